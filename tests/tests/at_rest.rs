@@ -1,5 +1,5 @@
-//! Minutes at rest after a manoeuvre, under every law. What decays in a law's memory has to end at zero: a number below
-//! 1.2e-38 is subnormal, and many processors take a hundred times as long to compute with it.
+//! Flies minutes at rest after a manoeuvre, under every law. Decaying values in a law's memory must end at zero:
+//! numbers below 1.2e-38 are subnormal, and many processors take a hundred times as long to compute with them.
 
 use afbc::integral::IntegralBackstepping;
 use afbc::monitor::Bounds;
@@ -10,20 +10,20 @@ use afbc_types::{Parameters, PerAxis, Setpoint, State};
 use core::fmt::Debug;
 use nalgebra::Vector3;
 
-/// Settings of the peers.
+/// Settings of the other laws.
 const SETTINGS: Settings = Profile::Flight.settings().common;
 
-/// Step in which the setpoint moves by 1 m along each axis and by 1 rad.
+/// Step at which the setpoint moves by 1 m along each axis and by 1 rad.
 const BEGIN: usize = 1_000;
-/// Steps of the vehicle's motion, after which it is at rest on its setpoint.
+/// Number of steps of the motion, after which the vehicle rests at its setpoint.
 const MOTION: usize = 2_000;
 const TEN_MINUTES: usize = 600_000;
-/// The slowest averages, over a second, decay from 1 to 1e-38 in 87 s.
+/// The slowest averages, over one second, decay from 1 to 1e-38 in 87 s.
 const TWO_MINUTES: usize = 120_000;
-/// Steps in which what decays within a second is looked at often.
+/// Number of first steps that are checked often, for values that decay within a second.
 const EARLY: usize = 40_000;
 
-/// State and setpoint of a step, from its number, the last state and the last step's trace.
+/// Returns state and setpoint of a step from its number, the last state and the last step's trace.
 type Motion = fn(usize, &State, &Trace) -> (State, Setpoint);
 
 const MOTIONS: [(&str, Motion, usize); 5] = [
@@ -39,7 +39,7 @@ fn setpoint(step: usize) -> Setpoint {
     Setpoint { position_m: Vector3::repeat(size), yaw_rad: size, ..Setpoint::default() }
 }
 
-/// Moves smoothly, and leans as its acceleration needs.
+/// Moves smoothly, and tilts as the acceleration needs.
 fn smooth(step: usize, _: &State, _: &Trace) -> (State, Setpoint) {
     let seconds = MOTION as f32 * 1e-3;
     let t = (step.saturating_sub(BEGIN) as f32 / MOTION as f32).min(1.0);
@@ -55,14 +55,14 @@ fn smooth(step: usize, _: &State, _: &Trace) -> (State, Setpoint) {
     (state, setpoint(step))
 }
 
-/// Stays where it was, then is at the setpoint.
+/// Stays at the old place, then jumps to the setpoint.
 fn late(step: usize, _: &State, _: &Trace) -> (State, Setpoint) {
     let Setpoint { position_m, yaw_rad, .. } = setpoint(if step < BEGIN + MOTION { 0 } else { step });
     let state = State { position_m, attitude_rad: Vector3::new(0.0, 0.0, yaw_rad), ..State::default() };
     (state, setpoint(step))
 }
 
-/// Follows what the law tracks, a step later.
+/// Follows the law's reference, one step later.
 fn follows(step: usize, last: &State, trace: &Trace) -> (State, Setpoint) {
     let (mut state, errors) = (*last, &trace.errors);
     state.position_m += Vector3::new(errors.x.e1, errors.y.e1, errors.z.e1);
@@ -72,7 +72,7 @@ fn follows(step: usize, last: &State, trace: &Trace) -> (State, Setpoint) {
     (state, setpoint(step))
 }
 
-/// Moves smoothly on the ground, with a setpoint below it at the end.
+/// Moves smoothly on the ground, with a setpoint below the ground at the end.
 fn landed(step: usize, last: &State, trace: &Trace) -> (State, Setpoint) {
     let (mut state, mut setpoint) = smooth(step, last, trace);
     (state.position_m.z, state.velocity_m_s.z) = (0.0, 0.0);
@@ -80,13 +80,13 @@ fn landed(step: usize, last: &State, trace: &Trace) -> (State, Setpoint) {
     (state, setpoint)
 }
 
-/// True if a number in this text is subnormal; one that is has been printed with an exponent, and exactly.
+/// True if the text contains a subnormal number. Debug output prints such numbers exactly, with an exponent.
 fn found(text: &str) -> bool {
     text.split(|c: char| !c.is_ascii_alphanumeric() && !"+-.".contains(c))
         .any(|word| word.contains("e-") && word.parse::<f32>().is_ok_and(f32::is_subnormal))
 }
 
-/// Returns the places of subnormal numbers in what the memory prints, which is every field: the names that lead to it.
+/// Returns the paths of the subnormal fields in the memory's debug output, which prints every field.
 fn subnormals(memory: &impl Debug) -> Vec<String> {
     if !found(&format!("{memory:?}")) {
         return Vec::new();
@@ -102,7 +102,7 @@ fn subnormals(memory: &impl Debug) -> Vec<String> {
     places
 }
 
-/// Flies every motion, and finds no subnormal number in the controller's memory.
+/// Flies every motion and checks that no number in the controller's memory becomes subnormal.
 fn leaves_nothing_subnormal<C: FlightController>(name: &str, controller: &C)
 where
     C::Memory: PartialEq,
@@ -115,12 +115,12 @@ where
             (state, setpoint) = motion(step, &state, &trace);
             let _ = controller.step(&mut memory, Some(&state), &setpoint);
             trace = C::trace(&memory.control);
-            // What decays in less than a tenth of a second decays before the rest has come to rest.
+            // Values that decay in less than 0.1 s decay before the vehicle rests, so early steps are checked often.
             if step % if step < EARLY { 7 } else { 97 } == 0 {
                 let places = subnormals(&memory.control);
                 assert!(places.is_empty(), "{name}, {motion_name}, step {step}:\n{}", places.join("\n"));
             }
-            // Nothing moves any more.
+            // Stops as soon as nothing changes any more.
             if step > BEGIN + MOTION && (memory, state, setpoint) == before {
                 break;
             }

@@ -1,5 +1,5 @@
-//! The black box of flights: replay of our own log does again what the estimator did, and a log that is cut is read up
-//! to there.
+//! The black box of flights: replaying our own log repeats the estimator's work, and a log that was cut off is read up
+//! to the cut.
 
 use afbc_hil::{Host, MessagePeriods, Station, place};
 use afbc_onboard::Link;
@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-/// Flies a built-in scenario by the firmware's code; returns its log.
+/// Flies a built-in scenario with the firmware's code and returns its log.
 fn flown(name: &str, duration_s: f64) -> Vec<u8> {
     let scenario = built_in(name).unwrap().read().unwrap();
     let contenders = vec![afbc_hil::firmware(&scenario).unwrap()];
@@ -34,8 +34,8 @@ fn file(name: &str, bytes: &[u8]) -> PathBuf {
     path
 }
 
-/// The estimator over the log is where the log says that it was: outdoors by receiver, barometer and magnetometer,
-/// indoors by motion capture. Bounds are roundings: of a quaternion in f32, and of a state between two samples.
+/// The replayed estimates equal the logged ones, outdoors with receiver, barometer and magnetometer, and indoors with
+/// motion capture. The bounds are rounding errors: of a quaternion in f32, and of a state between two samples.
 #[test]
 fn a_replay_is_the_flight() {
     for (name, sensors) in
@@ -50,17 +50,17 @@ fn a_replay_is_the_flight() {
         assert!(matches!(replayed.start, EstimatorStart::AtRest(_)), "{name}: {:?}", replayed.start);
         let figures = &replayed.figures;
         for (figure, most) in [(&figures.attitude, 1e-4), (&figures.velocity, 1e-6), (&figures.position, 1e-6)] {
-            // A state of every 12 ms of attitude and 20 ms of motion, from the start of the estimator on.
+            // There is a logged attitude every 12 ms and a logged motion every 20 ms, from the estimator's start on.
             assert!(figure.count > 400, "{name}: {figure:?}");
             assert!(figure.largest < most, "{name}: {figure:?}");
         }
     }
 }
 
-/// Bytes of a record before its content.
+/// Length of a record's header \[bytes\].
 const HEAD: usize = 3;
 
-/// Returns where each record ends, and how many samples of the inertial sensor there are until then.
+/// Returns the end of each record, and the number of IMU samples up to there.
 fn ends(log: &[u8]) -> Vec<(usize, usize)> {
     let (mut at, mut samples, mut id) = (16, 0, None);
     let mut ends = Vec::new();
@@ -77,14 +77,14 @@ fn ends(log: &[u8]) -> Vec<(usize, usize)> {
     ends
 }
 
-/// Cut at any byte, as when the power is lost, it is read up to its last whole record.
+/// A log that was cut at any byte, as by a loss of power, is read up to its last whole record.
 #[test]
 fn a_cut_log_is_read_up_to_there() {
     let log = flown("mocap", 0.5);
     let ends = ends(&log);
     let first = ends.iter().find(|(_, samples)| *samples > 0).unwrap().0;
     let all = afbc_replay::read(&file("whole.ulg", &log)).unwrap();
-    // Every byte of the first milliseconds, and some of the rest.
+    // Cuts at every byte of the first milliseconds, and at some of the rest.
     for cut in (first..first + 1_500).chain((first + 1_500..log.len()).step_by(9_973)) {
         let read = afbc_replay::read(&file("cut.ulg", &log[..cut])).unwrap();
         let (end, samples) = ends[ends.partition_point(|(end, _)| *end <= cut) - 1];

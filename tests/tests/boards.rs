@@ -1,10 +1,9 @@
-//! Firmware and boards meet in one place, nothing on a board is used twice, every interrupt has the priority of its
-//! purpose, and the documented wiring is that of the code.
+//! Checks of the boards: each meets the firmware in one place, uses nothing twice and gives every interrupt the
+//! priority of its purpose, and the documented wiring is that of the code.
 //!
-//! The compiler already refuses a pin on the wrong peripheral, a DMA stream of another request, the wrong channel of
-//! a timer, and any of them used twice; the linker refuses two handlers of an interrupt, and an image that is too
-//! large.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // what is unreadable must stop it
+//! The compiler already refuses a pin on the wrong peripheral, a DMA stream of another request, the wrong channel of a
+//! timer, and any of them used twice. The linker refuses two handlers for an interrupt, and an image that is too large.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // unreadable code must stop it
 
 use crate::board_table::{Battery, BoardTable, LogBus, Motor, Stream, Timer, row, wiring};
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,7 +14,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
 
-/// What makes an image of a table.
+/// File of the macro that makes an image of a table.
 const TABLES: &str = "firmware/chips/stm32f4/src/flight_controller.rs";
 
 /// Returns every Rust file below `folder`, with its text.
@@ -32,7 +31,7 @@ fn sources(folder: &Path) -> Vec<(PathBuf, String)> {
     found
 }
 
-/// Returns the names of pins in `text`: P, a port, a number.
+/// Returns the names of pins in `text`, such as PA13.
 fn pins(text: &str) -> BTreeSet<String> {
     let words = text.split(|c: char| !c.is_ascii_alphanumeric());
     let is_pin = |word: &&str| {
@@ -44,7 +43,7 @@ fn pins(text: &str) -> BTreeSet<String> {
     words.filter(is_pin).map(str::to_owned).collect()
 }
 
-/// In code once in its folder, as a table once in its file.
+/// A board in code calls the firmware once in its folder, a board that is a table once in its file.
 #[test]
 fn every_board_meets_the_firmware_once() {
     let (tables, mut codes) = kinds();
@@ -63,7 +62,7 @@ fn every_board_meets_the_firmware_once() {
     assert!(root().join("memory.x").is_file());
 }
 
-/// A page for each, listed in the book, with what its owner needs.
+/// Every board has a page that is listed in the book and has the required sections.
 #[test]
 fn every_board_has_a_page() {
     let contents = fs::read_to_string(root().join("docs/SUMMARY.md")).unwrap();
@@ -85,7 +84,7 @@ fn every_board_has_a_page() {
     }
 }
 
-/// No board is selected by `#[path]` or conditional compilation, and no chip is named.
+/// The firmware selects no board by `#[path]` or conditional compilation, and names no chip.
 #[test]
 fn the_firmware_knows_no_board() {
     let manifest = fs::read_to_string(root().join("firmware/Cargo.toml")).unwrap();
@@ -122,7 +121,7 @@ fn the_wiring_is_what_the_board_uses() {
         let code = code_of(&root().join("firmware/boards").join(board));
         let (head, body) = code.split_once("\nuse ").unwrap();
         assert_eq!(pins(body).len(), count, "{board}: {:?}", pins(body));
-        // Those of crystal and debugger are fixed by the chip.
+        // The chip fixes the pins of crystal and debugger.
         let fixed = ["PH0", "PH1", "PA13", "PA14"].map(str::to_owned).into();
         assert_eq!(&pins(table) - &fixed, pins(body), "docs/{page}, {board}");
         assert_eq!(&pins(head) - &fixed, pins(body), "the table of {board} itself");
@@ -134,14 +133,14 @@ fn code_of(board: &Path) -> String {
     fs::read_to_string(board.join("src/board.rs")).unwrap()
 }
 
-/// Returns what is in a folder, if it is there.
+/// Returns the sorted contents of a folder; none if the folder is missing.
 fn within(folder: &Path) -> Vec<PathBuf> {
     let mut paths: Vec<_> = fs::read_dir(folder).into_iter().flatten().map(|entry| entry.unwrap().path()).collect();
     paths.sort();
     paths
 }
 
-/// Returns the files of the boards that are a table, with it, and the folders of those that are code.
+/// Returns the boards that are tables, as files with their tables, and the folders of the boards in code.
 fn kinds() -> (Vec<(PathBuf, BoardTable)>, Vec<PathBuf>) {
     let codes =
         within(&root().join("firmware/boards")).into_iter().filter(|path| path.is_dir() && !path.ends_with("emulated"));
@@ -152,7 +151,7 @@ fn kinds() -> (Vec<(PathBuf, BoardTable)>, Vec<PathBuf>) {
     (tables, codes)
 }
 
-/// Returns the name of a board by the file of its table, or by its folder.
+/// Returns the name of a board, from its table's file or its folder.
 fn name_of(board: &Path) -> &str {
     let name = board.file_stem().unwrap().to_str().unwrap();
     if board.is_dir() { name } else { name.strip_prefix("flight-").unwrap() }
@@ -165,13 +164,13 @@ fn chip_of(board: &Path) -> String {
     text.split_once("\nchip = \"").unwrap().1.split('"').next().unwrap().to_owned()
 }
 
-/// Returns the words of `text` that begin with `start`, without it, up to what is no part of a name.
+/// Returns the rest of each word of `text` that begins with `start`.
 fn names_after<'a>(text: &'a str, start: &'a str) -> Vec<&'a str> {
     let is_end = |c: char| !c.is_ascii_alphanumeric() && c != '_';
     text.split(start).skip(1).map(|rest| rest.split(is_end).next().unwrap()).collect()
 }
 
-/// Returns the interrupt lines that the executors of `firmware::image!` take, the first in a file.
+/// Returns the interrupt lines that the first `firmware::image!` of a file gives to the executors.
 fn executors(file: &Path) -> Vec<String> {
     let text = fs::read_to_string(file).unwrap();
     let image = text.split_once("firmware::image!(").unwrap().1.split_once(");").unwrap().0;
@@ -214,8 +213,8 @@ fn nothing_is_used_twice() {
     }
 }
 
-/// Pins of one number on all ports have one line of external interrupts: no board uses a line twice, each is that of
-/// its pin, and has the interrupt that the chips' manuals give it (RM0090, RM0433).
+/// Pins with the same number share an EXTI line on all ports. No board uses a line twice, each line matches its pin,
+/// and its interrupt is the one in the chips' manuals (RM0090, RM0433).
 #[test]
 fn every_line_of_external_interrupts_is_that_of_one_pin() {
     let interrupt = |line: usize| match line {
@@ -253,7 +252,7 @@ fn every_line_of_external_interrupts_is_that_of_one_pin() {
     assert_eq!(count, expected);
 }
 
-/// What a table says twice, it says alike.
+/// Names that a table repeats agree with each other.
 #[test]
 fn streams_have_their_interrupts_and_motors_their_pins() {
     for (board, table) in kinds().0 {
@@ -265,12 +264,12 @@ fn streams_have_their_interrupts_and_motors_their_pins() {
         }
         assert_eq!(table.i2c.lines, ["EV", "ER"].map(|line| format!("{}_{line}", table.i2c.name)));
         for Timer { name, word, .. } in &table.timers {
-            // Those of 32 bits (RM0090).
+            // TIM2 and TIM5 have 32 bits (RM0090).
             let is_wide = ["TIM2", "TIM5"].contains(&name.as_str());
             assert_eq!(word, if is_wide { "u32" } else { "u16" }, "{}", board.display());
         }
     }
-    // In code, the pins of the motors are those that are held low after a panic.
+    // In boards in code, the motor pins are those that are held low after a panic.
     for board in kinds().1 {
         let code = code_of(&board);
         let driven: BTreeSet<_> = names_after(&code, "pin(p.").into_iter().map(str::to_owned).collect();
@@ -291,8 +290,8 @@ fn streams_have_their_interrupts_and_motors_their_pins() {
     }
 }
 
-/// Bytes of serial ports come first, then the IMU's interrupt and transfers, the motors', the slow sensors', and the
-/// memory card's.
+/// Interrupts of serial ports have the highest priority, then those of IMU and its transfers, motors, slow sensors and
+/// memory card.
 #[test]
 fn every_interrupt_has_the_priority_of_its_purpose() {
     let table = fs::read_to_string(root().join(TABLES)).unwrap();
@@ -320,7 +319,7 @@ fn every_interrupt_has_the_priority_of_its_purpose() {
         let handlers = handlers(&code);
         assert!(priorities.keys().eq(handlers.keys()), "{}: {priorities:?} {handlers:?}", board.display());
         let motors: Vec<_> = code.split("Motors<").skip(1).filter_map(|it| it.split(", ").nth(1)).collect();
-        // What the card's interface is given.
+        // Peripherals that the card's interface takes.
         let card = code.split_once("Sdmmc::new_4bit(").map_or("", |(_, call)| call.split(')').next().unwrap());
         let card: Vec<_> = names_after(card, "p.").iter().map(|name| format!("<{name}>")).collect();
         for (line, handler) in handlers {
@@ -338,7 +337,8 @@ fn every_interrupt_has_the_priority_of_its_purpose() {
     }
 }
 
-/// Returns the interrupts that code binds, with their handlers, but that of USB, whose driver sets its priority.
+/// Returns the interrupts that the code binds, with their handlers. USB is left out, since its driver sets its own
+/// priority.
 fn handlers(code: &str) -> BTreeMap<String, String> {
     let bound = code.split_once("bind_interrupts!(struct").unwrap().1.split_once("});").unwrap().0;
     let lines = bound.lines().filter_map(|line| line.split_once(" => "));
@@ -347,7 +347,8 @@ fn handlers(code: &str) -> BTreeMap<String, String> {
     lines.map(|(line, handler)| (name(line), handler.trim_start_matches("embassy_stm32::").to_owned())).collect()
 }
 
-/// Returns the interrupts that code gives a priority, with its name: one by one, in pairs, or a list in a loop.
+/// Returns the interrupts to which the code gives a priority, with the priority's name. The code does so one by one, in
+/// pairs, or in a loop over a list.
 fn prioritised(code: &str) -> BTreeMap<String, String> {
     let mut found = BTreeMap::new();
     let mut add = |line: &str, priority: &str| {
@@ -378,8 +379,8 @@ fn prioritised(code: &str) -> BTreeMap<String, String> {
     found
 }
 
-/// A line that nothing drives must not be read: every UART has the set-up whose RX is pulled up. Every I2C is recovered
-/// after trouble.
+/// A line that nothing drives must not be read, so every UART uses the set-up with a pull-up on RX. Every I2C recovers
+/// after errors.
 #[test]
 fn no_board_has_a_bare_uart_or_i2c() {
     let (mut uarts, mut buses) = (0, 0);
@@ -387,7 +388,7 @@ fn no_board_has_a_bare_uart_or_i2c() {
         let calls = |call: &str| text.matches(call).count();
         assert_eq!(calls("usart::Config::default()"), 0, "{}", path.display());
         if text.contains("embassy_stm32::usart::") {
-            // Where all others begin.
+            // The other set-ups start from this one.
             let begins = path.ends_with("chips/stm32/src/link.rs");
             assert_eq!(calls("= Config::default()"), usize::from(begins), "{}", path.display());
         }
@@ -401,9 +402,9 @@ fn no_board_has_a_bare_uart_or_i2c() {
     assert!(uarts >= 12 && buses >= 4, "{uarts} UARTs, {buses} I2C");
 }
 
-/// Each table's file repeats what matters of Betaflight's description of the board (`betaflight/config`), copied by
-/// hand once more: the scale of the current in millivolts per 10 A; an LED, but for those at the debugger's pins;
-/// PINIO1, which is inverted and off while armed; the flash chip, if the board has one that is used.
+/// Each table's file repeats the relevant part of Betaflight's description of the board (`betaflight/config`), copied
+/// by hand a second time: the current scale in millivolts per 10 A, the LED unless it is at the debugger's pins,
+/// PINIO1, which is inverted and off while armed, and the flash chip, if it is used.
 #[test]
 fn boards_are_as_betaflight_describes_them() {
     for (board, table) in kinds().0 {
@@ -434,7 +435,7 @@ fn boards_are_as_betaflight_describes_them() {
         ));
         let wired: BTreeMap<_, _> = wired.into_iter().map(|(what, pins)| (what, pins.join(", "))).collect();
         assert_eq!(wired, described, "{name}");
-        // No scale of the voltage is given: 110 tenths of a volt per volt.
+        // Betaflight gives no voltage scale for these boards, so its default applies: 110 tenths of a volt per volt.
         assert_eq!((*volts_per_volt, &**converter), (11.0, "ADC1"), "{name}");
         assert_eq!((table.crystal_hz, table.numbering.as_str()), (8_000_000, "BETAFLIGHT"), "{name}");
     }
@@ -457,7 +458,7 @@ fn every_board_that_is_a_table_has_its_page() {
     }
 }
 
-/// Writes a page if that is asked for, and compares it.
+/// Writes a page if the variable WRITE is set, then compares it.
 fn assert_written(path: &Path, text: &str) {
     if std::env::var_os("WRITE").is_some() {
         fs::write(path, text).unwrap();
@@ -465,7 +466,7 @@ fn assert_written(path: &Path, text: &str) {
     assert_eq!(fs::read_to_string(path).unwrap(), text, "run WRITE=1 cargo test -p flight-tests --test all boards::");
 }
 
-/// Rows of boards that are a table are written, those of others follow.
+/// The rows of boards that are tables are generated; the rows of other boards follow.
 #[test]
 fn the_list_has_every_board() {
     let path = root().join("docs/boards.md");

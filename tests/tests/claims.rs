@@ -1,4 +1,4 @@
-//! The paper's three claims, checked by flights with all four signs of the uncertainty and both models of the vehicle.
+//! Checks the paper's three claims by flights with all four signs of the uncertainty and both models of the vehicle.
 
 use afbc_plant::{Environment, Gust, GustKind, Motion, PlantModel};
 use afbc_report::claims::VANISHED;
@@ -19,7 +19,7 @@ fn fly_both(scenario: &Scenario) -> Vec<Flown> {
     scenario.contenders.iter().map(fly).collect()
 }
 
-/// Returns every default reading: four signs, two models.
+/// Returns all default readings of the paper: four signs, two models.
 fn readings() -> impl Iterator<Item = Scenario> {
     Uncertainty::ALL.into_iter().flat_map(|uncertainty| {
         [PlantModel::Simplified, PlantModel::RigidBody].map(move |model| {
@@ -32,7 +32,7 @@ fn below(a: Vector4<f64>, b: Vector4<f64>) -> bool {
     a.iter().zip(b.iter()).all(|(a, b)| a < b)
 }
 
-/// Returns mean and largest |error| over the last 5 s.
+/// Returns the mean and largest |error| over the last 5 s.
 fn late(run: &Run) -> (Vector4<f64>, Vector4<f64>) {
     let late = run.log.iter().filter(|sample| sample.time_s >= 55.0);
     let errors: Vec<_> = late.map(|sample| metrics::tracking_error(sample).abs()).collect();
@@ -40,7 +40,7 @@ fn late(run: &Run) -> (Vector4<f64>, Vector4<f64>) {
     (errors.iter().sum::<Vector4<f64>>() / errors.len() as f64, largest)
 }
 
-/// Checks the figures themselves, without [`claims`].
+/// Checks the figures themselves, without the code of [`claims`].
 #[test]
 fn the_flights_bear_the_claims_out() {
     for scenario in readings() {
@@ -51,9 +51,9 @@ fn the_flights_bear_the_claims_out() {
         let (a, b): (&Metrics, &Metrics) = (&afbc.metrics, &baseline.metrics);
 
         // "Null error is achieved in all outputs for the AFBC controller ... which is not the case for backstepping".
-        // Over the last 5 s, so that neither a zero crossing nor chatter decides, AFBC's errors are millimetres (psi
-        // still decaying after the gust at 45 s), backstepping's decimetres. A start 1e-6 m away changes AFBC's figures
-        // by up to 1.3 mm and 6 mrad, amplified by chatter, and backstepping's not at all.
+        // The average over the last 5 s hides zero crossings and chatter. There, AFBC's errors are millimetres, with
+        // psi still decaying after the gust at 45 s, and backstepping's are decimetres. A start 1e-6 m away changes
+        // AFBC's figures by up to 1.3 mm and 6 mrad, since chatter amplifies it, and does not change backstepping's.
         let (mean, largest) = late(&afbc);
         let kept = b.final_error.abs();
         assert!(below(mean, Vector4::new(0.01, 0.01, 0.002, 0.07)), "{place}: AFBC is left with {mean}");
@@ -81,7 +81,7 @@ fn the_claims_as_reported_hold() {
         for claim in &claims {
             assert!(claim.holds, "{} {:?}: {claim:?}", scenario.model.name(), scenario.case);
         }
-        // The evidence contains the figures: AFBC's and the baseline's RMSE along x, to the millimetre.
+        // The evidence contains the figures: the RMSE of both laws along x, to the millimetre.
         let tracking = claims.iter().find(|claim| claim.statement.contains("tracks better")).unwrap();
         for run in [&flown[0].run, &flown[1].run] {
             let figure = format!("x {:.3}", run.metrics.rmse.x);
@@ -90,7 +90,7 @@ fn the_claims_as_reported_hold() {
     }
 }
 
-/// A claim without support fails: making each figure worse in turn makes exactly its own claim fail.
+/// A claim without support fails. Making each figure worse in turn makes exactly its own claim fail.
 #[test]
 fn a_claim_falls_with_its_figures() {
     let honest = fly_both(&scenario(PlantModel::Simplified, Case::DEFAULT).unwrap());
@@ -99,7 +99,7 @@ fn a_claim_falls_with_its_figures() {
         change(&mut flown[0].run, &honest[1].run);
         claims(&flown).iter().map(|claim| claim.holds).collect::<Vec<_>>()
     };
-    // An error along one axis during the last 5 s, as a share of the error that backstepping keeps there.
+    // Adds an error along one axis during the last 5 s, as a share of the error that backstepping has there.
     let left = |run: &mut Run, baseline: &Run, axis: usize, share: f64| {
         let late = |sample: &&Sample| sample.time_s >= 55.0;
         let kept: Vec<f64> = baseline.log.iter().filter(late).map(|s| metrics::tracking_error(s)[axis].abs()).collect();
@@ -123,7 +123,7 @@ fn a_claim_falls_with_its_figures() {
         };
         assert_eq!(holds(&smoother), [true, true, false]);
     }
-    // Without flights of both laws there are no claims.
+    // Without flights of both laws, there are no claims.
     assert_eq!(claims(&honest[..1]).len(), 0);
     let mut other = honest.clone();
     other[1].scenario.name = "another".into();
@@ -140,7 +140,8 @@ fn no_claim_holds_if_a_vehicle_is_lost() {
 }
 
 /// Backstepping's remaining error in closed form: with f and g known except for A, (13) comes to rest where (1 +
-/// alpha_1 alpha_2) e_1 = A. Hover with a persistent gust on x; alpha_1 = 1, alpha_2 = 2, so A/3.
+/// alpha_1 alpha_2) e_1 = A. In hover with a persistent gust along x, with alpha_1 = 1 and alpha_2 = 2, the error is
+/// A/3.
 #[test]
 fn backstepping_keeps_an_offset_of_the_gust_over_one_plus_both_gains() {
     for size in [0.3, 1.2, -0.9] {
@@ -155,14 +156,14 @@ fn backstepping_keeps_an_offset_of_the_gust_over_one_plus_both_gains() {
 
         let run = Run::fly(&scenario, scenario.contender(ControllerKind::Backstepping).unwrap(), u64::MAX).unwrap();
         let offset = size / (1.0 + 1.0 * 2.0);
-        // The vehicle holds its height, so thrust is weight over the cosine of the tilt, as (40) assumes, and g
-        // tan(theta) is u5: only rounding remains, of f32 positions of 1 m (6e-8) times alpha_1 alpha_2, and
-        // the cosine of a yaw of 0, which is exact. After 39 s the transient has decayed.
+        // The vehicle holds its height, so the thrust is the weight divided by the cosine of the tilt, as (40) assumes,
+        // and g tan(theta) is u5. Only rounding remains: that of f32 positions of 1 m (6e-8) times alpha_1 alpha_2. The
+        // cosine of a yaw of 0 is exact. After 39 s the transient has decayed.
         let error = run.metrics.final_error;
         assert!((error.x - offset).abs() <= 1e-6, "{} m for {offset} m", error.x);
         assert!(error.y.abs() < 1e-6 && error.w.abs() < 1e-6, "{error}");
 
-        // AFBC keeps no error: adaptation removes it. After 39 s it is below a twentieth.
+        // AFBC keeps no error, since adaptation removes it. After 39 s the error is below a twentieth of the offset.
         let run = Run::fly(&scenario, scenario.contender(ControllerKind::Afbc).unwrap(), u64::MAX).unwrap();
         assert!(run.metrics.final_error.x.abs() < 0.05 * offset.abs(), "{} m of {offset} m", run.metrics.final_error.x);
     }

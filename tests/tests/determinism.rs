@@ -1,5 +1,5 @@
-//! Repeated flights give the same bits in every number of every sample; repeated property tests draw the same cases.
-#![allow(clippy::unwrap_used, missing_docs)] // what cannot be flown must stop the test
+//! Repeated flights give the same bits in every number of every sample. Repeated property tests draw the same cases.
+#![allow(clippy::unwrap_used, missing_docs)] // a failed flight must stop the test
 
 use afbc::Profile;
 use afbc_plant::PlantModel;
@@ -12,7 +12,7 @@ use afbc_types::Axis;
 use proptest::prelude::{ProptestConfig, Rng as _};
 use proptest::test_runner::{RngSeed, TestRunner};
 
-/// Every number of a sample.
+/// Returns every number of a sample.
 fn numbers(sample: &Sample) -> impl Iterator<Item = u64> {
     let (m, r, a, t) = (&sample.motion, &sample.reference, &sample.action, &sample.trace);
     let wide = [sample.time_s, r.yaw_rad, r.yaw_rate_rad_s, r.yaw_acceleration_rad_s2].into_iter().chain(
@@ -49,7 +49,7 @@ fn numbers(sample: &Sample) -> impl Iterator<Item = u64> {
     wide.into_iter().chain(narrow)
 }
 
-/// Returns a hash of all bits of a flight (FNV-1a), and its number of samples.
+/// Returns a hash of all bits of a flight (FNV-1a) and the number of its samples.
 fn digest(scenario: &Scenario, contender: &Contender) -> (u64, usize) {
     let (mut hash, mut samples) = (0xcbf2_9ce4_8422_2325_u64, 0);
     fly(scenario, contender, |sample| {
@@ -72,7 +72,7 @@ fn two_flights_are_the_same_to_the_bit() {
             let first = digest(&scenario, contender);
             assert_eq!(first.1, 25_001);
             assert_eq!(digest(&scenario, contender), first, "{} {}", model.name(), kind.name());
-            // Concurrently with another flight, in another thread.
+            // Another thread flies while this one waits.
             let elsewhere = std::thread::scope(|scope| scope.spawn(|| digest(&scenario, contender)).join().unwrap());
             assert_eq!(elsewhere, first);
             // The digest detects a difference in the last bit of a number.
@@ -82,7 +82,7 @@ fn two_flights_are_the_same_to_the_bit() {
     }
 }
 
-/// `.cargo/config.toml` sets the seed of every property test of the workspace, `scripts/soak` others.
+/// `.cargo/config.toml` sets the seed of all property tests of the workspace. `scripts/soak` uses other seeds.
 #[test]
 fn property_tests_draw_the_same_cases_every_time() {
     let config = ProptestConfig::with_cases(1);

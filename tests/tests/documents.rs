@@ -7,7 +7,7 @@ use afbc_scenario::contender::ControllerKind;
 use std::fs;
 use std::path::Path;
 
-/// True if `text` holds a date after "easured".
+/// True if `text` has a date after "measured" or "Measured".
 fn is_dated(text: &str) -> bool {
     let is_date = |word: &str| {
         let form: String = word.chars().take(10).map(|c| if c.is_ascii_digit() { '0' } else { c }).collect();
@@ -22,8 +22,8 @@ fn is_compared(root: &Path, text: &str, name: &str) -> bool {
     words.any(|word| word.ends_with(".rs") && fs::read_to_string(root.join(word)).is_ok_and(|code| code.contains(name)))
 }
 
-/// A table with right-aligned columns holds figures. Its section names the file with the comparison, which reads the
-/// page, or says "Measured" with the date.
+/// Tables with right-aligned columns hold figures. Their section names the source file that compares them with the
+/// code, or says "Measured" with a date.
 #[test]
 fn every_table_of_figures_is_compared_or_dated() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
@@ -46,7 +46,7 @@ fn every_table_of_figures_is_compared_or_dated() {
     assert!(tables >= 8, "{tables} sections");
 }
 
-/// Tables of keys that name laws list all of them.
+/// Every table of keys that names laws lists all laws.
 #[test]
 fn pages_that_list_the_laws_list_all() {
     for (page, text) in [
@@ -81,7 +81,7 @@ fn the_gains_of_the_profile_flight_are_those_on_its_page() {
             s.delta_max,
             s.sigma,
         ];
-        // To half of the last digit written.
+        // Compares to half of the last digit written.
         let close = |(cell, figure): (&str, &f32)| {
             let decimals = cell.split_once('.').map_or(0, |(_, decimals)| decimals.len());
             (cell.parse::<f32>().unwrap() - figure).abs() <= 0.501 * 0.1_f32.powi(decimals as i32)

@@ -1,4 +1,5 @@
-//! Ten hours of hover in noise: the estimates of the profile `flight` stay bounded, those of the law as printed drift.
+//! Ten hours of hover with noise: the estimates of the profile `flight` stay bounded; those of the law as printed
+//! drift.
 
 use afbc::{Adaptive, AdaptiveEstimate, Cascade, Controller, Profile};
 use afbc_control::{FlightController, Validated};
@@ -14,7 +15,7 @@ use nalgebra::Vector3;
 const STEP_S: f64 = 0.001;
 const HOUR: u64 = 3_600_000;
 
-/// A hover at 2 m with rotors of 20 ms and 3 N and noise of 0.001 on every state.
+/// A hover at 2 m with a rotor lag of 20 ms, at most 3 N per rotor, and noise of 0.001 on every state.
 struct Hover {
     controller: Controller<Adaptive>,
     memory: Validated<Cascade<AdaptiveEstimate>>,
@@ -40,7 +41,7 @@ impl Hover {
         Hover { controller, memory: Validated::default(), plant, sensors, setpoint }
     }
 
-    /// Flies `steps`; returns the largest distance from the setpoint \[m\].
+    /// Flies `steps` and returns the largest distance from the setpoint \[m\].
     fn fly(&mut self, steps: u64) -> f64 {
         let mut furthest = 0.0_f64;
         for _ in 0..steps {
@@ -53,7 +54,7 @@ impl Hover {
         furthest
     }
 
-    /// Returns |Theta_hat| and delta_hat of each subsystem.
+    /// Returns the norms |Theta_hat| and delta_hat of each subsystem.
     fn norms(&self) -> PerAxis<[f32; 2]> {
         let estimates = &self.memory.control.estimates;
         PerAxis::from_fn(|axis| [estimates[axis].theta.norm(), estimates[axis].delta])
@@ -75,7 +76,7 @@ fn estimates_of_the_profile_flight_stay_bounded_over_ten_hours() {
             let safeguards = gains[axis].safeguards;
             assert!(theta <= 0.9 * safeguards.theta_max, "hour {hour}, {axis:?}: |Theta_hat| = {theta}");
             assert!((0.0..=safeguards.delta_max).contains(&delta), "hour {hour}, {axis:?}: delta_hat = {delta}");
-            // No slow drift: an hour is 36 time constants of the leakage.
+            // There is no slow drift: an hour is 36 time constants of the leakage.
             let [theta_then, delta_then] = first[axis];
             assert!((theta - theta_then).abs() <= 0.2 * theta_then.max(0.1), "{axis:?}: {theta_then} to {theta}");
             assert!((delta - delta_then).abs() <= 0.2 * delta_then.max(0.01), "{axis:?}: {delta_then} to {delta}");
@@ -100,8 +101,8 @@ fn estimates_of_the_law_as_printed_drift_until_the_vehicle_is_lost() {
     assert!(furthest > 50.0);
 }
 
-/// Without noise, the flight lasts as long as docs/results.md says and ends as described there: level, with the thrust
-/// that the allocation needs for the limit cycle in pitch.
+/// Without noise, the flight lasts as long as docs/results.md says. It ends level, with the thrust that the allocation
+/// needs for the limit cycle in pitch.
 #[test]
 fn the_printed_hover_is_lost_upwards_and_level() {
     let mut scenario = Scenario { duration_s: 300.0, ..built_in("hover").unwrap().read().unwrap() };
@@ -118,7 +119,7 @@ fn the_printed_hover_is_lost_upwards_and_level() {
 
     let tilt = |sample: &Sample| sample.motion.attitude_rad.xy().amax();
     assert!(run.log.iter().filter(|sample| sample.time_s > 5.0).all(|sample| tilt(sample) < 0.06));
-    // In the last second the thrust exceeds the demand, since pitch has priority.
+    // In the last second, the thrust exceeds the demand, since pitch has priority.
     let end: Vec<_> = run.log.iter().filter(|sample| sample.time_s > lost.time_s - 1.0).collect();
     let mean = |of: fn(&Sample) -> f32| end.iter().map(|sample| of(sample)).sum::<f32>() / end.len() as f32;
     let weight_n = (Parameters::PAPER.mass_kg * Parameters::PAPER.gravity_m_s2) as f32;

@@ -1,6 +1,6 @@
-//! Flights on the vehicle's own estimate: how accurate and how honest it is in the closed loop. `docs/estimation.md`
+//! Flights on the vehicle's own estimate: its accuracy and its consistency in the closed loop. `docs/estimation.md`
 //! shows the figures; `--nocapture` prints them.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // what cannot be flown must stop the test
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a failed flight must stop the test
 
 use afbc_plant::instruments::{Failure, InstrumentFault};
 use afbc_scenario::contender::{Contender, ControllerKind};
@@ -18,7 +18,7 @@ fn afbc(scenario: &Scenario) -> &Contender {
     scenario.contender(ControllerKind::Afbc).unwrap()
 }
 
-/// Flies under AFBC, which must keep the vehicle.
+/// Flies under AFBC, which must not lose the vehicle.
 fn flown(scenario: &Scenario, mut observe: impl FnMut(&Sample)) -> Metrics {
     let mut metrics = Accumulator::default();
     let lost = fly(scenario, afbc(scenario), |sample| {
@@ -29,8 +29,8 @@ fn flown(scenario: &Scenario, mut observe: impl FnMut(&Sample)) -> Metrics {
     metrics.finish()
 }
 
-/// Mean squares over flights with the seeds 1 to `flights`: of the estimate's errors, and the largest errors of
-/// tracking.
+/// Returns the mean squared errors of the estimate and the largest tracking errors, over flights with the seeds 1 to
+/// `flights`.
 fn accuracy(scenario: &Scenario, flights: u64) -> (EstimateMetrics, Vector4<f64>) {
     let mut sum = EstimateMetrics::default();
     let mut tracking = Vector4::zeros();
@@ -49,7 +49,7 @@ fn accuracy(scenario: &Scenario, flights: u64) -> (EstimateMetrics, Vector4<f64>
     (EstimateMetrics { position_m, velocity_m_s, attitude_rad, ..sum }, tracking)
 }
 
-/// The paper's trajectory in front of a motion-capture system.
+/// The paper's trajectory with motion capture.
 #[test]
 fn indoors() {
     let (estimate, tracking) = accuracy(&scenario("mocap"), 10);
@@ -59,8 +59,9 @@ fn indoors() {
     assert!(tracking.max() <= 0.01, "{tracking}");
 }
 
-/// The paper's trajectory on GNSS, barometer and magnetometer. What the receiver's slow error is, no filter can tell:
-/// the position is as good as the receiver, and better than half of it where its error is noise.
+/// The paper's trajectory with GNSS, barometer and magnetometer. No filter can know the receiver's slow error, so the
+/// position is as good as the receiver's. Where the receiver's error is noise, the position error is less than half of
+/// it.
 #[test]
 fn outdoors() {
     let scenario = scenario("outdoor");
@@ -90,8 +91,8 @@ fn outdoors() {
     assert!(share <= 0.5, "{share}");
 }
 
-/// A hover in which the tracker fails for `gap_s`: the largest distance from the reference, and the largest changes
-/// of the inputs per step before, and from its return on.
+/// Returns results of a hover in which the tracker fails for `gap_s`: the largest distance from the reference, and the
+/// largest changes of the inputs per step before the failure and after the tracker's return.
 fn without_tracker(failure: Failure, gap_s: f64, seed: u64) -> (f64, f64, f64) {
     let mut scenario = scenario("mocap");
     let position_m = Vector3::new(0.0, 0.0, 2.0);
@@ -126,21 +127,21 @@ fn the_tracker_is_gone_in_hover() {
         let far_m = flights.iter().fold(0.0_f64, |far_m, flight| far_m.max(flight.0));
         let before = flights.iter().fold(0.0_f64, |most, flight| most.max(flight.1));
         let after = flights.iter().fold(0.0_f64, |most, flight| most.max(flight.2));
-        // Vibration changes the inputs too; the return of the tracker no more than that.
+        // Vibration changes the inputs too. The tracker's return must not change them more.
         println!(
             "{} for {gap_s} s: {far_m:.3} m; inputs change by {before:.4} N before, {after:.4} N after",
             failure.name()
         );
         assert!(far_m <= most_m, "{gap_s} s: {far_m} m");
-        // A frozen pose is believed for 0.2 s, against what the inertial sensor says: the vehicle, 0.4 m off by then,
-        // flies back faster than one whose tracker was lost.
+        // A frozen pose is believed for 0.2 s against the inertial sensor. The vehicle is 0.4 m off by then and flies
+        // back faster than after a lost tracker.
         let most = if matches!(failure, Failure::TrackerFrozen) { 0.35 } else { 1.2 * before };
         assert!(after <= most, "{gap_s} s: {after} N after {before} N");
     }
 }
 
-/// A tracker that does not return, or says the same for ever: the position is invalid after 5 s, and the pilot is not
-/// told one.
+/// If a tracker never returns, or repeats itself for ever, the position becomes invalid after 5 s, and the controller
+/// gets none.
 #[test]
 fn a_tracker_gone_for_good_is_admitted() {
     admitted(Failure::TrackerLost);
@@ -158,14 +159,14 @@ fn admitted(failure: Failure) {
         if view.state.is_none() {
             lost_s.get_or_insert(view.time_s);
         }
-        // Free fall, but that is for the controller to care about.
+        // The vehicle falls freely here, which does not matter to the estimator.
         world.advance(&Default::default());
     }
     let lost_s = lost_s.unwrap();
     assert!((5.0..7.0).contains(&lost_s), "{lost_s} s");
 }
 
-/// A tracker that is silent at first: the vehicle rests until it speaks.
+/// While the tracker is silent at first, the vehicle rests.
 #[test]
 fn nobody_starts_without_an_estimate() {
     let mut scenario = scenario("mocap");
@@ -177,7 +178,7 @@ fn nobody_starts_without_an_estimate() {
     }
 }
 
-/// A vehicle that is held is not measured again, however often somebody looks.
+/// Looking at a world repeatedly does not take new measurements.
 #[test]
 fn looking_twice_changes_nothing() {
     let mut world = World::new(&scenario("outdoor"), 0.001).unwrap();
@@ -187,7 +188,7 @@ fn looking_twice_changes_nothing() {
     assert!(first.state.is_some(), "it has settled before t = 0");
 }
 
-/// An outage of the link takes the tracker away, not the estimate.
+/// An outage of the link stops the tracker's measurements, not the estimate.
 #[test]
 fn an_outage_is_not_one_of_the_estimate() {
     let mut scenario = scenario("mocap");
@@ -220,8 +221,8 @@ fn every_law_flies_on_it() {
     }
 }
 
-/// Neither rotors that shake the inertial sensor twice as much nor fixes reach the inputs, and the monitor finds no
-/// limit cycle. Without the notch roll and pitch change by 50 mN a step.
+/// Neither twice the vibration nor fixes reach the inputs, and the monitor finds no limit cycle. Without the notch
+/// filter, roll and pitch inputs would change by 50 mN per step.
 #[test]
 fn shaken_twice_as_much() {
     for name in ["mocap", "outdoor"] {
@@ -257,14 +258,14 @@ fn the_same_flight_twice() {
     assert!(first == estimates());
 }
 
-/// Means over the flights of a Monte Carlo.
+/// Means over the flights of a Monte Carlo study.
 #[derive(Default)]
 struct Consistency {
-    /// NEES of the nine at each of [`TIMES_S`].
+    /// NEES of the nine coordinates at each of [`TIMES_S`].
     nees: [f64; TIMES_S.len()],
-    /// Squared error over variance of attitude, velocity and position, each coordinate, at these times.
+    /// Squared error divided by the variance of attitude, velocity and position, for each coordinate, at these times.
     ratios: [Vector3<f64>; 3],
-    /// Of each aid: normalised innovations squared, their scalars, measurements rejected.
+    /// For each aid: sum of normalised innovations squared, number of scalars, number of rejected measurements.
     nis: [(f64, u64, u64); Aid::ALL.len()],
 }
 
@@ -310,7 +311,8 @@ impl Consistency {
     }
 }
 
-/// Bounds of 95 % of the mean over the flights of chi-square numbers with `degrees` of freedom: normal, since many.
+/// True if the mean over the flights of chi-square numbers with `degrees` of freedom is within its 95 % bounds. The
+/// mean of so many is nearly normal.
 fn is_consistent(mean: f64, degrees: f64) -> bool {
     (mean - degrees).abs() <= 1.96 * (2.0 * degrees / FLIGHTS as f64).sqrt()
 }
@@ -326,8 +328,8 @@ fn consistent_indoors() {
     }
 }
 
-/// Nothing may be more wrong than it says: no error, no position by the receiver's slow error, no innovation but those
-/// that the document explains.
+/// No error may be larger than the estimate says: no error, no position off by the receiver's slow error, no innovation
+/// except those that the document explains.
 #[test]
 fn consistent_outdoors() {
     let slow = scenario("outdoor");
@@ -338,11 +340,12 @@ fn consistent_outdoors() {
     for (scenario, height) in [(&slow, 1.3), (&fast, 1.02)] {
         let found = monte_carlo(scenario);
         let name = &scenario.name;
-        // Stated somewhat too large, for vibration: below the lower bound, never above the upper one.
+        // The variances are slightly too large, to allow for vibration. NEES may be below the lower bound but never
+        // above the upper one.
         let most = 9.0 + 1.96 * (18.0 / FLIGHTS as f64).sqrt();
         assert!(found.nees.iter().all(|nees| (6.0..most).contains(nees)), "{name}: {:?}", found.nees);
         assert!(found.ratios.iter().all(|ratio| ratio.max() <= 1.3), "{name}: {:?}", found.ratios);
-        // 95 % of 21 000 scalars.
+        // 95 % bounds for 21 000 scalars.
         assert!((0.981..1.019).contains(&found.nis(Aid::GnssPosition)), "{name}: {}", found.nis(Aid::GnssPosition));
         assert!((0.9..1.019).contains(&found.nis(Aid::GnssVelocity)), "{name}: {}", found.nis(Aid::GnssVelocity));
         assert!((0.98..height).contains(&found.nis(Aid::Height)), "{name}: {}", found.nis(Aid::Height));
@@ -350,8 +353,8 @@ fn consistent_outdoors() {
     }
 }
 
-/// Hours of flight, a tenth of one each by default; `HOURS=10` flies ten: the covariance is positive and bounded, and
-/// no error grows that its standard deviation does not tell.
+/// Long flights, by default a tenth of an hour each; `HOURS=10` flies ten hours. The covariance stays positive and
+/// bounded, and no error grows beyond its standard deviation.
 #[test]
 fn hours_of_flight() {
     let hours: f64 = std::env::var("HOURS").map_or(0.1, |hours| hours.parse().unwrap());
@@ -361,7 +364,7 @@ fn hours_of_flight() {
         let mut turned = Vector3::<f32>::zeros();
         flown(&scenario, |sample| {
             let e = sample.estimated.unwrap();
-            // Not a number if the covariance is not positive.
+            // NEES is NaN if the covariance is not positive.
             assert!(e.valid && e.nees.is_finite(), "{name}, {} s: {e:?}", sample.time_s);
             if sample.time_s < SETTLED_S || (sample.time_s + 0.5).fract() > 0.0005 {
                 return;
@@ -384,7 +387,7 @@ fn hours_of_flight() {
         let nees = nees / checks;
         println!("{name}, {hours} h: NEES {nees:.2}, largest sigma {sigmas:.3?}, attitude off by {turned:.4?} rad");
         println!("  of {checks} beyond 3 sigma {far:?}");
-        // One in 370 by chance; errors last for minutes outdoors.
+        // By chance, one error in 370 is outside. Outdoors, errors last for minutes.
         assert!(far.iter().all(|far| *far <= 10.0 + 0.01 * checks), "{name}: {far:?} of {checks}");
         assert!(sigmas[0] < 0.05 && sigmas[1] < 0.1 && sigmas[2] < sigma_m, "{name}: {sigmas:?}");
         assert!(nees < nees_max && turned.xy().max() < 0.02 && turned.z < 0.12, "{name}: {nees}, {turned} rad");

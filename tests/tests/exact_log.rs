@@ -1,4 +1,4 @@
-//! An exact log in a file: what is in it, what differs and where, and what other settings would have commanded.
+//! Exact logs in files: their contents, the first difference of a replay, and the commands with other settings.
 
 use crate::exact_flights::{SCENARIO, fly, fly_with, log_of, records};
 use afbc::Profile;
@@ -19,17 +19,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-/// A flight without faults.
+/// A log of a flight without faults.
 static LOG: LazyLock<Vec<u8>> = LazyLock::new(|| fly(&load(Path::new(SCENARIO)).unwrap(), 3, 13_000));
 
-/// A file for a test.
+/// Returns the path of a file for a test.
 fn file(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("exact_log");
     fs::create_dir_all(&folder).unwrap();
     folder.join(format!("{test}.log"))
 }
 
-/// Replays these bytes from a file.
+/// Writes these bytes to a file and replays it.
 fn read(test: &str, bytes: &[u8], changes: &[&str]) -> Result<ExactReplay, FileError> {
     let path = file(test);
     fs::write(&path, bytes).unwrap();
@@ -47,7 +47,7 @@ fn paper() -> Vehicle {
     built_in("paper").unwrap().read().unwrap()
 }
 
-/// What an image without a vehicle file has, is the built-in vehicle of the name that it writes.
+/// An image without a vehicle file has the built-in vehicle whose name it writes into the log.
 #[test]
 fn the_papers_vehicle_is_built_in() {
     assert_eq!(paper().configuration::<4>().unwrap(), Configuration::default());
@@ -73,7 +73,7 @@ fn it_says_what_is_in_the_log() {
     assert_eq!(problem(&log), None);
 }
 
-/// The flight image's code under every law, on every preset of faults, gives the same again.
+/// The flight image's code repeats flights under every law, with every preset of faults.
 #[test]
 fn every_law_and_flights_with_faults_are_the_same_again() {
     let scenario = load(Path::new(SCENARIO)).unwrap();
@@ -95,7 +95,7 @@ fn every_law_and_flights_with_faults_are_the_same_again() {
     }
 }
 
-/// Other vehicles are found by their names.
+/// Built-in vehicles are found by the names in their logs.
 #[test]
 fn built_in_vehicles_are_known_by_name() {
     let scenario = load(Path::new(SCENARIO)).unwrap();
@@ -113,14 +113,14 @@ fn built_in_vehicles_are_known_by_name() {
     assert!(rotors.contains(&4) && rotors.contains(&6));
 }
 
-/// A vehicle that is not this one, though it may have its name.
+/// Returns a vehicle that differs from `vehicle`, but has the same name.
 fn other(vehicle: &Vehicle) -> Vehicle {
     let mut other = vehicle.clone();
     other.parameters.mass_kg *= 1.01;
     other
 }
 
-/// Whatever is cut off, the ticks before it are the same again: never a panic, never a difference.
+/// A log that is cut anywhere repeats the ticks before the cut: it never panics and never shows a difference.
 #[test]
 fn a_log_cut_at_any_byte_is_read_up_to_there() {
     let log = &LOG[..300_000];
@@ -143,7 +143,7 @@ fn a_log_cut_at_any_byte_is_read_up_to_there() {
     }
 }
 
-/// A bit of an input that is not as it was, in a frame that is whole again, is named at its tick or right after it.
+/// A changed bit of an input, in an otherwise valid frame, is reported at its tick or right after it.
 #[test]
 fn a_bit_of_an_input_is_named_at_its_tick() {
     let whole = records(&LOG);
@@ -157,7 +157,7 @@ fn a_bit_of_an_input_is_named_at_its_tick() {
         };
         let mut changed = whole.clone();
         let Record::Tick(tick) = &mut changed[at] else { panic!("a tick") };
-        // Of lower bits the rounding of a velocity leaves nothing at times.
+        // Lower bits are left out, since rounding of the velocity may hide them.
         let (number, bit) = (tick.number, random.next_u32() % 15 + 8);
         let [_, force] = &mut tick.readings.imu.as_mut().unwrap().value;
         force.z = f32::from_bits(force.z.to_bits() ^ 1 << bit);
@@ -168,7 +168,7 @@ fn a_bit_of_an_input_is_named_at_its_tick() {
         };
         assert!((number..number + 3).contains(tick), "bit {bit}: {tick} instead of {number}");
         assert!(signals.contains(&GivenSignal::Estimate), "{signals:?}");
-        // The place is that of the tick's frame.
+        // The reported byte is the position of the tick's frame.
         let before = changed.iter().take_while(|record| !matches!(record, Record::Tick(it) if it.number == *tick));
         assert_eq!(*byte, log_of(&before.cloned().collect::<Vec<_>>()).len());
         let said = problem(&ReplayedLog { name: "input", replay: &found }).unwrap();
@@ -176,7 +176,7 @@ fn a_bit_of_an_input_is_named_at_its_tick() {
     }
 }
 
-/// A throttle, a mode and the speeds that a tick gave are named as such.
+/// Changes of a throttle, a mode, the estimate and the speeds of a tick are reported by those names.
 #[test]
 fn each_signal_is_named() {
     let changes: [fn(&mut Given); 4] =
@@ -197,19 +197,20 @@ fn each_signal_is_named() {
     }
 }
 
-/// A bit of the file that is flipped spoils a frame, which is named with what is missing then.
+/// A flipped bit of the file damages a frame, which is reported with the missing ticks.
 #[test]
 fn a_bit_of_the_file_is_named_by_its_frame() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(13);
     for _ in 0..20 {
         let mut damaged = LOG.clone();
-        // Not in the start.
+        // The flipped bit is behind the beginning of the log.
         let at = 10_000 + random.next_u32() as usize % (damaged.len() - 20_000);
         damaged[at] ^= 1 << (random.next_u32() % 8);
         let found = read("bit", &damaged, &[]).unwrap();
         let Some(said) = problem(&ReplayedLog { name: "bit", replay: &found }) else { panic!("byte {at} is accepted") };
         let (count, Some(place)) = found.damaged else { panic!("{said}") };
-        // A frame whose mark of its end is spoilt ends with the next one, whose place may be named.
+        // If the end mark of a frame is damaged, the frame ends with the next one, and the next one's position may be
+        // reported.
         assert!(count <= 2 && place <= at + 1 && at < place + 400, "{at}: {place}");
         assert!(said.contains(&format!("byte {place}: ")) && said.contains("copy it again"), "{said}");
     }
@@ -243,7 +244,7 @@ fn what_is_no_log_is_refused_in_one_line() {
     assert!(missing.contains("no/such.log") && missing.contains("cannot be read"), "{missing}");
 }
 
-/// What a link has caught before the vehicle was powered up is no part of the log.
+/// Bytes that the link received before the vehicle was powered up are skipped.
 #[test]
 fn noise_before_the_start_is_skipped() {
     let log = [b"\xff\x80noise\0more".as_slice(), &[0], &LOG[..200_000]].concat();
@@ -251,7 +252,7 @@ fn noise_before_the_start_is_skipped() {
     assert!(found.is_same() && found.same_ticks > 1_000);
 }
 
-/// A processor that is restarted goes on in the same log.
+/// After a restart, the processor continues in the same log.
 #[test]
 fn a_restart_is_replayed() {
     let log = [LOG.as_slice(), &LOG].concat();
@@ -260,14 +261,14 @@ fn a_restart_is_replayed() {
     assert!(found.is_same());
 }
 
-/// The comparison with these changes.
+/// Returns the comparison of a replay with these changed settings.
 fn changed(changes: &[&str]) -> ChangeComparison {
     let found = read(&format!("change-{}", changes.join("-")), &LOG, changes).unwrap();
     assert!(found.is_same() && found.same_ticks == 13_000);
     found.comparison.unwrap()
 }
 
-/// Largest differences of rotor speeds, attitude setpoint, position setpoint and estimate.
+/// Returns the largest differences of rotor speeds, attitude setpoint, position setpoint and estimate.
 fn largest(comparison: &ChangeComparison) -> [f64; 4] {
     let of = |names: &[&str]| {
         let figures = QUANTITIES.iter().zip(&comparison.figures);
@@ -282,7 +283,7 @@ fn largest(comparison: &ChangeComparison) -> [f64; 4] {
     ]
 }
 
-/// A change changes what depends on it, and nothing before that in the tick.
+/// A changed setting affects what depends on it, and nothing earlier in the tick.
 #[test]
 fn a_change_changes_what_it_should() {
     let value = |name: &str| {
@@ -290,38 +291,38 @@ fn a_change_changes_what_it_should() {
         let found = table.iter().find(|parameter| parameter.name.as_str() == name);
         found.unwrap_or_else(|| panic!("{name}")).value
     };
-    // As it was: the same bits.
+    // With unchanged values, all bits are the same.
     let same = changed(&[&format!("V_MASS={}", value("V_MASS")), "law=afbc"]);
     assert_eq!(largest(&same), [0.0; 4]);
     assert!(same.figures.iter().any(|figure| figure.count > 1_000) && same.other_mode == 0);
-    // A gain of the law: commands, not the estimate, and not where it is to go.
+    // A gain of the law changes commands, but neither the estimate nor the position setpoint.
     let gain = changed(&[&format!("A_Z_ALPHA1={}", 1.2 * value("A_Z_ALPHA1"))]);
     let [speeds, _, setpoint, estimate] = largest(&gain);
     assert!(speeds > 0.1 && setpoint == 0.0 && estimate == 0.0, "{:?}", largest(&gain));
-    // Another law: likewise.
+    // Another law also changes commands, but neither the estimate nor the position setpoint.
     let law = changed(&["law=pid"]);
     let [speeds, attitude, setpoint, estimate] = largest(&law);
     assert!(speeds > 1.0 && attitude > 1e-4 && setpoint == 0.0 && estimate == 0.0, "{:?}", largest(&law));
-    // The estimator: everything.
+    // A setting of the estimator changes everything.
     let estimator = changed(&["EST_ACC_NOISE=0.5"]);
     let [speeds, _, _, estimate] = largest(&estimator);
     assert!(speeds > 0.0 && estimate > 1e-4, "{:?}", largest(&estimator));
-    // The guidance: the setpoint, not the estimate.
+    // A setting of the guidance changes the setpoint, but not the estimate.
     let guidance = changed(&["MPC_Z_VEL_MAX_UP=0.5"]);
     let [speeds, _, setpoint, estimate] = largest(&guidance);
     assert!(speeds > 0.0 && setpoint > 0.05 && estimate == 0.0, "{:?}", largest(&guidance));
-    // A hundred rows per second.
+    // There are a hundred rows per second.
     assert_eq!(gain.rows.len(), 1_300);
 }
 
-/// The figures are those of the rows.
+/// The figures follow from the rows.
 #[test]
 fn figures_follow_from_the_rows() {
     let comparison = changed(&["law=pid"]);
     for (index, figure) in comparison.figures.iter().enumerate() {
         let differences = comparison.rows.iter().filter_map(|row| row.differences().nth(index).flatten());
         let most = differences.map(f64::abs).fold(0.0, f64::max);
-        // Rows are every tenth tick, and also of ticks in which one of the two is disarmed.
+        // There is a row for every tenth tick, also for ticks in which one of the two flights is disarmed.
         let rms = figure.rms().unwrap_or_default();
         assert!(rms <= figure.largest + 1e-12, "{}", QUANTITIES[index].name);
         if comparison.other_mode == 0 && figure.count > 0 && QUANTITIES[index].rotor.is_some() {

@@ -1,4 +1,4 @@
-//! A flight is flown again from its exact log, to the last bit, and what differs is named.
+//! An exact log repeats its flight to the last bit, and differences are reported.
 
 use crate::exact_flights::{SCENARIO, fly, log_of, records};
 use afbc_log::exact::{FRAME_MAX as RECORD_MAX, Frames, Record, ReplayDifference, ReplayStep, Replayer};
@@ -8,7 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::path::Path;
 
-/// Flies again; returns the number of ticks and the first difference.
+/// Replays the log. Returns the number of ticks and the first difference.
 fn replay(log: &[u8]) -> (u32, Option<ReplayDifference>) {
     let (mut replayer, mut frames) = (Replayer::new(Configuration::<4>::default()).unwrap(), Frames::default());
     let (mut ticks, mut armed) = (0, false);
@@ -33,8 +33,8 @@ fn flights_are_flown_again_to_the_last_bit() {
     }
 }
 
-/// A bit of a reading that is not as it was changes the flight, from that tick on or soon after; what a tick gave that
-/// is not as it was is named at once, and so is a tick that is missing.
+/// A changed bit of a reading changes the flight at that tick or soon after. A changed output of a tick, or a missing
+/// tick, is reported at once.
 #[test]
 fn what_differs_is_named() {
     let scenario = load(Path::new(SCENARIO)).unwrap();
@@ -75,7 +75,7 @@ fn what_differs_is_named() {
     }
 }
 
-/// A board measures its battery beside the messages; what a tick took of it counts, too.
+/// A board measures its battery separately from the messages. The battery values that a tick used count, too.
 #[test]
 fn a_battery_counts() {
     let scenario = load(Path::new(SCENARIO)).unwrap();
@@ -93,7 +93,7 @@ fn a_battery_counts() {
     assert!((10_000..40_000).contains(&ticks), "{ticks}: {difference:?}");
 }
 
-/// The longest record has room in a frame.
+/// The longest record fits into a frame.
 #[test]
 fn every_record_fits() {
     let scenario = load(Path::new(SCENARIO)).unwrap();
@@ -101,7 +101,7 @@ fn every_record_fits() {
     assert!(longest < RECORD_MAX / 2, "{longest}");
 }
 
-/// Damaged bytes are noticed, whatever they are: never a panic, never another flight that passes for this one.
+/// Damaged bytes are always noticed. They never cause a panic, or pass for the original flight.
 #[test]
 fn damaged_bytes_are_noticed() {
     let scenario = load(Path::new(SCENARIO)).unwrap();
@@ -116,7 +116,7 @@ fn damaged_bytes_are_noticed() {
             _ => damaged.insert(at, random.next_u32() as u8),
         }
         let (ticks, difference) = replay(&damaged);
-        // A zero more between two frames is nothing; the log may end with what is left of a frame.
+        // An additional zero between two frames has no effect. The log may end within a frame.
         let read = records_or_none(&damaged);
         let is_noticed = read.as_ref().is_none_or(|read| *read == records(&log)) || difference.is_some();
         assert!(is_noticed || ticks == 999, "{at}: {ticks}");

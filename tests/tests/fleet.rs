@@ -1,5 +1,5 @@
-//! Every built-in vehicle flies hover, step, lissajous and wind under every law, its gains by rule or from its file;
-//! AFBC under its monitor, as on board.
+//! Every built-in vehicle flies hover, step, lissajous and wind under every law, with gains by rule or from its file.
+//! AFBC is under its monitor, as on board.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)] // a flight that cannot begin must stop the test
 
 use afbc::Profile;
@@ -11,15 +11,15 @@ use std::thread;
 
 /// Bounds of one law's flights.
 struct Bounds {
-    /// Largest root mean square distance from the reference, which may have jumped \[m\].
+    /// Largest root mean square distance from the reference \[m\]. The reference may have jumped.
     rms_m: f64,
-    /// Largest distance at the end of a calm flight to one place \[m\].
+    /// Largest distance at the end of a calm flight to one position \[m\].
     end_m: f64,
 }
 
 impl Bounds {
-    /// Backstepping learns nothing: in wind it stays off by the disturbance over c + alpha_1 alpha_2, and a Crazyflie's
-    /// motors lose thrust with the battery's voltage.
+    /// Backstepping does not adapt. In wind it keeps an offset, the disturbance divided by c + alpha_1 alpha_2, and a
+    /// Crazyflie's motors lose thrust as the battery's voltage falls.
     fn of(kind: ControllerKind) -> Self {
         match kind {
             ControllerKind::Backstepping => Bounds { rms_m: 7.5, end_m: 0.6 },
@@ -28,7 +28,7 @@ impl Bounds {
     }
 }
 
-/// Flies it and returns one line on what is wrong, if anything is.
+/// Flies the scenario and returns one line about what went wrong, if anything did.
 fn fault(scenario: &Scenario, contender: &Contender) -> Option<String> {
     let run = Run::fly(scenario, contender, u64::MAX).unwrap();
     let (rms_m, end_m) = (run.metrics.rmse.xyz().norm(), run.metrics.final_error.xyz().norm());
@@ -48,7 +48,7 @@ fn fault(scenario: &Scenario, contender: &Contender) -> Option<String> {
     Some(format!("{}: {}", contender.name, fault))
 }
 
-/// The scenario on the vehicle, under every law.
+/// Returns the scenario on the vehicle, under every law.
 fn scenario(vehicle: &Vehicle, name: &str) -> Scenario {
     let mut scenario = built_in(name).unwrap().read().unwrap();
     let contender = |kind| Contender::of(kind, Profile::Flight).monitored();
@@ -79,8 +79,8 @@ fn every_vehicle_flies_everything_under_every_law() {
     assert!(faults.is_empty(), "{faults:#?}");
 }
 
-/// The rule keeps the margin: rotors that lag half as much again as the law was told, a later command and a later
-/// state.
+/// The gains by rule keep a margin for rotors that lag 1.5 times as much as the law was told, with delayed commands and
+/// states.
 #[test]
 fn slow_rotors_may_be_slower_still() {
     for name in ["crazyflie", "racer"] {
@@ -94,8 +94,8 @@ fn slow_rotors_may_be_slower_still() {
     }
 }
 
-/// What the rule is for: with rotors that lag by twice the Crazyflie's 72 ms, AFBC with the gains for 20 ms does not
-/// get through a step, as it does with those of the rule.
+/// Shows the need for the rule. With twice the Crazyflie's rotor lag of 72 ms, AFBC fails in a step with the gains for
+/// 20 ms, and succeeds with the gains by rule.
 #[test]
 fn gains_for_quick_rotors_do_not_hold_slow_ones() {
     let ruled = afbc_vehicles::built_in("crazyflie").unwrap().read().unwrap();

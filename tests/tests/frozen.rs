@@ -1,5 +1,5 @@
-//! Trackers that freeze in flight: the firmware's code on the host and the rigid body above a ground, connected by
-//! MAVLink frames.
+//! Trackers that freeze in flight. The firmware's code on the host flies the rigid body above a ground; MAVLink frames
+//! connect them.
 
 use afbc_flight_core::{EndReason, Mode};
 use afbc_hil::{Host, Station};
@@ -8,18 +8,18 @@ use afbc_plant::{Contact, Environment, Motion, Plant, PlantModel, Realism};
 use afbc_types::{Parameters, State};
 use nalgebra::Vector3;
 
-/// Times of arming and of the freeze \[ms\].
+/// Time of arming \[ms\]. `FREEZES_MS` is the time of the freeze.
 const ARM_MS: u64 = 2_100;
 const FREEZES_MS: u64 = 9_100;
 
 /// Output of a frozen tracker.
 #[derive(Clone, Copy, Debug)]
 enum Frozen {
-    /// The last state, bit for bit.
+    /// Repeats the last state, bit for bit.
     Bits,
-    /// The last state with noise.
+    /// Repeats the last state with noise.
     Noisy,
-    /// Nothing for this many ms, then the last state, bit for bit or with noise.
+    /// Sends nothing for this many ms, then repeats the last state, bit for bit or with noise.
     After(u64, bool),
 }
 
@@ -27,14 +27,14 @@ enum Frozen {
 struct Seen {
     modes: Vec<(u64, Mode)>,
     ended: Option<EndReason>,
-    /// Height at the end of the flight \[m\], and largest tilt from the freeze on \[rad\].
+    /// Height at the end of the flight \[m\]. `tilt_rad` is the largest tilt from the freeze on.
     ended_m: f64,
     tilt_rad: f64,
     /// Speed at the first ground contact \[m/s\].
     touchdown_m_s: Option<f64>,
 }
 
-/// Climbs to `height_m`, flies along x at `speed_m_s`, and freezes the tracker there.
+/// Climbs to `height_m`, flies along x at `speed_m_s`, and then freezes the tracker.
 fn fly(height_m: f64, speed_m_s: f64, frozen: Frozen) -> Seen {
     let ground = Realism { contact: Some(Contact::PAPER), ..Realism::default() };
     let start = Motion { position_m: Vector3::new(0.0, 0.0, 0.02), ..Motion::default() };
@@ -98,7 +98,7 @@ fn fly(height_m: f64, speed_m_s: f64, frozen: Frozen) -> Seen {
     seen
 }
 
-/// Before the cure, a repeated pose at 1 m/s turned the vehicle upside down within a second, in mode Flying.
+/// Without the protection, a pose repeated at 1 m/s turned the vehicle upside down within a second, in mode Flying.
 #[test]
 fn a_repeated_state_is_coasted_through_and_ends_in_a_descent() {
     for speed_m_s in [0.0, 0.5, 1.0, 2.0] {
@@ -114,8 +114,8 @@ fn a_repeated_state_is_coasted_through_and_ends_in_a_descent() {
     }
 }
 
-/// With noise, the contradiction with the twist reveals it: late, when the attitude is already lost, but the motors
-/// stop.
+/// With noise, the contradiction to the twist reveals the frozen pose. This comes late, when the attitude is already
+/// lost, but the motors stop.
 #[test]
 fn a_noisy_constant_pose_with_a_moving_twist_is_distrusted() {
     for speed_m_s in [1.0, 2.0] {
@@ -127,7 +127,7 @@ fn a_noisy_constant_pose_with_a_moving_twist_is_distrusted() {
     }
 }
 
-/// After an outage, a frozen pose was once taken for a landing at 5 m, and stopped the motors.
+/// A frozen pose after an outage was once mistaken for a landing at 5 m, which stopped the motors.
 #[test]
 fn a_frozen_pose_after_an_outage_is_no_landing() {
     for gap_ms in [300, 1_000] {

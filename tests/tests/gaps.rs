@@ -1,5 +1,5 @@
-//! Checks of the gaps and errors in the paper, under the headings of `docs/paper.md`.
-#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be flown must stop the test
+//! Checks of the paper's gaps and errors, with the headings of `docs/paper.md`.
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a failed flight must stop the test
 
 use afbc::adaptive::{self};
 use afbc::fuzzy::{Basis, Membership};
@@ -50,7 +50,7 @@ impl<L: Law> Law for Rateless<L> {
     }
 }
 
-/// Flies the scenario and returns whether the vehicle stayed upright, and within 1 m after 5 s.
+/// Flies the scenario. Returns true if the vehicle stayed upright, and within 1 m after 5 s.
 fn flies<L: Law>(scenario: &Scenario, settings: Settings, law: L) -> bool {
     let controller = Controller::new(scenario.vehicle.to_f32(), settings, law).unwrap();
     let mut world = World::new(scenario, f64::from(settings.common.dt_s)).unwrap();
@@ -62,12 +62,12 @@ fn flies<L: Law>(scenario: &Scenario, settings: Settings, law: L) -> bool {
     end == FlightEnd::default()
 }
 
-/// The paper's settings with another command filter.
+/// Returns the paper's settings with another command filter.
 fn filtered(command_filter_rad_s: f32) -> Settings {
     Settings { command_filter_rad_s, ..Profile::Paper.settings() }
 }
 
-/// Both laws with the paper's gains.
+/// Returns both laws with the paper's gains.
 fn laws() -> (Adaptive, Backstepping) {
     let gains = Profile::Paper.gains();
     let alphas = PerAxis::from_fn(|axis| gains[axis].backstepping);
@@ -76,8 +76,9 @@ fn laws() -> (Adaptive, Backstepping) {
 
 #[test]
 fn without_the_rates_of_the_desired_angles_neither_law_flies() {
-    // Over the whole band in which both fly with the rates. (Above it the loss takes longer: at 1000 rad/s, almost
-    // without a filter, backstepping in calm air still oscillates within 0.3 m after 60 s, and AFBC is 30 m away.)
+    // Covers the whole band in which both laws fly with the rates. Above the band, the loss takes longer: at 1000
+    // rad/s, almost without a filter, backstepping in calm air still oscillates within 0.3 m after 60 s, and AFBC is 30
+    // m away.
     for bandwidth in [10.0, 20.0, 40.0, 80.0] {
         let (scenario, settings) = (paper(CALM), filtered(bandwidth));
         let (adaptive, backstepping) = laws();
@@ -101,7 +102,7 @@ fn with_the_filters_rates_both_fly_from_10_to_80_rad_s() {
 
 const ATTITUDE: Membership = Membership { centre: 0.26, width: 0.1 };
 
-/// (18) as printed, in `f32`: nine products of two Gaussians over their sum.
+/// Computes (18) as printed, in `f32`: nine products of two Gaussians, each divided by their sum.
 fn printed(membership: Membership, inputs: [f32; 2]) -> [f32; 9] {
     let Membership { centre, width } = membership;
     let gaussian = |x: f32, j: usize| {
@@ -123,8 +124,8 @@ fn the_printed_basis_is_0_over_0_from_1_705_rad_s_and_the_implemented_one_is_not
         let sum: f32 = ours.iter().sum();
         assert!((sum - 1.0).abs() < 1e-6 && ours.iter().all(|w| (0.0..=1.0).contains(w)), "{ours} at {rate} rad/s");
         if rate < 1.55 {
-            // The same basis, as long as no relevant Gaussian is below the normal numbers of f32, except for the
-            // rounding of exponents up to 87, six times.
+            // Here both are the same basis, since no relevant Gaussian is below the normal numbers of f32. They differ
+            // only by the rounding of exponents up to 87, six times.
             for (a, b) in ours.iter().zip(printed) {
                 assert!((a - b).abs() < 4e-5, "{a} against {b} at {rate} rad/s");
             }
@@ -135,7 +136,7 @@ fn the_printed_basis_is_0_over_0_from_1_705_rad_s_and_the_implemented_one_is_not
 
 #[test]
 fn the_basis_is_accurate_where_the_printed_one_underflows() {
-    // In f64 (18) holds up to 4.125 rad/s; up to there it is the oracle for the implemented one.
+    // In f64, (18) holds up to 4.125 rad/s. Up to there, it is the oracle for the implemented basis.
     let basis = Basis::new(ATTITUDE).unwrap();
     for step in 0..=400_u16 {
         let rate = f32::from(step) / 100.0;
@@ -148,13 +149,13 @@ fn the_basis_is_accurate_where_the_printed_one_underflows() {
         let sum: f64 = firing.iter().sum();
         assert!(sum > 0.0);
         for (ours, firing) in basis.weights([0.1, rate]).transpose().iter().zip(firing) {
-            // Exponents of up to 26 * 4.1, 7 roundings: see the property tests of the basis.
+            // The bound for exponents of up to 26 * 4.1 with 7 roundings. The property tests of the basis explain it.
             assert!((f64::from(*ours) - firing / sum).abs() <= 1e-4 * firing / sum + 1e-36, "at {rate} rad/s");
         }
     }
 }
 
-/// The consequence: a roll rate of 2 rad/s, half a turn in 1.5 s, makes every estimate of the printed basis NaN
+/// The consequence: a roll rate of 2 rad/s, half a turn in 1.5 s, would make every estimate of the printed basis NaN
 /// forever.
 #[test]
 fn a_fast_roll_leaves_the_estimates_finite() {
@@ -187,7 +188,7 @@ fn a_fast_roll_leaves_the_estimates_finite() {
 fn chatter_mn(delta: f32, epsilon: f32) -> f64 {
     let mut gains = Profile::Paper.gains();
     for axis in Axis::ALL {
-        // Without adaptation: the threshold applies to the value of delta_hat, not to its growth.
+        // Without adaptation, since the threshold applies to the value of delta_hat, not to its growth.
         gains[axis] = adaptive::Gains { gamma: 0.0, eta: 0.0, epsilon, ..gains[axis] };
     }
     let law = Adaptive::new(gains).unwrap();
@@ -214,8 +215,9 @@ fn chatter_mn(delta: f32, epsilon: f32) -> f64 {
 
 #[test]
 fn the_robust_term_becomes_a_relay_at_2_epsilon_over_g_dt() {
-    // An Euler step of e_2 under u = (delta / epsilon + alpha_2) e_2 is stable while g dt (delta / epsilon + alpha_2) <
-    // 2 with g = l / Ix = 65.8: delta < 0.0284, or 0.030 without alpha_2. Located to 1 %.
+    // An Euler step of e_2 under u = (delta / epsilon + alpha_2) e_2 is stable while
+    // g dt (delta / epsilon + alpha_2) < 2. With g = l / Ix = 65.8, this means delta < 0.0284, or 0.030 without
+    // alpha_2. The test locates the limit to 1 %.
     let (g, dt, alpha2) = (65.79_f32, 0.001, 2.0);
     for epsilon in [0.001, 0.002, 0.005] {
         let onset = epsilon * (2.0 / (g * dt) - alpha2);
@@ -268,10 +270,11 @@ fn a_hundred_times_the_epsilon_is_as_accurate_without_chatter() {
         let wide = Run::fly(&paper(case), &with_epsilon(0.1), u64::MAX).unwrap();
         assert_eq!((printed.lost, wide.lost), (None, None));
         let mn = |run: &Run| run.metrics.mean_abs_delta_u * 1000.0;
-        // U1 and U2 chatter by 50 mN or more per step as printed, and no longer.
+        // With the printed epsilon, U1 and U2 chatter by 50 mN or more per step; with the larger one, they do not.
         assert!(mn(&printed).x > 50.0 && mn(&printed).y > 50.0, "{}", mn(&printed));
         assert!(mn(&wide).x < 0.5 && mn(&wide).y < 0.5, "{}", mn(&wide));
-        // As accurate: no error grows by more than a fifth and 5 mm, and all stay below half of backstepping's.
+        // The accuracy is the same: no error grows by more than a fifth and 5 mm, and all stay below half of
+        // backstepping's.
         let baseline =
             Run::fly(&paper(case), &Contender::of(ControllerKind::Backstepping, Profile::Paper), u64::MAX).unwrap();
         let errors = |run: &Run| -> [f64; 4] { run.metrics.rmse.into() };
@@ -295,7 +298,8 @@ fn as_persistent_accelerations_backstepping_keeps_an_error_and_afbc_does_not() {
     for model in [PlantModel::Simplified, PlantModel::RigidBody] {
         let [afbc, baseline] = both(Reading::Persistent, model);
         assert_eq!((afbc.lost, baseline.lost), (None, None));
-        // A / (1 + alpha_1 alpha_2) in x, y and psi: 1.2 / 3, and psi through g_3 = d / (b Iz) = 1.43.
+        // The error in x and y is A / (1 + alpha_1 alpha_2) = 1.2 / 3. In psi, it also depends on
+        // g_3 = d / (b Iz) = 1.43.
         let kept = baseline.metrics.final_error.abs();
         assert!((0.3..0.5).contains(&kept.x) && (0.3..0.5).contains(&kept.y) && kept.w > 0.25, "{kept}");
         let left = afbc.metrics.final_error.abs();
@@ -318,10 +322,10 @@ fn after_pulses_of_1_s_both_recover() {
 fn as_forces_and_moments_both_lose_the_vehicle_to_the_moment_on_roll() {
     for model in [PlantModel::Simplified, PlantModel::RigidBody] {
         for run in both(Reading::Forces, model) {
-            // 1.2 N on 0.486 kg from 7.5 s on is survived. 1.2 N m on 0.0038 kg m2 from 15 s on is 316 rad/s2: holding
-            // it takes a difference of 4.8 N between opposed rotors, more than the weight. Either roll is lost (rigid
-            // body), or the vehicle climbs away within 4 s, since roll has priority over thrust when rotors are at
-            // zero.
+            // Both survive 1.2 N on 0.486 kg from 7.5 s on. The moment of 1.2 N m on 0.0038 kg m2 from 15 s on is 316
+            // rad/s2. Holding it takes a difference of 4.8 N between opposite rotors, more than the weight. Either roll
+            // is lost (rigid body), or the vehicle climbs away within 4 s, since roll has priority over thrust when
+            // rotors are at zero.
             let lost = run.lost.unwrap();
             assert!((15.0..19.0).contains(&lost.time_s), "{} {}: {lost:?}", model.name(), run.contender.name);
         }

@@ -1,5 +1,5 @@
-//! Any frame that gives roll, pitch, yaw and thrust with a margin hovers under every law, four to eight rotors
-//! anywhere.
+//! Any frame of four to eight rotors hovers under every law, if its rotors give roll, pitch, yaw and thrust with a
+//! margin.
 
 use afbc::Profile;
 use afbc_scenario::contender::{Contender, ControllerKind};
@@ -8,10 +8,10 @@ use afbc_sim::run::Run;
 use afbc_types::{Parameters, Rotor};
 use proptest::prelude::*;
 
-/// Largest distance at the end \[m\].
+/// Largest distance from the reference at the end \[m\].
 const END_M: f64 = 0.03;
 
-/// Rotors around the vehicle in turn, each somewhat off its place, neighbours turning against each other.
+/// Draws rotors around the vehicle, each somewhat displaced, with neighbours that turn in opposite directions.
 fn frame() -> impl Strategy<Value = Vec<Rotor<f64>>> {
     let off = (-0.12..0.12_f64, 0.85..1.15_f64);
     (4..=8_usize, 0.0..core::f64::consts::TAU, prop::array::uniform8(off)).prop_map(|(count, turn, off)| {
@@ -26,7 +26,7 @@ fn frame() -> impl Strategy<Value = Vec<Rotor<f64>>> {
 fn hover(rotors: Vec<Rotor<f64>>) -> Scenario {
     let mut scenario = built_in("hover").unwrap().read().unwrap();
     scenario.realism.rotors.time_constant_s = 0.02;
-    // As strong together as the paper's four, but for what an uneven frame asks of some.
+    // All rotors together are somewhat stronger than the paper's four, since an uneven frame asks more of some.
     let force_max_n = 16.0 / rotors.len() as f64;
     scenario.realism.rotors.max_rad_s = (force_max_n / Parameters::PAPER.thrust_factor_n_s2).sqrt();
     let contender = |kind| {
@@ -44,7 +44,7 @@ proptest! {
     #[test]
     fn any_frame_hovers_under_every_law(rotors in frame()) {
         let scenario = hover(rotors);
-        // What has no margin, or yaw that takes roll along, is refused by name; that is not what this is about.
+        // Frames without a margin, or whose yaw disturbs roll, are refused by name. This test leaves them out.
         prop_assume!(scenario.check().is_ok());
         for contender in &scenario.contenders {
             let run = Run::fly(&scenario, contender, u64::MAX).unwrap();

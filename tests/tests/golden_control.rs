@@ -1,5 +1,5 @@
-//! Every row of the control crate's golden data, in `f32`. Each tolerance is a bound on rounding, computed row by row,
-//! so it is also tight for small numbers.
+//! Compares every row of the control crate's golden data in `f32`. Each tolerance is a bound on the rounding error of
+//! its row, so it is also tight for small numbers.
 
 use afbc::adaptive::{Gains, Subsystem};
 use afbc::backstepping::{self, ideal, proportional};
@@ -13,7 +13,7 @@ use afbc_types::{Inputs, Parameters, RotorSpeeds};
 use flight_tests::{ROWS, Row, golden};
 use nalgebra::{Matrix3, Vector4};
 
-/// Rounding error of one `f32` operation, relative.
+/// Relative rounding error of one `f32` operation.
 const U: f64 = 1.0 / (1 << 24) as f64;
 
 fn assert_within(row: &Row<'_>, column: &str, got: f32, allowed: f64) {
@@ -26,16 +26,17 @@ fn assert_within(row: &Row<'_>, column: &str, got: f32, allowed: f64) {
     );
 }
 
-/// Bound on the relative error of a fuzzy weight. ln w_i changes by at most twice the change of the exponents k|x| and
-/// ln q. k|x| has 6 roundings besides x's (c, s, two divisions by s, s again, the product) and the error of x itself;
-/// ln q = c^2 / 2s^2 has 5. Another 20 cover the exponentials (2 each) and the products and sums around them.
+/// Returns a bound on the relative error of a fuzzy weight. ln w_i changes by at most twice the change of the exponents
+/// k|x| and ln q. k|x| has 6 roundings besides that of x (c, s, two divisions by s, s again, the product), and the
+/// error of x itself. ln q = c^2 / 2s^2 has 5 roundings. Another 20 cover the exponentials (2 each) and the products
+/// and sums around them.
 fn weight_bound(centre: f64, width: f64, inputs: [f64; 2], input_errors: [f64; 2]) -> f64 {
     let k = centre / (width * width);
     let exponents: f64 = inputs.iter().zip(input_errors).map(|(x, error)| k * (6.0 * U * x.abs() + error)).sum();
     2.0 * (exponents + 2.0 * 5.0 * U * 0.5 * (centre / width).powi(2)) + 20.0 * U
 }
 
-/// Below the normal numbers of `f32` a weight's error is absolute: 2^-150 over a sum of at least q.
+/// Below the normal numbers of `f32`, a weight's error is absolute: 2^-150, divided by a sum of at least q.
 const WEIGHT_FLOOR: f64 = 1e-36;
 
 #[test]
@@ -47,7 +48,7 @@ fn fuzzy_basis_agrees_in_every_row() {
         let basis = Basis::new(Membership { centre: centre as f32, width: width as f32 }).unwrap();
         let w = basis.weights([first as f32, second as f32]);
         let bound = weight_bound(centre, width, [first, second], [U * first.abs(), U * second.abs()]);
-        // Row-major: the first input is the outermost.
+        // The order is row-major: the first input is the outermost.
         for (rule, (got, expected)) in w.transpose().iter().zip(row.nine("w")).enumerate() {
             assert_within(&row, &format!("w{}", rule + 1), *got, expected * bound + WEIGHT_FLOOR);
         }
@@ -88,7 +89,7 @@ fn afbc_subsystem_agrees_in_every_row() {
             AdaptiveEstimate { theta: Matrix3::from_row_slice(&theta.map(|t| t as f32)), delta: delta as f32 };
         let (terms, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, 0.0);
 
-        // Errors: each input is rounded once, each difference and product once more.
+        // Each input is rounded once, each difference and product once more.
         let [e1, e2] = row.all(["e1", "e2"]);
         let e1_error = U * (x1.abs() + x1d.abs() + e1.abs());
         let e1_dot_error = U * (x1d_dot.abs() + x2.abs() + (x1d_dot - x2).abs());
@@ -103,26 +104,26 @@ fn afbc_subsystem_agrees_in_every_row() {
         };
         let w_bound = weight_bound(centre, width, exact_inputs, input_errors);
 
-        // (22): a sum of nine products; w within its bound; theta, product and eight sums rounded. The weights follow
-        // from the golden rates: w_i = theta_dot_i / (gamma e_2).
+        // (22) is a sum of nine products. w is within its bound; theta, product and eight sums are rounded. The weights
+        // follow from the golden rates: w_i = theta_dot_i / (gamma e_2).
         let theta_dot = row.nine("theta_dot");
         let products: f64 = theta_dot.iter().zip(theta).map(|(rate, theta)| (rate / (gamma * e2) * theta).abs()).sum();
         let fuzzy_error = products * (w_bound + 10.0 * U) + 9.0 * WEIGHT_FLOOR;
         assert_within(&row, "u_a", terms.fuzzy, fuzzy_error);
-        // (32): d tanh(s) <= ds; s = e_2 / epsilon has e_2's error and three roundings, s tanh'(s) <= 0.448; tanh is
-        // accurate to 1.4e-7; delta and the product are rounded.
+        // (32): d tanh(s) <= ds. s = e_2 / epsilon has the error of e_2 and three roundings, and s tanh'(s) <= 0.448.
+        // tanh is accurate to 1.4e-7. delta and the product are rounded.
         let tanh_error = e2_error / epsilon + 0.448 * 3.0 * U + 1.4e-7;
         let robust_error = delta.abs() * (tanh_error + 2.0 * U);
         assert_within(&row, "u_r", terms.robust, robust_error);
         // (21)
         let proportional_error = alpha2 * (e2_error + 2.0 * U * e2.abs());
         assert_within(&row, "u_pd", terms.proportional, proportional_error);
-        // (20): two sums.
+        // (20) has two sums.
         let size: f64 = row.all(["u_a", "u_r", "u_pd"]).iter().map(|term| term.abs()).sum();
         assert_within(&row, "u", terms.sum(), fuzzy_error + robust_error + proportional_error + 2.0 * U * size);
-        // (33): eta, two products.
+        // (33) has the rounding of eta and two products.
         assert_within(&row, "delta_hat_dot", rate.delta(), eta * (e2_error + e2.abs() * (tanh_error + 3.0 * U)));
-        // (34): gamma, two products.
+        // (34) has the rounding of gamma and two products.
         for (rule, (got, expected)) in rate.theta().transpose().iter().zip(theta_dot).enumerate() {
             let weight = expected / (gamma * e2);
             let allowed = gamma * (e2_error * weight + e2.abs() * (weight * (w_bound + 3.0 * U) + WEIGHT_FLOOR));
@@ -159,7 +160,7 @@ fn backstepping_agrees_in_every_row() {
         let e2_error = e1_dot_error + alpha1 * (e1_error + 2.0 * U * e1.abs()) + U * e2.abs();
         assert_within(&row, "e1", errors.e1, e1_error);
         assert_within(&row, "e2", errors.e2, e2_error);
-        // (16): the errors of e1 and e2 through their factors, and at most 9 roundings of each term on its way to u.
+        // (16): the errors of e1 and e2 count with their factors, and each term is rounded at most 9 times.
         let carried = e1_error * (1.0 + alpha1 * alpha1) + e2_error * alpha1;
         let size = e1.abs() + alpha1 * e2.abs() + alpha1 * alpha1 * e1.abs() + x1d_ddot.abs() + f.abs();
         let u_eq_error = (carried + 9.0 * U * size) / g;
@@ -180,9 +181,9 @@ fn desired_attitude_agrees_in_every_row() {
     for row in table.rows() {
         let [u5, u6, psi] = row.all(["u5_m_s2", "u6_m_s2", "psi_rad"]);
         let [phi_d, theta_d] = desired_attitude(u5 as f32, u6 as f32, psi as f32, (1.0 / gravity) as f32);
-        // Sine and cosine are off by at most 1.7e-4 each, plus a few roundings (8 U) of the sums: the numerators of
-        // both tangents change by at most that share of |u5| + |u6|. The arc tangent's slope is at most 1, its own
-        // error 1.2e-7.
+        // Sine and cosine have errors of at most 1.7e-4 each, and the sums a few roundings (8 U). The numerators of
+        // both tangents change by at most that share of |u5| + |u6|. The arc tangent has a slope of at most 1 and an
+        // error of its own of 1.2e-7.
         let moved = (TRIGONOMETRY + 8.0 * U) * (u5.abs() + u6.abs()) / gravity;
         assert_within(&row, "theta_d_rad", theta_d, moved + 1.2e-7);
         // phi_d also contains cos(theta_d) = (1 + t^2)^-1/2, whose slope in t is at most 0.385.
@@ -191,8 +192,8 @@ fn desired_attitude_agrees_in_every_row() {
     }
 }
 
-/// The golden rows without errors of sine and cosine: at a yaw where they are accurate enough, (40) holds to
-/// rounding. The desired acceleration is rotated by the golden yaw beforehand, in `f64`.
+/// Compares the golden rows without errors of sine and cosine: at a yaw of 0, where they are accurate enough, (40)
+/// holds to rounding. The desired acceleration is rotated by the golden yaw beforehand, in `f64`.
 #[test]
 fn desired_attitude_without_yaw_agrees_to_rounding() {
     let gravity = Parameters::PAPER.gravity_m_s2;
@@ -216,7 +217,7 @@ const SPEEDS: [&str; 4] = ["omega1_rad_s", "omega2_rad_s", "omega3_rad_s", "omeg
 const FORCES: [&str; 4] = ["f1_n", "f2_n", "f3_n", "f4_n"];
 const INPUTS: [&str; 4] = ["u1_n", "u2_n", "u3_n", "u4_n"];
 
-/// A mixer for rotors of 20 N, with which no row saturates.
+/// Returns a mixer for rotors of 20 N, with which no row saturates.
 fn mixer() -> Mixer {
     Mixer::new(Parameters::PAPER.to_f32(), 20.0).unwrap()
 }
@@ -228,12 +229,12 @@ fn mixer_agrees_from_speeds_to_inputs_in_every_row() {
     for row in table.rows() {
         let speeds = RotorSpeeds(Vector4::from(row.all(SPEEDS).map(|w| w as f32)));
         let forces = mixer().forces(&speeds);
-        // b, omega twice, two products.
+        // Roundings of b, of omega twice, and of two products.
         for ((got, column), expected) in forces.0.iter().zip(FORCES).zip(row.all(FORCES)) {
             assert_within(&row, column, *got, 5.0 * U * expected);
         }
         let Inputs { roll_n, pitch_n, yaw_n, thrust_n } = mixer().inputs(&forces);
-        // Sums of at most four forces: 3 more roundings, each of at most their total.
+        // Sums of at most four forces have 3 more roundings, each relative to at most their total.
         for (got, column) in [roll_n, pitch_n, yaw_n, thrust_n].into_iter().zip(INPUTS) {
             assert_within(&row, column, got, 8.0 * U * row.get("u4_n"));
         }
@@ -248,22 +249,22 @@ fn mixer_agrees_from_inputs_to_speeds_in_every_row() {
         let [roll_n, pitch_n, yaw_n, thrust_n] = row.all(INPUTS).map(|u| u as f32);
         let allocation = mixer().allocate(&Inputs { roll_n, pitch_n, yaw_n, thrust_n });
         assert!(!allocation.saturated, "{}", row.place());
-        // Each input is rounded once and each of two sums once more; the inputs add up to at most 2 U4.
+        // Each input is rounded once, and each of two sums once more. The inputs add up to at most 2 U4.
         let allowed = 4.0 * U * row.get("u4_n");
         for (got, column) in allocation.forces.0.iter().zip(FORCES) {
             assert_within(&row, column, *got, allowed);
         }
         let speeds = mixer().speeds(&allocation.forces);
         for ((got, column), force) in speeds.0.iter().zip(SPEEDS).zip(row.all(FORCES)) {
-            // The square root turns a force's error into b omega / 2 of it, and three roundings into half as many.
+            // The square root halves the relative error of the force. There are three more roundings.
             let omega = row.get(column);
             assert_within(&row, column, *got, omega * (3.0 * U + 0.5 * allowed / (force - allowed)));
         }
     }
 }
 
-/// The virtual controls are accelerations: the attitude that (40) demands gives them in the plant of (6) at hover
-/// thrust (39). This checks that signs and frames of all golden files agree.
+/// The virtual controls are accelerations. The attitude that (40) demands gives these accelerations in the plant of (6)
+/// at hover thrust (39), which shows that the signs and frames of all golden files agree.
 #[test]
 fn desired_attitude_gives_the_wanted_acceleration_in_the_plant() {
     use afbc_plant::{Load, Motion, simplified};

@@ -1,12 +1,12 @@
-//! Every row of the plant's golden data, in `f64`, within 1e-9 relative.
+//! Compares every row of the plant's golden data in `f64`, within a relative error of 1e-9.
 
 use afbc_plant::{Load, Motion, rigid_body, simplified};
 use afbc_types::Parameters;
 use flight_tests::{ROWS, Row, golden};
 use nalgebra::Vector3;
 
-/// Relative to the expected number, without an allowance for cancellation: no result in the data is small compared with
-/// its own terms (in fact all agree to 1e-12).
+/// The tolerance is relative to the expected number, without an allowance for cancellation. No result in the data is
+/// small compared with its own terms (in fact all agree to 1e-12).
 fn assert_close(row: &Row<'_>, column: &str, got: f64) {
     let expected = row.get(column);
     assert!(
@@ -22,7 +22,7 @@ fn assert_vector(row: &Row<'_>, columns: [&str; 3], got: [f64; 3]) {
     }
 }
 
-/// Rotor speeds and disturbances of a row.
+/// Returns the rotor speeds and disturbances of a row.
 fn load(row: &Row<'_>) -> Load {
     let speeds = row.all(["omega1_rad_s", "omega2_rad_s", "omega3_rad_s", "omega4_rad_s"]);
     let a_force = Vector3::from(row.all(["a_x", "a_y", "a_z"]));
@@ -30,7 +30,7 @@ fn load(row: &Row<'_>) -> Load {
     Load::new(&Parameters::PAPER, speeds, a_force, a_moment)
 }
 
-/// A motion whose position and velocity must not matter.
+/// Returns a motion with an arbitrary position and velocity, which must not matter.
 fn motion(attitude_rad: [f64; 3], rates_rad_s: [f64; 3]) -> Motion {
     Motion {
         position_m: Vector3::new(3.0, -4.0, 5.0),
@@ -70,7 +70,7 @@ fn rigid_body_agrees_in_every_row() {
     }
 }
 
-/// The rigid body does not integrate Euler angles; its quaternion must turn at the golden Euler rates.
+/// The rigid body does not integrate Euler angles. Its quaternion must turn at the golden Euler rates.
 #[test]
 fn the_quaternion_turns_at_the_golden_euler_rates() {
     let table = golden("plant_rigid_body");
@@ -85,7 +85,8 @@ fn the_quaternion_turns_at_the_golden_euler_rates() {
             (attitude(h) - attitude(-h)).map(|a| a - core::f64::consts::TAU * (a / core::f64::consts::TAU).round());
         for (rate, column) in (difference / (2.0 * h)).iter().zip(["phi_dot", "theta_dot", "psi_dot"]) {
             let expected = row.get(column);
-            // A central difference over 1e-6 s of rates up to 15 rad/s: rounding 4e-16/1e-6, truncation (15 h)^2 of it.
+            // A central difference over 1e-6 s of rates up to 15 rad/s has a rounding error of 4e-16/1e-6 and a
+            // truncation error of (15 h)^2 times the rate.
             assert!((rate - expected).abs() <= 1e-8, "{}: {column} = {rate}, expected {expected}", row.place());
         }
     }

@@ -1,6 +1,6 @@
-//! AFBC under its monitor in closed loop: what trips it, what does not, and the flight across a switch to the fallback
-//! law.
-#![allow(clippy::unwrap_used, missing_docs)] // what cannot be flown must stop the test
+//! AFBC under its monitor in the closed loop: causes of trips, flights without trips, and flights across a switch to
+//! the fallback law.
+#![allow(clippy::unwrap_used, missing_docs)] // a failed flight must stop the test
 
 use afbc::monitor::Bounds;
 use afbc::{Guarded, Profile, Settings, Trip, guarded};
@@ -20,7 +20,7 @@ fn guarded(profile: Profile, settings: Settings, bounds: Bounds) -> Guarded {
     Guarded::new(Parameters::PAPER.to_f32(), settings, profile.gains(), bounds).unwrap()
 }
 
-/// The profile `flight` under its own bounds, with some changed.
+/// Returns the profile `flight` under its own bounds, some of them changed.
 fn flight(change: fn(&mut Bounds)) -> Guarded {
     let mut bounds = Bounds::new(&Profile::Flight.gains(), &Parameters::PAPER.to_f32(), &Profile::Flight.settings());
     change(&mut bounds);
@@ -31,7 +31,7 @@ fn above(height_m: f32) -> Setpoint {
     Setpoint { position_m: Vector3::new(0.0, 0.0, height_m), ..Setpoint::default() }
 }
 
-/// One vehicle with its sensors, its controller and the controller's memory.
+/// A vehicle with its sensors, its controller and the controller's memory.
 struct Bench {
     controller: Guarded,
     memory: Validated<guarded::Memory>,
@@ -40,7 +40,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// In the air, with a rotor lag of 20 ms and 3 N per rotor.
+    /// Makes a vehicle in the air, with a rotor lag of 20 ms and 3 N per rotor.
     fn real(controller: Guarded, realism: Realism, noise: Deviations) -> Self {
         let rotors = Rotors { time_constant_s: 0.02, max_rad_s: 317.0, ..Rotors::default() };
         let environment = Environment::calm(Parameters::PAPER).unwrap();
@@ -79,11 +79,12 @@ impl Bench {
     }
 }
 
-/// Noise of position and velocity from motion capture, of attitude and rates from a small inertial sensor.
+/// Noise of position and velocity is that of motion capture; noise of attitude and rates is that of a small inertial
+/// sensor.
 const NOISE: Deviations = Deviations { position_m: 0.002, velocity_m_s: 0.01, attitude_rad: 0.002, rates_rad_s: 0.02 };
 
-/// The paper's flight with its gusts and uncertainty: with the printed epsilon of 1 mm/s the robust terms chatter once
-/// they have grown, after more than half of it, and the detector trips. Without the detector nothing trips.
+/// In the paper's flight with gusts and uncertainty, the robust terms with the printed epsilon of 1 mm/s chatter once
+/// they have grown, after more than half of the flight. The detector trips. Without the detector, nothing trips.
 #[test]
 fn the_printed_laws_chatter_is_a_limit_cycle() {
     let paper = paper::scenario(PlantModel::Simplified, Case::DEFAULT).unwrap();
@@ -105,7 +106,7 @@ fn the_printed_laws_chatter_is_a_limit_cycle() {
     assert_eq!(fly(Bounds { swings_hz: 1e4, ..bounds }), None);
 }
 
-/// Noise, wind, turbulence and a course of steps do not trip the monitor of the profile `flight`.
+/// Noise, wind, turbulence and a series of steps do not trip the monitor of the profile `flight`.
 #[test]
 fn a_noisy_flight_in_wind_does_not_trip() {
     let wind =
@@ -120,8 +121,8 @@ fn a_noisy_flight_in_wind_does_not_trip() {
     }
 }
 
-/// A trip while the vehicle learns to tilt against the wind: the inputs continue without a jump, the fallback law
-/// returns to the setpoint, and so does AFBC once it is engaged again. It does not engage itself.
+/// The monitor trips while the vehicle adapts its tilt to the wind. The inputs continue without a jump, and the
+/// fallback law returns to the setpoint. So does AFBC when it is engaged again, which it never does by itself.
 #[test]
 fn a_flight_goes_on_across_a_trip_and_back() {
     let setpoint = above(0.0);
@@ -129,8 +130,8 @@ fn a_flight_goes_on_across_a_trip_and_back() {
     let realism = Realism { drag: Some(Drag::PAPER), wind, ..Realism::default() };
     let mut bench = Bench::real(flight(|bounds| bounds.theta.x = 0.05), realism, Deviations::default());
 
-    // At the switch, filtered inputs go on changing as in the step before, within 5 mN; virtual ones, which are not
-    // filtered, change by at most 5 mm/s2.
+    // At the switch, filtered inputs continue to change as in the step before, within 5 mN. Virtual inputs, which are
+    // not filtered, change by at most 5 mm/s2.
     let bumpless = |earlier: &Trace, before: &Trace, after: &Trace, what: &str| {
         let wanted = |trace: &Trace| {
             let Inputs { roll_n, pitch_n, yaw_n, thrust_n } = trace.inputs;
@@ -161,7 +162,7 @@ fn a_flight_goes_on_across_a_trip_and_back() {
     }
     assert!(bench.distance_m(&setpoint) < 0.01, "{} m off", bench.distance_m(&setpoint));
 
-    // Engaged with bounds that the wind does not exceed.
+    // Engages AFBC with bounds that the wind does not exceed.
     bench.controller = flight(|_| ());
     bench.controller.engage(&mut bench.memory.control);
     let _ = bench.step(&setpoint);
@@ -173,7 +174,7 @@ fn a_flight_goes_on_across_a_trip_and_back() {
     }
 }
 
-/// The fallback law reaches setpoints far beyond its speed limits, up, down and sideways.
+/// The fallback law reaches setpoints for which its speed limits matter, up, down and sideways.
 #[test]
 fn the_fallback_flies_far() {
     let tripped = |bounds: &mut Bounds| bounds.error = PerAxis { z: 0.0, ..bounds.error };

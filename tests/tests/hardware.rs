@@ -1,4 +1,4 @@
-//! Limits of the profile `flight` in the paper's flight with real rotors and a noisy state.
+//! Limits of the profile `flight` in the paper's flight, with realistic rotors and a noisy state.
 
 use afbc::Profile;
 use afbc_scenario::contender::{Contender, ControllerKind};

@@ -1,5 +1,5 @@
-//! A vehicle's file and its parameters are two views of one declaration: from the file through a station's file and a
-//! store, every bit of what the firmware flies is the same.
+//! A vehicle's file and its parameters are two views of one declaration. From the file through a station's parameter
+//! file and a store, every bit of the firmware's configuration stays the same.
 #![allow(clippy::unwrap_used, missing_docs)] // tests
 
 use afbc_files::Flash;
@@ -16,7 +16,7 @@ fn kept<const N: usize>(vehicle: &Vehicle, rotors: Configuration<N>, format: For
     let original: Configuration<N> = vehicle.configuration().unwrap();
     let all = ParameterTable::new(original.clone());
     let text = written(format, &vehicle.name, all.iter().map(|it| (it.name, it.value, it.kind.number())));
-    // Into the store of an image with other values: all that the file says has to be kept.
+    // The store belongs to an image with other values, so it must keep all values of the file.
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{}-{format:?}.store", vehicle.name));
     let _ = fs::remove_file(&path);
     let mut table = ParameterTable::new(rotors.clone());
@@ -33,7 +33,7 @@ fn kept<const N: usize>(vehicle: &Vehicle, rotors: Configuration<N>, format: For
     let mut store = Store::open(Flash::known(&path).unwrap(), 0, hash(b"image")).unwrap();
     Kept::NOW.load(&mut found, &mut store, |notice| notices.push(notice)).unwrap();
     assert_eq!(notices, []);
-    // Debug shows every bit but that of a NaN, and there is none.
+    // Debug output shows every bit except those of NaN, which does not occur.
     assert_eq!(format!("{:?}", found.configuration()), format!("{original:?}"), "{}", vehicle.name);
     let flown = |configuration: &Configuration<N>| format!("{:?}", Prepared::new(configuration).unwrap());
     assert_eq!(flown(found.configuration()), flown(&original));
@@ -44,7 +44,7 @@ fn from_a_vehicles_file_through_parameters_and_store_nothing_changes() {
     let vehicles: Vec<Vehicle> = BUILT_IN.iter().map(|vehicle| vehicle.read().unwrap()).collect();
     for vehicle in &vehicles {
         with_rotors!(vehicle.rotors.len(), N => {
-            // Another image with the same rotors: where they are is no parameter.
+            // The other image has the same rotors, since their positions are not parameters.
             let mut other: Configuration<N> = vehicle.configuration().unwrap();
             other.airframe.parameters.mass_kg *= 0.97;
             other.settings.bumpless = !other.settings.bumpless;
@@ -56,7 +56,8 @@ fn from_a_vehicles_file_through_parameters_and_store_nothing_changes() {
     }
 }
 
-/// A program that is killed while it sets a value leaves what a cut of power leaves; two programs cannot share a store.
+/// A program that is killed while it sets a value leaves the same store as a loss of power. Two programs cannot share a
+/// store.
 #[test]
 fn a_store_in_a_file_is_whole_and_belongs_to_one_program() {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("shared.store");
@@ -66,7 +67,7 @@ fn a_store_in_a_file_is_whole_and_belongs_to_one_program() {
     store.set(RecordName::new("A").unwrap(), 0, Some(7)).unwrap();
     assert_eq!(Flash::known(&path).unwrap_err().to_string(), "in use by another program");
     drop(store);
-    // A write cut in the middle: the second half of the record is missing.
+    // The write was cut in the middle: the second half of the record is missing.
     let mut bytes = fs::read(&path).unwrap();
     let end = bytes.iter().rposition(|byte| *byte != 0xFF).unwrap() + 1;
     let begin = end - 28;
@@ -83,8 +84,8 @@ fn a_store_in_a_file_is_whole_and_belongs_to_one_program() {
     assert_eq!((store.found().damaged, store.get(RecordName::new("A").unwrap()).unwrap()), (0, Some((0, 8))));
 }
 
-/// A parameter under its former and its present name, both in the store after a cut of power, has one of the two values
-/// in the end, also where what is stored does not fly together.
+/// A loss of power may leave a parameter in the store under its former and its present name. It then has one of the two
+/// values in the end, even if the stored values do not fit together.
 #[test]
 fn a_parameter_under_two_names_has_one_of_its_values() {
     let kept = Kept { renamed: &[("V_WEIGHT", "V_MASS")], ..Kept::NOW };

@@ -1,5 +1,5 @@
-//! The memory of the air: what the vehicle's file does not tell is learnt lap by lap. Compares the table of
-//! `docs/flight.md`, or writes it with `WRITE=1`.
+//! Tests the law's memory of aerodynamic forces: a difference from the vehicle's file is learnt lap by lap. Compares
+//! the table of `docs/flight.md`, or writes it with `WRITE=1`.
 
 use afbc::Profile;
 use afbc_plant::{Environment, Motion, ParameterChange, Payload, PlantParameter, RotorFault};
@@ -16,16 +16,16 @@ const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/flight.md");
 const BEGIN: &str = "<!-- laps: written by WRITE=1 cargo test -p flight-tests --test all laps:: -->\n";
 const END: &str = "<!-- laps: end -->";
 
-/// In what the vehicle is unlike its file.
+/// A difference between the vehicle and its file.
 #[derive(Clone, Copy)]
 enum Unlike {
-    /// Drag, by a factor.
+    /// Factor on the drag.
     Drag(f64),
-    /// Thrust at any speed of the rotors, by a factor.
+    /// Factor on the thrust at any rotor speed.
     Thrust(f64),
-    /// The first rotor has this share of its thrust.
+    /// Remaining fraction of the first rotor's thrust.
     Rotor(f64),
-    /// A payload of this share of the mass, a fifth of an arm ahead.
+    /// Payload with this fraction of the mass, a fifth of an arm ahead.
     Payload(f64),
 }
 
@@ -42,7 +42,7 @@ impl Unlike {
         }
     }
 
-    /// Makes `scenario` unlike the vehicle's file, by which laws know it.
+    /// Changes the vehicle of `scenario`, but not the file by which the laws know the vehicle.
     fn put(self, scenario: &mut Scenario) {
         let vehicle = scenario.vehicle;
         let (start_s, end_s) = (0.0, f64::INFINITY);
@@ -69,7 +69,7 @@ impl Unlike {
     }
 }
 
-/// Laps of Gerono's lemniscate of 6 m by 3 m at up to this speed, and the time of one.
+/// Returns laps of Gerono's lemniscate of 6 m by 3 m at up to this speed, and the time of a lap.
 fn laps(vehicle: &str, speed_m_s: f64, unlike: Unlike) -> (Scenario, f64) {
     let vehicle = afbc_vehicles::built_in(vehicle).unwrap().read().unwrap();
     let mut scenario = built_in("hardware").unwrap().read().unwrap();
@@ -86,7 +86,7 @@ fn laps(vehicle: &str, speed_m_s: f64, unlike: Unlike) -> (Scenario, f64) {
     (scenario, period_s)
 }
 
-/// Root mean square distance from the reference in each lap \[m\].
+/// Returns the root mean square distance from the reference in each lap \[m\].
 fn errors((scenario, period_s): &(Scenario, f64), contender: &Contender) -> [f64; LAPS] {
     let run = Run::fly(scenario, contender, 1).unwrap();
     assert!(run.lost.is_none() && run.tripped.is_none(), "{:?} {:?}", run.lost, run.tripped);
@@ -102,7 +102,8 @@ fn errors((scenario, period_s): &(Scenario, f64), contender: &Contender) -> [f64
     })
 }
 
-/// Errors of AFBC in each lap, of AFBC without its memory, and of INDI, each with its gains for the vehicle \[m\].
+/// Returns the errors in each lap of AFBC, of AFBC without its memory, and of INDI, each with its gains for the vehicle
+/// \[m\].
 fn all_errors(flight: &(Scenario, f64)) -> [[f64; LAPS]; 3] {
     let vehicle = flight.0.vehicle_file.as_ref().unwrap();
     let on_it = |kind| Contender::of(kind, Profile::Flight).on(vehicle, Profile::Flight).unwrap();
@@ -112,9 +113,9 @@ fn all_errors(flight: &(Scenario, f64)) -> [[f64; LAPS]; 3] {
     [afbc, forgetful, indi].map(|contender| errors(flight, &contender))
 }
 
-/// On drag unlike what the file says, each lap is nearer than the one before, and lap 5 is half of INDI's at most, with
-/// twice the drag nearer by 15 % at least than without the memory, and half of lap 1 on the paper's vehicle, 0.65 on
-/// the racer. Of all else the memory makes no flight worse.
+/// With a drag unlike the file's, each lap has a smaller error than the one before. Lap 5 has at most half of INDI's
+/// error, and at most 0.5 (paper's vehicle) or 0.65 (racer) of that of lap 1. With twice the drag, it has at least 15 %
+/// less than without the memory. With other differences, the memory makes no flight worse.
 #[test]
 fn what_the_file_does_not_tell_is_learnt_lap_by_lap() {
     let mut table = String::from("| | lap 1 | 2 | 3 | 5 | 5, no memory | 5, INDI |\n|---|--:|--:|--:|--:|--:|--:|\n");

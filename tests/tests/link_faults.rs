@@ -1,5 +1,5 @@
-//! Flights over a link that drops, delays, corrupts, truncates, repeats or reorders frames: the rigid-body plant and
-//! the firmware's code on the host, connected by MAVLink frames. (`crates/flight-core/tests/faults.rs` has the same
+//! Flies over a link that drops, delays, corrupts, truncates, repeats or reorders frames. The firmware's code on the
+//! host flies the rigid-body plant; MAVLink frames connect them. (`crates/flight-core/tests/faults.rs` tests the same
 //! faults without a plant, to the millisecond.)
 //!
 //! Times are in ms since the request to arm. Until then the vehicle is held at its start. There is a ground.
@@ -16,21 +16,21 @@ use core::ops::Range;
 use nalgebra::Vector3;
 use std::fmt::Write as _;
 
-/// Time after which tracking errors are evaluated, for faults present from the start, which is far from the reference
-/// \[ms\].
+/// Time after which tracking errors are evaluated \[ms\], for faults from the start on. The start is far from the
+/// reference.
 const SETTLED_MS: i64 = 5_000;
-/// Speed above which a landing counts as a crash, with an arbitrary end state \[m/s\].
+/// Touch-down speed above which a landing counts as a crash, whose final attitude is arbitrary \[m/s\].
 const CRASH_M_S: f64 = 3.0;
 /// Time between control ticks \[s\].
 const STEP_S: f64 = 0.001;
-/// Time for which the vehicle is held, with states and setpoints, before the request to arm \[ms\].
+/// Time for which the vehicle is held before the request to arm, while states and setpoints are sent \[ms\].
 const HELD_MS: i64 = 1_100;
 
 // --- Flights. ---
 
 #[derive(Clone, Copy, Debug)]
 enum Flight {
-    /// At rest at this height \[m\], at its setpoint.
+    /// Hovers at this height \[m\], starting at rest.
     Hover(f64),
     /// The paper's flight with gusts and uncertainty.
     Paper,
@@ -54,7 +54,7 @@ impl Flight {
 
 // --- Faults. ---
 
-/// Frames affected, by MAVLink message.
+/// Affected frames, by MAVLink message.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Of {
     States,
@@ -85,13 +85,13 @@ impl Of {
 #[derive(Clone, Copy, Debug)]
 enum What {
     Drop,
-    /// Drops this share \[%\].
+    /// Drops this share of the frames \[%\].
     DropSome(u64),
-    /// Drops all but every n-th.
+    /// Drops all frames but every n-th.
     KeepEach(u64),
-    /// Delays by this many ms.
+    /// Delays frames by this many ms.
     Delay(i64),
-    /// Delays by a random time up to this many ms, so that frames overtake each other.
+    /// Delays frames by a random time up to this many ms, so that frames overtake each other.
     Jitter(u64),
     /// Holds frames back until the end of the fault, then delivers them at once.
     HoldBack,
@@ -99,15 +99,15 @@ enum What {
     Reverse(i64),
     /// Flips one random bit.
     Flip,
-    /// Flips one bit of this share of frames \[%\].
+    /// Flips one bit in this share of the frames \[%\].
     FlipSome(u64),
-    /// Cuts off the second half.
+    /// Cuts off the second half of the frame.
     Truncate,
-    /// Delivers each frame again a ms later.
+    /// Delivers each frame a second time one ms later.
     Twice,
-    /// Inserts bytes that look like the start of a frame before it.
+    /// Inserts bytes before the frame that look like the start of a frame.
     Noise,
-    /// Delivers the first frame of the fault again and again instead.
+    /// Delivers the first frame of the fault repeatedly instead of the others.
     Replay,
 }
 
@@ -119,17 +119,18 @@ const FOREVER: i64 = i64::MAX;
 
 #[derive(Clone, Copy, Debug)]
 enum Then {
-    /// Continues flying, within this distance of its reference \[m\].
+    /// Continues to fly within this distance of the reference \[m\].
     Flies(f64),
-    /// Coasts and continues flying, within the first distance of its reference, and within the second during the last 2
-    /// s \[m\].
+    /// Coasts and then continues to fly. The distance from the reference stays within the first value, and within the
+    /// second one during the last 2 s \[m\].
     Recovers(f64, f64),
-    /// Coasts, descends and continues flying, within the first distance of its reference, and within the second during
-    /// the last 2 s \[m\].
+    /// Coasts, descends and then continues to fly. The distance from the reference stays within the first value, and
+    /// within the second one during the last 2 s \[m\].
     Resumes(f64, f64),
-    /// Descends at most this fast \[m/s\], and disarms on the ground.
+    /// Descends and touches down at most this fast \[m/s\], then disarms on the ground.
     Lands(f64),
-    /// Descends blind, and disarms in the air 2.25 s after the last state; hits the ground at most this fast \[m/s\].
+    /// Descends without an attitude and disarms in the air 2.25 s after the last state. Hits the ground at most this
+    /// fast \[m/s\].
     GivesUp(f64),
     /// Disarms at this time \[ms\].
     Stops(i64),
@@ -143,7 +144,7 @@ struct Case {
     name: &'static str,
     flight: Flight,
     faults: &'static [Fault],
-    /// Requests after the one to arm.
+    /// Requests after the request to arm.
     requests: &'static [(i64, Command)],
     end_ms: i64,
     then: Then,
@@ -171,7 +172,8 @@ const CASES: &[Case] = &[
     case("hover", Hover(2.0), &[], 10_000, Flies(0.05)),
     case("the paper's flight", Paper, &[], 42_000, Flies(0.5)),
 
-    // Dropped frames. On its way to the reference, 1.5 m above its start, the vehicle is 0.95 m off after a second.
+    // Dropped frames. On its way to the reference, 1.5 m above the start, the vehicle is still 0.95 m away after one
+    // second.
     case("19 ms without a state", Hover(2.0), &[(States, 3000..3019, Drop)], 10_000, Flies(0.1)),
     case("100 ms without a state, hovering", Hover(2.0), &[(States, 3000..3100, Drop)], 13_000, Recovers(0.1, 0.02)),
     case("240 ms without a state, hovering", Hover(2.0), &[(States, 3000..3240, Drop)], 13_000, Recovers(0.1, 0.02)),
@@ -196,7 +198,7 @@ const CASES: &[Case] = &[
     case("no state any more, hovering low", Hover(1.5), &[(States, 3000..FOREVER, Drop)], 10_000, Lands(2.0)),
     case("no state any more, hovering high", Hover(5.0), &[(States, 3000..FOREVER, Drop)], 10_000, GivesUp(9.0)),
     case("no state any more, the paper's flight", Paper, &[(States, 10_000..FOREVER, Drop)], 20_000, GivesUp(9.0)),
-    // Flying blind, it cannot know that inertia and thrust have changed.
+    // Without states, the vehicle cannot know that inertia and thrust have changed.
     case("no state any more, as parameters change", Paper, &[(States, 19_900..FOREVER, Drop)], 30_000, Lands(10.0)),
     case("the uplink is dead", Hover(1.5), &[(Uplink, 3000..FOREVER, Drop)], 10_000, Lands(2.0)),
     case("half of all states lost by chance, the paper's flight", Paper,
@@ -208,7 +210,7 @@ const CASES: &[Case] = &[
 
     // Delayed frames.
     case("states 10 ms late, the paper's flight", Paper, &[(States, 5_000..FOREVER, Delay(10))], 42_000, Flies(0.8)),
-    // Each later state is as old as the first one: time on the way and the clocks' difference look alike.
+    // Each later state is as late as the first one. A delay looks like a difference between the clocks.
     case("states 30 ms late", Hover(1.5), &[(States, 3000..FOREVER, Delay(30))], 10_000, Resumes(0.9, 0.1)),
     case("states held back for 100 ms, then all at once", Hover(2.0),
         &[(States, 3000..3100, HoldBack)], 13_000, Recovers(0.1, 0.02)),
@@ -272,7 +274,7 @@ const CASES: &[Case] = &[
 
 // --- The link. ---
 
-/// Pseudo-random numbers, the same in every run.
+/// Generator of pseudo-random numbers, the same in every run.
 struct Chance(u64);
 
 impl Chance {
@@ -287,7 +289,7 @@ struct Air {
     faults: &'static [Fault],
     chance: Chance,
     sent: u64,
-    /// Time of arrival \[ms\], order of arrival in that ms, and frame.
+    /// Time of arrival \[ms\], order of arrival within that ms, and the frame.
     under_way: Vec<(i64, i64, Vec<u8>)>,
     replayed: Option<Vec<u8>>,
 }
@@ -297,7 +299,7 @@ impl Air {
         Air { faults, chance: Chance(1), sent: 0, under_way: Vec::new(), replayed: None }
     }
 
-    /// Sends the frames in `bytes`, and returns the bytes that arrive in this ms.
+    /// Sends the frames in `bytes`. Returns the bytes that arrive in this ms.
     fn pass(&mut self, now_ms: i64, bytes: &[u8]) -> Vec<u8> {
         let mut rest = bytes;
         while !rest.is_empty() {
@@ -349,24 +351,26 @@ impl Air {
 
 #[derive(Debug, Default)]
 struct Seen {
-    /// Start of each mode \[ms\], and the height then \[m\].
+    /// Start of each mode \[ms\], with the height at that time \[m\].
     modes: Vec<(i64, Mode, f64)>,
     answers: Vec<Result<Request, Refusal>>,
-    /// Answer about arming that the station received.
+    /// Reason of a refusal to arm that the station received.
     refused: Option<&'static str>,
-    /// Largest distance from the reference while armed, from the first fault on, and during the last 2 s \[m\].
+    /// Largest distance from the reference while armed, from the first fault on \[m\]. `last_m` is the same for the
+    /// last 2 s.
     worst_m: f64,
     last_m: f64,
     /// Largest roll or pitch while armed \[rad\].
     tilt_rad: f64,
     /// Speed at the first ground contact \[m/s\].
     touchdown_m_s: Option<f64>,
-    /// Largest height after it \[m\].
+    /// Largest height after the first ground contact \[m\].
     bounce_m: f64,
-    /// Whether it had touched the ground when the last mode began, and its roll or pitch then \[rad\].
+    /// True if the vehicle had touched the ground when the last mode began. `last_tilt_rad` is its roll or pitch at
+    /// that time.
     touched_down_before: bool,
     last_tilt_rad: f64,
-    /// Violations of rules that hold always.
+    /// Violations of rules that always hold.
     violations: Vec<String>,
 }
 
@@ -389,7 +393,7 @@ fn fly(case: &Case) -> Seen {
         station.track((now_ms + 2 * HELD_MS) as u64 * 1000, motion.measure());
         station.lead(reference.setpoint());
         if now_ms.rem_euclid(1_000) == 0 {
-            // Anew after an outage, which ends the mode.
+            // The heartbeat and the mode are sent again after an outage, which ends the mode.
             station.beat();
             station.follow();
         }
@@ -510,7 +514,7 @@ fn wrong(case: &Case, seen: &Seen) -> Vec<String> {
     wrong
 }
 
-/// Returns every result, in order, computed on two threads.
+/// Computes a result for each item on two threads, and returns the results in order.
 fn in_parallel<T: Sync, R: Send>(of: &[T], work: fn(&T) -> R) -> Vec<R> {
     let (even, odd): (Vec<_>, Vec<_>) = std::thread::scope(|scope| {
         let odd = scope.spawn(|| of.iter().skip(1).step_by(2).map(work).collect());
@@ -520,7 +524,7 @@ fn in_parallel<T: Sync, R: Send>(of: &[T], work: fn(&T) -> R) -> Vec<R> {
     (0..of.len()).filter_map(|index| if index % 2 == 0 { even.next() } else { odd.next() }).collect()
 }
 
-/// Flies every case, and fails with a list of all that did not end as expected.
+/// Flies every case. Fails with a list of all that did not end as expected.
 fn check(cases: &[Case]) {
     let mut failures = String::new();
     for (case, seen) in cases.iter().zip(in_parallel(cases, fly)) {
@@ -544,8 +548,8 @@ fn every_case_ends_as_it_should() {
     check(CASES);
 }
 
-/// Outages at any time of the paper's flight. Those short enough to coast through are recovered from. After
-/// longer ones the vehicle descends, and flies on when the state has been back for a second.
+/// Outages may begin at any time of the paper's flight. The vehicle coasts through short ones and recovers. In longer
+/// ones it descends, and it flies on when states have been back for a second.
 #[test]
 fn an_outage_may_come_at_any_time() {
     let outage = |start_ms: i64, length_ms: i64, end_ms: i64, then: Then| {
@@ -556,7 +560,8 @@ fn an_outage_may_come_at_any_time() {
         .step_by(5_100)
         .flat_map(|start_ms| {
             [
-                // The first begins while the vehicle is still on its way from 1.5 m off, 1.36 m then.
+                // The first outage begins while the vehicle is still 1.36 m away from the reference, on its way from
+                // 1.5 m.
                 outage(start_ms, 240, 8_000, Recovers(if start_ms < 2_000 { 1.4 } else { 0.6 }, 0.5)),
                 outage(start_ms, 300, 15_000, Resumes(if start_ms < 2_000 { 2.0 } else { 1.1 }, 0.5)),
                 outage(start_ms, 1000, 15_000, Resumes(2.2, 0.5)),

@@ -1,5 +1,5 @@
-//! Margins of the profile `flight`, monitored as on board: fast curves, delay, sampled states, noise, and the vehicles
-//! that it was once lost with.
+//! Margins of the profile `flight`, monitored as on board: fast curves, delay, sampled states, noise, and vehicles that
+//! were once lost.
 
 use afbc::Profile;
 use afbc_campaign::suite::SUITES;
@@ -16,7 +16,7 @@ fn flown(kind: ControllerKind) -> Contender {
     Contender::of(kind, Profile::Flight).monitored()
 }
 
-/// `hardware` without gusts and parameter changes, on a figure of eight of this half-length that takes this time.
+/// Returns `hardware` without gusts and parameter changes, on a figure of eight with this half length and period.
 fn eight(half_length_m: f64, period_s: f64, height_m: f64) -> Scenario {
     let mut scenario = built_in("hardware").unwrap().read().unwrap();
     scenario.environment = Environment::calm(*scenario.environment.nominal()).unwrap();
@@ -29,7 +29,7 @@ fn eight(half_length_m: f64, period_s: f64, height_m: f64) -> Scenario {
     scenario
 }
 
-/// An eight of 3 m in 8 s in light turbulence.
+/// Returns a figure of eight of 3 m in 8 s, in light turbulence.
 fn turbulent(seed: u64) -> Scenario {
     let mut scenario = Scenario { seed, ..eight(1.5, 8.0, 0.3) };
     scenario.realism.drag = Some(Drag::PAPER);
@@ -37,15 +37,15 @@ fn turbulent(seed: u64) -> Scenario {
     scenario
 }
 
-/// Flies it without being lost or handed over, and returns the RMS distance from the reference \[m\] and the largest
-/// mean change of an input \[N\].
+/// Flies the scenario without a loss or a trip. Returns the RMS distance from the reference \[m\] and the largest mean
+/// change of an input \[N\].
 fn fly(scenario: &Scenario) -> (f64, f64) {
     let run = Run::fly(scenario, &flown(ControllerKind::Afbc), u64::MAX).unwrap();
     assert!(run.lost.is_none() && run.tripped.is_none(), "{:?} {:?}", run.lost, run.tripped);
     (run.metrics.rmse.xyz().norm(), run.metrics.mean_abs_delta_u.max())
 }
 
-/// A lemniscate of 6 m at 4 m/s at most: every derivative is known, so that next to nothing is left to learn.
+/// A lemniscate of 6 m at up to 4 m/s. Every derivative of the reference is known, so almost nothing is left to learn.
 #[test]
 fn a_fast_curve_is_no_disturbance() {
     let speed_m_s = 4.0;
@@ -54,7 +54,7 @@ fn a_fast_curve_is_no_disturbance() {
     assert!(rms_m < 0.002, "{rms_m} m");
 }
 
-/// In turbulence the disturbance observer keeps the vehicle nearer to its reference by a third at least.
+/// In turbulence, the disturbance observer reduces the distance from the reference by at least a third.
 #[test]
 fn wind_is_observed_not_learnt() {
     for seed in 1..=3 {
@@ -70,7 +70,7 @@ fn wind_is_observed_not_learnt() {
     }
 }
 
-/// A state that is 20 ms old is flown on without chatter, which would be 100 mN and more.
+/// States that are 20 ms late do not cause chatter, which would be 100 mN or more.
 #[test]
 fn delay_of_20_ms_does_not_chatter() {
     for seed in 1..=3 {
@@ -81,8 +81,8 @@ fn delay_of_20_ms_does_not_chatter() {
     }
 }
 
-/// 100 states per second that are 20 ms old, with a gyroscope at 1 kHz. INDI is 28 mm off: by what a vehicle flies in
-/// 20 ms it trails under every law.
+/// The law flies with 100 states per second that are 20 ms late and a gyroscope at 1 kHz. INDI's error is 28 mm: under
+/// every law, the vehicle trails by the distance that it flies in 20 ms.
 #[test]
 fn a_slow_tracker_with_a_gyroscope_suffices() {
     for seed in 1..=3 {
@@ -93,7 +93,7 @@ fn a_slow_tracker_with_a_gyroscope_suffices() {
     }
 }
 
-/// Noise of 0.05 rad/s on the rates costs less than under PID with its filters (0.86 to 0.89 of it).
+/// With noise of 0.05 rad/s on the rates, the cost is lower than under PID with its filters (0.86 to 0.89 of it).
 #[test]
 fn noisy_rates_cost_less_than_under_pid() {
     for seed in 1..=3 {
@@ -105,8 +105,8 @@ fn noisy_rates_cost_less_than_under_pid() {
     }
 }
 
-/// Two light vehicles with large inertia, in whose limit cycle of roll and pitch the mixer once raised the thrust
-/// until they were 36 and 46 m too high.
+/// Two light vehicles with large inertia have a limit cycle in roll and pitch. The mixer once raised their thrust in
+/// it, until they were 36 and 46 m too high.
 #[test]
 fn no_vehicle_is_lifted_by_its_own_limit_cycle() {
     let campaign = afbc_campaign::built_in("robustness").unwrap().read().unwrap();
@@ -118,8 +118,8 @@ fn no_vehicle_is_lifted_by_its_own_limit_cycle() {
     }
 }
 
-/// On a racer's circle at 1 g drag pushes, and turns, the vehicle: known, it costs half of what it does unknown, and
-/// where the rotors are counts for a fifth of the rest at least.
+/// On a racer's circle at 1 g, drag pushes and turns the vehicle. If the law knows the drag, the error is half as
+/// large. Knowing the height of the rotors reduces the rest by at least a fifth.
 #[test]
 fn known_drag_costs_less() {
     let suite = BuiltIn::named(&SUITES, "field").unwrap().read().unwrap();

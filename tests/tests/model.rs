@@ -1,6 +1,5 @@
-//! The model inverted by the baseline compared with the plant: two independent implementations, in the control crates
-//! and in the plant.
-#![allow(clippy::indexing_slicing, missing_docs)] // what is missing must stop the test
+//! Compares the model that the baseline inverts with the plant: two independent implementations.
+#![allow(clippy::indexing_slicing, missing_docs)] // missing data must stop the test
 
 use afbc::model;
 use afbc_plant::{Load, Motion, simplified};
@@ -8,7 +7,7 @@ use afbc_types::{Axis, Parameters, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-/// Rounding error of one `f32` operation, relative.
+/// Relative rounding error of one `f32` operation.
 const U: f64 = 1.0 / (1 << 24) as f64;
 
 /// Largest error of the control crate's sine and cosine, checked by `crates/control/tests/math.rs`.
@@ -61,8 +60,8 @@ proptest! {
         let gyroscopic = |i: f64, x: f64| p.rotor_inertia_kg_m2 / i * x * r;
         let total = f1 + f2 + f3 + f4;
         let (_, c_theta) = (attitude_rad.x.cos(), attitude_rad.y.cos());
-        // For each subsystem: the plant's acceleration, the paper's U_i, and the sum of the terms' magnitudes. A term
-        // of f is rounded at most 8 times; z contains cosines that are not exact.
+        // Each case has a subsystem, the plant's acceleration, the paper's U_i, and the sum of the terms' magnitudes. A
+        // term of f is rounded at most 8 times. z contains cosines that are not exact.
         let cases = [
             (
                 Axis::Roll,
@@ -88,7 +87,7 @@ proptest! {
             let dynamics = model.dynamics(axis, &state, residual as f32);
             let got = f64::from(dynamics.f) + f64::from(dynamics.g) * u;
             let trigonometry = if axis == Axis::Z {
-                // Both cosines are off by at most 1.7e-4; below a product of 0.1, g_4 is limited by design.
+                // Both cosines have errors of at most 1.7e-4. Below a product of 0.1, g_4 is limited by design.
                 prop_assume!(attitude_rad.x.cos() * c_theta > 0.11);
                 (2.0 + TRIGONOMETRY) * TRIGONOMETRY * total / p.mass_kg
             } else {
@@ -121,7 +120,8 @@ proptest! {
         };
         let h = 1e-5;
         let exact = (g(h) - g(-h)) / (2.0 * h);
-        // Two products of a sine and a cosine, each factor off by at most 1.7e-4 (3.4e-4 of the product), times a rate.
+        // Two products of a sine and a cosine, each factor with an error of at most 1.7e-4 (3.4e-4 of the product),
+        // times a rate.
         let allowed = 2.5 * TRIGONOMETRY * (rates_rad_s.x.abs() + rates_rad_s.y.abs()) / p.mass_kg + 1e-6;
         prop_assert!((f64::from(dynamics.g_dot) - exact).abs() <= allowed, "{} for {exact}", dynamics.g_dot);
         prop_assert!((f64::from(dynamics.g) - g(0.0)).abs() <= 2.5 * TRIGONOMETRY / p.mass_kg);
@@ -129,7 +129,7 @@ proptest! {
     }
 }
 
-/// Beyond a tilt of 84 degrees g_4 no longer falls: it stays positive, as assumption A4 requires, at any attitude.
+/// Beyond a tilt of 84 degrees, g_4 no longer falls. It stays positive at any attitude, as assumption A4 requires.
 #[test]
 fn g_4_stays_positive_at_any_tilt() {
     let model = model::ModelConstants::new(&Parameters::PAPER.to_f32());

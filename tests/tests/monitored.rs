@@ -1,4 +1,4 @@
-//! The monitor in flight: faults trip it for what they are and in time, hard flights do not.
+//! The monitor in flight: faults trip it in time and with the right reason, hard flights do not trip it.
 
 use afbc::Profile;
 use afbc::Trip;
@@ -15,8 +15,8 @@ use nalgebra::Vector3;
 /// Time of every fault in the suite `faults` \[s\].
 const FAULT_S: f64 = 10.0;
 
-/// Flies AFBC as on board, and returns when and why the monitor tripped and how far from the reference, in the largest
-/// coordinate, the vehicle was \[m\].
+/// Flies AFBC as on board. Returns time and reason of the monitor's trip, and the vehicle's distance from the reference
+/// at that time, in the largest coordinate \[m\].
 fn trip(scenario: &Scenario) -> Option<(f64, &'static str, f64)> {
     let contender = Contender::of(ControllerKind::Afbc, Profile::Flight).monitored().for_vehicle(&scenario.vehicle);
     let mut tripped = None;
@@ -29,9 +29,8 @@ fn trip(scenario: &Scenario) -> Option<(f64, &'static str, f64)> {
     tripped
 }
 
-/// A wrong sign, whose error the law itself makes larger and larger, trips within two seconds and a half and a few
-/// metres, a rotor at 40 % within five. (With a wrong sign of roll or pitch the vehicle tumbles before any monitor
-/// could help.)
+/// A wrong sign, whose error the law itself amplifies, trips the monitor within 2.5 s and a few metres. A rotor at 40 %
+/// trips it within 5 s. (With a wrong sign of roll or pitch, the vehicle tumbles before any monitor could help.)
 #[test]
 fn faults_trip_for_what_they_are_and_in_time() {
     let suite: Suite = BuiltIn::named(&SUITES, "faults").unwrap().read().unwrap();
@@ -52,7 +51,7 @@ fn faults_trip_for_what_they_are_and_in_time() {
     }
 }
 
-/// Steps of weak and heavy vehicles in every direction, in wind and moderate turbulence: hard, but no faults.
+/// Weak and heavy vehicles make steps in every direction, in wind and moderate turbulence. This is hard, but no fault.
 #[test]
 fn hard_flights_do_not_trip() {
     let hardware = built_in("hardware").unwrap().read().unwrap();

@@ -1,4 +1,4 @@
-//! Motor controllers that answer, from the plant's rotors to stations, notch and fault detection.
+//! ESC telemetry, from the plant's rotors to stations, the notch filter and the detection of rotor failures.
 
 use afbc::Profile;
 use afbc_campaign::random::{Random, Seen};
@@ -23,16 +23,16 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::rc::Rc;
 
-/// From the ground, outdoors, on the estimate.
+/// A scenario outdoors on the estimate, which begins on the ground.
 const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../twin/scenarios/hover.toml");
-/// Types of parameters, as MAV_PARAM_TYPE.
+/// Value of MAV_PARAM_TYPE for whole numbers.
 const INT32: u8 = 6;
 const STATION: Address = Address { system: 255, component: 190 };
-/// When the vehicle is armed and takes off, and when it is in the air \[ms\].
+/// Time at which the vehicle is armed and takes off \[ms\]. `ALOFT_MS` is the time at which it is in the air.
 const READY_MS: u64 = 8_000;
 const ALOFT_MS: u64 = 18_000;
 
-/// What lets the vehicle listen to its motor controllers: over their telemetry's line, or on the motors' lines.
+/// Parameters that turn ESC telemetry on: over the telemetry line, or by bidirectional DSHOT on the motors' lines.
 const LISTENS: [(&str, i32); 2] = [("DSHOT_TEL_CFG", 1), ("DSHOT_BIDIR_EN", 1)];
 
 /// Returns the request to set a parameter.
@@ -42,7 +42,7 @@ fn setting(name: &str, value: i32) -> ParameterRequest {
     ParameterRequest::Set { name: letters, value: value.to_le_bytes(), kind: INT32 }
 }
 
-/// Sets parameters of a vehicle, in frames that `tick` hands over one by one.
+/// Sets parameters of a vehicle. Calls `tick` with the frame of each.
 fn set(sender: &mut Sender, parameters: &[(&str, i32)], tick: &mut dyn FnMut(&[u8])) {
     let mut buffer = [0; FRAME_MAX];
     for (name, value) in parameters {
@@ -60,11 +60,11 @@ struct Flier {
     report: Option<Report<ROTORS_MAX>>,
     /// Texts with their times \[ms\].
     texts: Vec<(u64, String)>,
-    /// Newest speeds of ESC_STATUS, of eight rotors \[rev/min\].
+    /// Newest rotor speeds in ESC_STATUS, for up to eight rotors \[rev/min\].
     told_rpm: Option<[i32; ROTORS_MAX]>,
-    /// Speeds of the rotors in the last 0.25 s \[rad/s\].
+    /// True rotor speeds in the last 0.25 s \[rad/s\].
     turned: std::collections::VecDeque<Vec<f64>>,
-    /// Sum of |dU1| \[N\], its steps.
+    /// Sum of |dU1| over the steps \[N\].
     kicks_n: f64,
     thrust_n: f64,
 }
@@ -74,7 +74,7 @@ impl Flier {
         Flier::of(scenario, parameters, |_| ())
     }
 
-    /// One whose exact log `write` takes.
+    /// Makes a flight whose exact log is passed to `write`.
     fn recording(scenario: &Scenario, parameters: &[(&str, i32)], write: impl FnMut(&[u8]) + 'static) -> Self {
         Flier::of(scenario, parameters, |host| host.record(write))
     }
@@ -142,7 +142,7 @@ impl Flier {
         }
     }
 
-    /// Takes off.
+    /// Arms and takes off.
     fn lift_off(&mut self) {
         self.until(READY_MS);
         self.tick(Some(&Uplink::Command(Command::Arm)));
@@ -157,14 +157,14 @@ impl Flier {
     }
 }
 
-/// Returns the hover in a breeze on a vehicle, or on the twin's.
+/// Returns a hover in a breeze, on a given vehicle or on the scenario's own.
 fn hover(seed: u64, vehicle: Option<&Vehicle>) -> Scenario {
     let mut scenario = Scenario { seed, ..load(Path::new(SCENARIO)).unwrap() };
     scenario.realism.seed = seed;
     vehicle.map_or(scenario.clone(), |vehicle| scenario.on(vehicle, Profile::Flight).unwrap())
 }
 
-/// The vehicles whose motors have controllers that speak DSHOT: all but the Crazyflie, of 28 g.
+/// Returns the vehicles whose ESCs speak DSHOT: all except the Crazyflie, which weighs 28 g.
 fn vehicles() -> Vec<Vehicle> {
     BUILT_IN.iter().filter(|built_in| built_in.name != "crazyflie").map(|built_in| built_in.read().unwrap()).collect()
 }
@@ -177,7 +177,7 @@ fn speeds_reach_stations() {
         let mut flier = Flier::new(&hover(1, Some(&vehicle)), &[listens]);
         flier.lift_off();
         let told = flier.told_rpm.unwrap();
-        // The message is up to 0.2 s old: as fast as the rotor has been since, to a hundredth.
+        // The message is up to 0.2 s old, so its speed is one that the rotor had since then, to 1 %.
         for (rotor, told) in told.into_iter().enumerate().take(flier.turned[0].len()) {
             let rpm = flier.turned.iter().map(|speeds| speeds[rotor] * 60.0 / core::f64::consts::TAU);
             let (least, most) =
@@ -189,7 +189,7 @@ fn speeds_reach_stations() {
     }
 }
 
-/// Nobody is asked, nothing is told and nothing moves unless the parameter says so.
+/// By default, no telemetry is requested or sent, and the notch does not move.
 #[test]
 fn by_default_nobody_listens() {
     let mut flier = Flier::new(&hover(1, None), &[]);
@@ -197,7 +197,7 @@ fn by_default_nobody_listens() {
     assert_eq!(flier.told_rpm, None);
 }
 
-/// A rotor that stops in flight is told within 0.1 s, on every vehicle, whenever and in whichever wind.
+/// A rotor that stops in flight is reported within 0.1 s, on every vehicle, at any time and in any wind.
 #[test]
 fn a_stopped_rotor_is_noticed_within_100_ms() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
@@ -222,11 +222,11 @@ fn a_stopped_rotor_is_noticed_within_100_ms() {
             assert_eq!(others.count(), 1, "{:?}", flier.texts);
         }
     }
-    // On the motors' lines they answer every frame.
+    // With bidirectional DSHOT, the ESCs answer every frame.
     assert!(latest_ms[0] > latest_ms[1] && latest_ms[1] > 15, "{latest_ms:?}");
 }
 
-/// A vehicle of six rotors that loses one does what the parameter says.
+/// A vehicle with six rotors that loses one acts as the parameter says.
 #[test]
 fn a_failure_has_the_consequence_that_is_set() {
     let vehicle = BUILT_IN.iter().find(|built_in| built_in.name == "f550").unwrap().read().unwrap();
@@ -241,7 +241,7 @@ fn a_failure_has_the_consequence_that_is_set() {
     }
 }
 
-/// The firmware, whose motor controllers are listened to, and what it says.
+/// The firmware with ESC telemetry, and its messages.
 struct Heard {
     host: Host,
     decoder: Decoder<Downlink>,
@@ -276,8 +276,8 @@ impl Autopilot for Heard {
     }
 }
 
-/// Drawn flights of every vehicle, fast and slow, with worn rotors, changing masses, gusts and low batteries, raise no
-/// alarm.
+/// Randomly drawn flights of every vehicle, fast and slow, with worn rotors, changing masses, gusts and low batteries,
+/// raise no alarm.
 #[test]
 fn no_drawn_flight_raises_an_alarm() {
     for seen in [Seen::Mocap, Seen::Outdoor] {
@@ -285,7 +285,7 @@ fn no_drawn_flight_raises_an_alarm() {
         let (mut flown, mut lost) = (0, Vec::new());
         for (flight, listens) in drawn.into_iter().zip(LISTENS.into_iter().cycle()) {
             let mut scenario = flight.scenario;
-            // At rest and level, or the vehicle does not arm.
+            // The vehicle must be level and at rest to arm.
             scenario.initial = Motion {
                 position_m: scenario.initial.position_m,
                 attitude_rad: Vector3::new(0.0, 0.0, scenario.initial.attitude_rad.z),
@@ -319,7 +319,8 @@ fn no_drawn_flight_raises_an_alarm() {
     }
 }
 
-/// Mean |dU1| of a hover with a load of so much of the vehicle's mass \[N\], whose notch follows or stands.
+/// Returns the mean |dU1| of a hover with a payload of the fraction `load` of the mass \[N\]. The notch follows the
+/// measured speeds if `follows` is true, and is fixed otherwise.
 fn kicks_n(vehicle: &Vehicle, load: f64, follows: bool, seed: u64) -> f64 {
     let mut scenario = hover(seed, Some(vehicle));
     scenario.realism.wind.turbulence = None;
@@ -335,21 +336,22 @@ fn kicks_n(vehicle: &Vehicle, load: f64, follows: bool, seed: u64) -> f64 {
     flier.kicks_n / 5_000.0
 }
 
-/// With a load the rotors turn faster than in the vehicle's file, and the notch that stands lets their vibration
-/// through; the one that follows does not.
+/// With a payload, the rotors turn faster than in hover without one. A fixed notch then passes their vibration; a notch
+/// that follows the measured speeds does not.
 #[test]
 fn a_notch_that_follows_beats_one_that_stands() {
     let paper = BUILT_IN.iter().find(|built_in| built_in.name == "paper").unwrap().read().unwrap();
     for (load, at_most) in [(0.0, 1.05), (0.25, 0.95), (0.5, 0.85)] {
         for seed in 1..4 {
             let [stands, follows] = [false, true].map(|follows| kicks_n(&paper, load, follows, seed));
-            // Measured 1.00 to 1.02 without a load, 0.73 to 0.90 with a quarter of the mass, 0.57 to 0.79 with half.
+            // Measured ratios: 1.00 to 1.02 without a payload, 0.73 to 0.90 with a quarter of the mass, 0.57 to 0.79
+            // with half.
             assert!(follows < at_most * stands, "load {load}, seed {seed}: {follows} of {stands} N");
         }
     }
 }
 
-/// What a flight took and gave is the same again, wherever the notch stood; a notch that stood elsewhere is noticed.
+/// A replay repeats the inputs and outputs of a flight with measured speeds. A notch at another frequency is noticed.
 #[test]
 fn flights_with_measured_speeds_replay_exactly() {
     LISTENS.into_iter().for_each(flies_and_replays);

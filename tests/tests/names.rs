@@ -1,11 +1,11 @@
-//! One name, one meaning: a public type name stands in one crate, but for those listed here with the reason.
+//! One name, one meaning: each public type name is declared in one crate only, except those listed here with a reason.
 
 use proc_macro2::{TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Names that several crates may use, and why.
+/// Names that several crates may use, with the reasons.
 const SHARED: [(&str, &str); 6] = [
     ("Error", "a library's error, as in std"),
     ("Gains", "a law's gains, named with the law's module: `pid::Gains`"),
@@ -14,14 +14,14 @@ const SHARED: [(&str, &str); 6] = [
     ("Memory", "what changes from step to step, named with the module that steps"),
     ("Settings", "the constants of a crate, named with it: `estimator::Settings`"),
 ];
-/// Most names that may be shared.
+/// Largest allowed number of shared names.
 const SHARED_MAX: usize = 30;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
 
-/// Returns the Rust files of a folder, without unit tests in files of their own.
+/// Returns the Rust files of a folder, without unit tests in their own files.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().map(|entry| entry.unwrap().path());
     let of = |path: PathBuf| match path.file_name().and_then(|name| name.to_str()) {
@@ -32,8 +32,8 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     entries.flat_map(of).filter(|path| path.extension().is_some_and(|extension| extension == "rs")).collect()
 }
 
-/// Adds the public types that tokens declare, within modules and macros too. An alias for a type of the same name is
-/// that type.
+/// Adds the public types that tokens declare, also within modules and macros. An alias for a type of the same name does
+/// not count.
 fn declared(tokens: TokenStream, names: &mut BTreeSet<String>) {
     let tokens: Vec<_> = tokens.into_iter().collect();
     let word = |at: usize| match tokens.get(at) {
@@ -64,7 +64,7 @@ fn names_of(text: &str) -> BTreeSet<String> {
     names
 }
 
-/// Returns the crates that declare each public type name.
+/// Returns, for each public type name, the crates that declare it.
 fn crates_by_name() -> BTreeMap<String, BTreeSet<String>> {
     let within = |folder: &str| fs::read_dir(root().join(folder)).unwrap().map(|entry| entry.unwrap().path());
     let single = ["firmware", "sitl"].map(|name| root().join(name));

@@ -1,5 +1,5 @@
-//! The paper's flight compared with the table of an independent simulation in `f64`: simplified model (6), the law as
-//! printed, errors over 5 s to 60 s.
+//! Compares the paper's flight with the table of an independent simulation in `f64`: simplified model (6), the law as
+//! printed, errors from 5 s to 60 s.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)] // a table that cannot be flown must stop the test
 
 use afbc_plant::PlantModel;
@@ -11,7 +11,7 @@ use afbc_sim::run::Run;
 use flight_tests::{Row, golden};
 use std::sync::LazyLock;
 
-/// Rows of the table: 8 scenarios, two laws.
+/// Number of rows of the table: 8 scenarios with two laws.
 const TABLE_ROWS: usize = 16;
 
 /// Figures below this are not compared, since 10 % of them is within the table's rounding \[m, rad\].
@@ -44,7 +44,7 @@ fn kind(row: &Row<'_>) -> ControllerKind {
     ControllerKind::PAPER.into_iter().find(|kind| kind.name() == row.text("controller")).unwrap()
 }
 
-/// Every row, flown once for all tests of this file.
+/// Results of every row, flown once for all tests of this file.
 static FLOWN: LazyLock<Vec<(Case, ControllerKind, Metrics)>> = LazyLock::new(|| {
     let table = golden("oracle_table");
     let cases: Vec<_> = table.rows().map(|row| (case(&row), kind(&row))).collect();
@@ -68,7 +68,7 @@ static FLOWN: LazyLock<Vec<(Case, ControllerKind, Metrics)>> = LazyLock::new(|| 
     })
 });
 
-/// Compares one group of columns where `counts` is true; returns the number of figures compared.
+/// Compares one group of columns, where `counts` returns true. Returns the number of compared figures.
 fn compare(
     columns: [&str; 4],
     figures: fn(&Metrics) -> [f64; 4],
@@ -137,10 +137,10 @@ fn largest_errors_agree_within_10_percent() {
     assert_eq!(compared, 51);
 }
 
-/// U4 under uncertainty is a relay that switches at every step, so its mean change is well defined. The chatter of U1
-/// and U2 is not, unless it is excited only by the uncertainty: it grows from rounding errors once delta_hat exceeds a
-/// threshold, so its onset depends on the floating-point format. Rounding the measured state to `f32`, with the law in
-/// `f64`, changes the calm figure of U1 from 9 to 13 mN.
+/// With uncertainty, U4 is a relay that switches at every step, so its mean change is well defined. The chatter of U1
+/// and U2 is only defined if the uncertainty alone excites it. Otherwise it grows from rounding errors once delta_hat
+/// exceeds a threshold, so its onset depends on the floating-point format: rounding the measured state to `f32`, with
+/// the law in `f64`, changes the figure of U1 in calm air from 9 to 13 mN.
 #[test]
 fn changes_of_inputs_agree_within_10_percent_where_they_are_defined() {
     let figures = |metrics: &Metrics| (metrics.mean_abs_delta_u * 1000.0).into();
@@ -151,7 +151,7 @@ fn changes_of_inputs_agree_within_10_percent_where_they_are_defined() {
     assert_eq!(compared, 7);
 }
 
-/// The baseline's inputs are smooth to the table's last digit, 0.1 mN, and so is U3 under either law.
+/// The baseline's inputs are smooth to the table's last digit, 0.1 mN, and so is U3 under both laws.
 #[test]
 fn smooth_inputs_are_as_smooth_as_in_the_table() {
     let figures = |metrics: &Metrics| (metrics.mean_abs_delta_u * 1000.0).into();

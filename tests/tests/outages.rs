@@ -1,11 +1,11 @@
-//! Scenarios with `flight_core`: inside the flight core, a controller coasts through outages that it would not survive
-//! alone.
+//! Scenarios with `flight_core`: inside the flight core, a law coasts through outages that it would not survive alone.
 
 use afbc_scenario::contender::ControllerKind;
 use afbc_scenario::{Outage, Scenario, built_in};
 use afbc_sim::flight::{Lost, Sample, fly};
 
-/// The paper's flight on hardware, with an outage of `length_s` from 7.45 s on, during which a gust begins.
+/// Returns the paper's flight on realistic hardware with an outage of `length_s` from 7.45 s on, during which a gust
+/// begins.
 fn scenario(length_s: f64, flight_core: bool) -> Scenario {
     let mut scenario = built_in("hardware").unwrap().read().unwrap();
     scenario.duration_s = 20.0;
@@ -14,7 +14,7 @@ fn scenario(length_s: f64, flight_core: bool) -> Scenario {
     scenario
 }
 
-/// Returns for each contender its name, the loss, the largest distance from the reference \[m\] and the last sample.
+/// Returns each contender's name, loss, largest distance from the reference \[m\] and last sample.
 fn outcomes(scenario: &Scenario) -> Vec<(String, Option<Lost>, f64, Sample)> {
     let outcome = |contender: &afbc_scenario::contender::Contender| {
         let (mut worst_m, mut last) = (0.0_f64, None);
@@ -46,7 +46,7 @@ fn alone_no_law_survives_an_outage_of_a_second() {
     }
 }
 
-/// Only the arming tick differs from a flight of the law alone.
+/// Without an outage, only the arming tick differs from a flight of the law alone.
 #[test]
 fn without_an_outage_the_flight_core_changes_nothing() {
     let ends = [true, false].map(|flight_core| outcomes(&scenario(0.0, flight_core)));
@@ -57,7 +57,7 @@ fn without_an_outage_the_flight_core_changes_nothing() {
     }
 }
 
-/// Without states to the end, the vehicle descends and its motors stop.
+/// If states never return, the vehicle descends and its motors stop.
 #[test]
 fn an_outage_to_the_end_ends_with_the_motors_off() {
     for (name, _, _, last) in outcomes(&scenario(f64::INFINITY, true)) {

@@ -1,7 +1,8 @@
-//! Every declared parameter is listed in `docs/parameters.md`, with a name that suits ground stations and never
-//! changes, and those that scenario files take in `docs/scenarios.md`.
+//! Every declared parameter is listed in `docs/parameters.md`, with a name that fits ground stations and never changes.
+//! Parameters of scenario files are also listed in `docs/scenarios.md`.
 //!
-//! `WRITE=1 cargo test -p flight-tests --test all parameters::` writes the first page and those rows of the other.
+//! `WRITE=1 cargo test -p flight-tests --test all parameters::` writes the first page, and the parameters' rows of the
+//! second.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
 use afbc::Profile;
@@ -22,12 +23,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-/// One parameter, or one element of a vector.
+/// A parameter, or an element of a vector.
 struct Row {
     name: String,
     /// Value in each of the group's columns.
     values: Vec<String>,
-    /// Accepted values, of a choice with their numbers.
+    /// Accepted values; for a choice, with their numbers.
     accepted: String,
     declaration: Declaration,
 }
@@ -36,14 +37,14 @@ struct Row {
 struct Group {
     title: String,
     prefix: &'static str,
-    /// Headings of the value columns: the default, or each profile.
+    /// Headings of the value columns: "default", or the profiles' names.
     columns: Vec<&'static str>,
     rows: Vec<Row>,
-    /// Whether the values of each column are in range.
+    /// For each column, an error if its values are out of range.
     valid: Vec<Result<(), OutOfRange>>,
 }
 
-/// Returns a group whose parameters have one default.
+/// Returns a group whose parameters have a single default.
 fn group(title: impl Into<String>, prefix: &'static str, parameters: impl Declared) -> Group {
     columns(title, prefix, [("default", parameters)])
 }
@@ -64,7 +65,7 @@ fn shown(value: &Value<'_>) -> Vec<String> {
     }
 }
 
-/// Returns what is accepted in place of a value.
+/// Returns the accepted values, in words.
 fn accepted(range: &Range, value: &Value<'_>) -> String {
     match value {
         Value::Switch(_) => "true, false".into(),
@@ -105,18 +106,18 @@ fn columns<G: Declared, const N: usize>(
     Group { title: title.into(), prefix, columns: columns.iter().map(|(heading, _)| *heading).collect(), rows, valid }
 }
 
-/// Returns AFBC's bounds for the paper's vehicle.
+/// Returns the monitor's bounds for the paper's vehicle.
 fn bounds(profile: Profile) -> Bounds {
     Bounds::new(&profile.gains(), &Parameters::PAPER.to_f32(), &profile.settings())
 }
 
-/// Returns the gains of a law: those of each profile, or its own for a law outside the cascade.
-/// Returns the name of a control law at the beginning of a heading.
+/// Returns the name of a control law as the beginning of a heading.
 fn heading(kind: ControllerKind) -> String {
     let title = kind.title();
     format!("{}{}", title[..1].to_uppercase(), &title[1..])
 }
 
+/// Returns the gains of a law: those of each profile, or a law's own outside the cascade.
 fn gains(kind: ControllerKind) -> Group {
     let title = heading(kind);
     if kind.in_cascade() {
@@ -215,11 +216,11 @@ fn keys(parameters: impl Declared) -> Vec<(&'static str, [String; 4])> {
             Value::Choice(_, words) => words.iter().map(|word| format!("`\"{word}\"`")).collect::<Vec<_>>().join(", "),
             _ => format!("{} to {}{each}", number(range.min), number(range.max)),
         };
-        // As a part of a sentence, unless it begins with a symbol or an abbreviation.
+        // The meaning becomes part of a sentence, unless it begins with a symbol or an abbreviation.
         let (first, rest) = meaning.trim_end_matches('.').split_at(1);
         let is_word = rest.starts_with(|c: char| c.is_lowercase() || c == ' ');
         let first = if is_word { first.to_lowercase() } else { first.to_owned() };
-        // The meaning states if a parameter is in the unit of the subsystem's input.
+        // The meaning itself says if a parameter is in the unit of the subsystem's input.
         let is_told = is_in_key(declaration) || unit.ends_with("input");
         let unit = if is_told { String::new() } else { format!(" \\[{unit}\\]") };
         if group.is_empty() {
@@ -260,7 +261,7 @@ fn sections() -> BTreeMap<String, Vec<(&'static str, [String; 4])>> {
     named.map(|(heading, keys)| (heading.to_owned(), keys)).into_iter().chain(peers).collect()
 }
 
-/// Returns `page` with the rows of declared keys as they are declared. A default that is described in words stays.
+/// Returns `page` with the rows of declared keys rewritten. A default that is described in words stays.
 fn with_declared_rows(page: &str) -> String {
     let mut sections = sections();
     let mut lines: Vec<String> = Vec::new();
@@ -285,7 +286,7 @@ fn with_declared_rows(page: &str) -> String {
     lines.join("\n") + "\n"
 }
 
-/// Checks that the page `name` is what `declared` makes of it, or writes it.
+/// Checks that the page `name` equals the result of `declared`, or writes it.
 fn compare(name: &str, declared: impl Fn(&str) -> String) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs").join(name);
     let written = fs::read_to_string(&path).unwrap();
@@ -321,7 +322,7 @@ fn names_are_unique_and_fit_mavlink() {
     assert!(names.len() > 150, "{}", names.len());
 }
 
-/// What a station sees of the firmware's vehicle is on the page, with the same range.
+/// Every parameter that a station sees of the firmware is on the page, with the same range.
 #[test]
 fn what_a_station_may_set_is_declared_here() {
     let rows: BTreeMap<String, Declaration> =
@@ -336,20 +337,20 @@ fn what_a_station_may_set_is_declared_here() {
     assert_eq!(usize::from(table.count()), expected);
 }
 
-/// True if a parameter has no unit, or its key ends in it.
+/// True if a parameter has no unit, or its key ends in the unit.
 fn is_in_key(Declaration { range, unit, .. }: &Declaration) -> bool {
     let ending: String = unit.to_lowercase().replace([' ', '/'], "_");
-    // "1/s" is "_1_s"; a plain or whole number has no ending.
+    // "1/s" becomes "_1_s". A plain or whole number has no ending.
     ["1", "number", ""].contains(unit) || range.name.ends_with(&format!("_{ending}"))
 }
 
-/// A key ends in its unit, unless it is one of the paper's letters.
+/// A key ends in its unit, except for the paper's letters.
 #[test]
 fn a_key_ends_in_its_unit() {
     const LETTERS: [&str; 4] = ["alpha1", "stiffness", "sigma", "error"];
     for Row { name, declaration, .. } in groups().into_iter().flat_map(|group| group.rows) {
         let Declaration { range, unit, .. } = declaration;
-        // A unit that depends on the axis is left out.
+        // Units that depend on the axis are left out.
         let is_exempt = LETTERS.contains(&range.name) || unit.contains("input") || unit.contains(" or ");
         assert!(is_exempt || is_in_key(&declaration), "{name}: {} in {unit}", range.name);
     }

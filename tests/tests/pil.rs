@@ -1,5 +1,5 @@
-//! The paper's flight, with gusts and uncertainty, flown by the firmware's machine code on an emulated Cortex-M4F: in
-//! 60,000 control ticks no bit differs from the same code on the host.
+//! The firmware's machine code on an emulated Cortex-M4F flies the paper's flight with gusts and uncertainty. In 60,000
+//! control ticks, no bit differs from the same code on the host.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 
 use afbc_hil::{Host, LoopEnd, MessagePeriods, Station, fly};
@@ -11,13 +11,13 @@ use pil::budget::TICK_INSTRUCTIONS_MAX;
 use pil::{Emulator, Image, Twins};
 use std::io::Write as _;
 
-/// Returns the emulator, or none, with a message on the terminal, if the test has to be skipped. Under CI nothing may
-/// be skipped.
+/// Returns the emulator. Returns none, with a message on the terminal, if the test must be skipped. Under CI nothing
+/// may be skipped.
 fn emulator_or_skip() -> Option<Emulator> {
     match Image::Pil.find().and_then(|image| Emulator::start(&image)) {
         Ok(emulator) => Some(emulator),
         Err(error) if error.is_missing() && std::env::var_os("CI").is_none() => {
-            // Not println!, which the test harness would hide.
+            // println! would not do, since the test harness captures it.
             let _ = writeln!(std::io::stderr(), "SKIPPED, nothing was tested: {error}");
             None
         }
@@ -43,6 +43,7 @@ fn the_papers_flight_is_the_hosts_bit_for_bit() {
     );
     assert_eq!((comparison.differing_ticks, comparison.differing_bits), (0, 0));
     assert_eq!(comparison.late_ticks, 0);
-    // The budget of docs/budgets.md, in the flight with the most chatter. Counted, not timed: every run gives the same.
+    // Checks the budget of docs/budgets.md in the flight with the most chatter. Instructions are counted, so every run
+    // gives the same number.
     assert!(comparison.instructions.max() <= f64::from(TICK_INSTRUCTIONS_MAX), "{comparison:?}");
 }

@@ -1,6 +1,5 @@
-//! Flights on the vehicle's own estimate by the firmware's machine code on an emulated Cortex-M4F, with every preset of
-//! an instrument, one of them for a minute: no bit of estimate and rotor commands differs from the same code on the
-//! host.
+//! The firmware's machine code on an emulated Cortex-M4F flies on its own estimate, with every preset of an instrument
+//! and once for a minute. No bit of the estimate and the rotor commands differs from the same code on the host.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 
 use afbc_hil::{Host, LoopEnd, MessagePeriods, Station, fly};
@@ -12,11 +11,11 @@ use pil::{Emulator, Image, Twins};
 use std::io::Write as _;
 use std::thread;
 
-/// Every inertial sensor indoors, and every pair of barometer and magnetometer outdoors with one of them.
+/// Returns flights with every inertial sensor indoors, and with every pair of barometer and magnetometer outdoors.
 fn flights() -> Vec<Scenario> {
     let scenario = |name: &str| built_in(name).expect("built in").read().expect("valid");
     let with = |mut scenario: Scenario, imu: Imu| {
-        // Vibration and mounting are the vehicle's.
+        // Vibration and mounting belong to the vehicle, not to the sensor.
         let Some(old) = scenario.instruments.imu else { panic!("{} has none", scenario.name) };
         let mut imu = Imu { mounting: old.mounting, ..imu };
         imu.gyro.vibration_rad_s = old.gyro.vibration_rad_s;
@@ -32,7 +31,7 @@ fn flights() -> Vec<Scenario> {
         (outdoors.instruments.barometer, outdoors.instruments.magnetometer) = (Some(barometer), Some(magnetometer));
         outdoors
     });
-    // Who reads the most sensors flies longest: the emulator takes longer than a flight.
+    // The flight that reads the most sensors is the longest one. Emulation is slower than real time.
     let mut flights: Vec<_> = outdoors.chain(indoors).collect();
     for (index, flight) in flights.iter_mut().enumerate() {
         flight.duration_s = if index == 0 { 60.0 } else { 20.0 };
@@ -40,12 +39,12 @@ fn flights() -> Vec<Scenario> {
     flights
 }
 
-/// Returns board and host, or none, with a line, without the emulator or its image; never under CI.
+/// Returns board and host. Returns none, with a message, if the emulator or its image is missing; fails under CI.
 fn twins_or_skip() -> Option<Twins> {
     match Image::Pil.find().and_then(|image| Emulator::start(&image)) {
         Ok(emulator) => Some(Twins::new(emulator, Host::new().expect("in range"))),
         Err(error) if error.is_missing() && std::env::var_os("CI").is_none() => {
-            // Not println!, which the test harness would hide.
+            // println! would not do, since the test harness captures it.
             let _ = writeln!(std::io::stderr(), "SKIPPED, nothing was tested: {error}");
             None
         }
@@ -53,12 +52,12 @@ fn twins_or_skip() -> Option<Twins> {
     }
 }
 
-/// Flies one.
+/// Flies a scenario on board and host and compares them.
 fn compare(scenario: &Scenario) {
     let Some(mut twins) = twins_or_skip() else { return };
     let mut off_m: f64 = 0.0;
     let end = fly(scenario, &mut Station::new(), &mut twins, MessagePeriods::LOCKSTEP, |sample| {
-        // It starts away from the reference.
+        // The vehicle starts away from the reference.
         let distance_m =
             if sample.time_s < 5.0 { 0.0 } else { (sample.motion.position_m - sample.reference.position_m).norm() };
         off_m = off_m.max(distance_m);
@@ -75,13 +74,13 @@ fn compare(scenario: &Scenario) {
     let instructions = &comparison.instructions;
     assert!(instructions.max() <= f64::from(ESTIMATING_INSTRUCTIONS_MAX), "{comparison:?}");
     assert!(instructions.mean() <= f64::from(ESTIMATING_INSTRUCTIONS_MEAN), "{comparison:?}");
-    // Indoors it flies as well as on the states of a tracker; outdoors the receiver's error is its own.
+    // Indoors it flies as well as with a tracker's states. Outdoors the receiver's error adds to the distance.
     let allowed_m = if scenario.instruments.tracker.is_some() { 0.02 } else { 6.0 };
     assert!(off_m < allowed_m, "{}: {off_m} m", scenario.name);
 }
 
-/// An inertial sensor that dies, and a tracker that follows: host and board fly on the tracker's poses, then blind, and
-/// give up in the same tick.
+/// The inertial sensor fails, and later the tracker. Host and board fly on the tracker's poses, then without an
+/// attitude, and give up in the same tick.
 #[test]
 fn what_is_left_of_the_sensors_is_the_hosts_bit_for_bit() {
     let mut scenario = built_in("mocap").expect("built in").read().expect("valid");

@@ -1,5 +1,5 @@
-//! Flights with real rotors, air, ground and sensors, from scenario files.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // what cannot be flown must stop the test
+//! Flights from scenario files with realistic rotors, air, ground and sensors.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a failed flight must stop the test
 
 use afbc_scenario::contender::ControllerKind;
 use afbc_scenario::{Scenario, built_in, parse};
@@ -23,11 +23,11 @@ fn every_law_flies_the_papers_experiment_on_hardware() {
     assert_eq!(runs.len(), ControllerKind::ALL.len());
     for run in &runs {
         assert_eq!(run.lost, None, "{}", run.contender.name);
-        // Thrust is off by 40 %, inertia by 75 %, and gusts persist: backstepping keeps an error of most of a metre,
-        // the others less.
+        // Thrust is wrong by 40 %, inertia by 75 %, and gusts persist. Backstepping keeps an error of most of a metre,
+        // the other laws less.
         assert!(run.metrics.max_abs.xyz().amax() < 1.0, "{}: {}", run.contender.name, run.metrics.max_abs);
     }
-    // The paper's claim under other conditions: AFBC keeps less than half of backstepping's error.
+    // The paper's claim holds under these conditions too: AFBC keeps less than half of backstepping's error.
     let rmse = |kind| runs.iter().find(|run| run.contender.kind() == kind).unwrap().metrics.rmse;
     let (afbc, baseline) = (rmse(ControllerKind::Afbc), rmse(ControllerKind::Backstepping));
     assert!(afbc.iter().zip(&baseline).all(|(a, b)| *a < 0.5 * b), "{afbc} against {baseline}");
@@ -45,7 +45,7 @@ fn no_law_loses_the_vehicle_in_the_storm() {
     }
 }
 
-/// The printed gains chatter on rotors with a lag; the monitor detects it, and the fallback law takes over.
+/// The printed gains chatter on rotors with a lag. The monitor detects this, and the fallback law takes over.
 #[test]
 fn a_monitor_that_trips_saves_the_vehicle() {
     let text = |monitor| {
@@ -78,7 +78,7 @@ fn the_seed_determines_the_flight() {
     assert_eq!(elsewhere, first);
     let other = ends(&Scenario { seed: storm.seed + 1, ..storm.clone() });
     assert!(other.0 != first.0 && other.1 != first.1);
-    // All contenders have the same noise.
+    // All contenders fly with the same noise.
     let biased = parse("biased", "seed = 3\n[sensors]\nbias = 0.01\n[trajectory]\nkind = \"paper\"", "biased").unwrap();
     let first = |kind| {
         let sample = samples(&Scenario { duration_s: 0.1, ..biased.clone() }, kind).swap_remove(0);
@@ -103,7 +103,7 @@ fn in_a_dropout_nothing_is_learnt() {
             assert_eq!(now.estimates, before.estimates, "at {} s", now.time_s);
         }
     }
-    // 2 per second of 30 ms each: some 600 of 10,000 steps.
+    // 2 dropouts per second of 30 ms each: some 600 of 10,000 steps.
     assert!((200..1500).contains(&missed), "{missed}");
 }
 

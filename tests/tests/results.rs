@@ -7,7 +7,8 @@ use afbc_sim::run::Run;
 
 const PAGE: &str = include_str!("../../docs/results.md");
 
-/// True if figures differ by at most the last digit, or by the 2 % that another host's rounding may change chatter by.
+/// True if the figures differ by at most the last digit, or by 2 %, by which another host's rounding may change
+/// chatter.
 fn agree(page: &str, code: &str) -> bool {
     match (page.parse::<f64>(), code.parse::<f64>()) {
         (Ok(page), Ok(code)) => (page - code).abs() <= 1.5e-4 + 0.02 * code.abs(),
@@ -30,8 +31,8 @@ fn the_results_page_is_what_the_code_does() {
     }
 }
 
-/// The table of `sitl compare`: the standard contenders in `hardware`, with an asterisk on the best of each column as
-/// printed.
+/// Compares the table of `sitl compare`: the standard contenders in `hardware`, with an asterisk at the best printed
+/// value of each column.
 #[test]
 fn the_table_on_real_rotors_is_what_flies() {
     let scenario = built_in("hardware").unwrap().read().unwrap();

@@ -1,6 +1,7 @@
-//! Faults, and pairs of faults, of the vehicle as the server has it: what becomes of it, what it says, and what holds
-//! at every tick. Compares the table of `docs/safety.md`, or writes it with `WRITE=1`; `CASE=fence` shows some alone.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs)] // what cannot fly stops the test
+//! Single and combined faults of the server's vehicle: the end of the flight, the announcements, and the rules that
+//! hold at every tick. Compares the table of `docs/safety.md`, or writes it with `WRITE=1`. `CASE=fence` shows the
+//! cases with that name only.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs)] // a failed flight stops it
 
 use crate::airborne::checker::End;
 use crate::airborne::{Checker, STATION, Session, Tick, on_all_cores};
@@ -13,18 +14,18 @@ const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/safety.md");
 const BEGIN: &str = "<!-- safety net: tests/tests/safety_net.rs -->\n";
 const ENDS: &str = "<!-- end of the safety net -->\n";
 
-/// Seeds of every case.
+/// Number of seeds of every case.
 const SEEDS: u64 = 2;
-/// Time that a take-off takes at most \[s\].
+/// Longest duration of a take-off \[s\].
 const TAKEN_OFF_S: f64 = 20.0;
-/// What every flight has: a station that is lost after 2 s, and a return 5 m above home.
+/// Parameters of every flight: a station counts as lost after 2 s, and the return height is 5 m above home.
 const COMMON: [(&str, f32); 2] = [("COM_DL_LOSS_T", 2.0), ("RTL_RETURN_ALT", 5.0)];
 
-/// What became of a flight.
+/// Result of a flight.
 struct Outcome {
     checker: Checker,
     end: End,
-    /// Texts from the beginning of the case on.
+    /// Texts heard since the beginning of the case.
     heard: Vec<String>,
 }
 
@@ -97,7 +98,7 @@ fn act(session: &mut Session, it: &Do) {
 }
 
 impl Outcome {
-    /// Returns what does not hold.
+    /// Returns the rules and expectations that do not hold.
     fn complaints(&self, case: &Case) -> Vec<String> {
         let mut complaints = self.checker.complaints.clone();
         let mut heard = self.heard.iter();

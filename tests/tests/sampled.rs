@@ -1,5 +1,5 @@
-//! Flights with a realistic tracker, 100 states per second, each 10 ms late: through the flight core, and as scenarios
-//! say it.
+//! Flights with a realistic tracker that sends 100 states per second, each 10 ms late: through the flight core, and in
+//! scenarios.
 
 use afbc::Profile;
 use afbc_control::FlightController;
@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 /// Time since power-up at which the vehicle is armed and released \[ms\].
 const ARMED_MS: u64 = 1_100;
 
-/// A tracker: one state every so many ms, each so many ms late.
+/// A tracker that sends a state every `period_ms`, each late by `late_ms`.
 struct Tracker {
     period_ms: u64,
     late_ms: u64,
@@ -35,7 +35,7 @@ impl Tracker {
     }
 }
 
-/// Returns the root mean square distance from the reference from 5 s on \[m\], and whether the flight was completed.
+/// Returns the root mean square distance from the reference from 5 s on \[m\], and true if the flight was completed.
 fn fly<C: FlightController<N>, const N: usize>(
     scenario: &Scenario,
     controller: C,
@@ -74,8 +74,8 @@ fn flown(scenario: &Scenario, kind: ControllerKind, tracker: Tracker) -> (f64, b
     fly(scenario, controller, tracker)
 }
 
-/// Nearly as accurate as with a state every millisecond, due to extrapolation. Without it PID and AFBC lose the
-/// vehicle.
+/// Because of extrapolation, flights are nearly as accurate as with a state every millisecond. Without it, PID and AFBC
+/// lose the vehicle.
 #[test]
 fn a_tracker_of_100_hz_that_is_10_ms_late_is_flown_on() {
     let mut scenario = built_in("hardware").unwrap().read().unwrap();
@@ -91,8 +91,8 @@ fn a_tracker_of_100_hz_that_is_10_ms_late_is_flown_on() {
     }
 }
 
-/// Flies `hardware` for 8 s with states every so many s, so late, and returns what was flown and measured, and the root
-/// mean square distance from the reference from 5 s on \[m\]; none if the vehicle is lost.
+/// Flies `hardware` for 8 s with states every `period_s`, late by `delay_s`. Returns true and measured states, and the
+/// root mean square distance from the reference from 5 s on \[m\]; none if the vehicle is lost.
 fn sampled(
     kind: ControllerKind,
     [period_s, delay_s]: [f64; 2],
@@ -105,7 +105,7 @@ fn sampled(
     followed(&scenario, kind)
 }
 
-/// The same for a whole scenario.
+/// Flies a whole scenario and returns the same results.
 fn followed(scenario: &Scenario, kind: ControllerKind) -> (Vec<[State; 2]>, Option<f64>) {
     let (mut seen, mut squares, mut count) = (Vec::new(), 0.0, 0.0);
     let lost = afbc_sim::flight::fly(scenario, &Contender::of(kind, Profile::Flight).monitored(), |sample| {
@@ -119,7 +119,7 @@ fn followed(scenario: &Scenario, kind: ControllerKind) -> (Vec<[State; 2]>, Opti
     (seen, lost.unwrap().is_none().then(|| (squares / count).sqrt()))
 }
 
-/// A law is given a state in every step: that of 10 to 19 ms ago, and with a gyro the rates of now.
+/// In every step, a law gets the state of 10 to 19 ms ago, and with a gyroscope the present rates.
 #[test]
 fn a_scenario_says_sampled_and_late_states_with_a_gyro() {
     for gyro in [false, true] {
@@ -132,8 +132,8 @@ fn a_scenario_says_sampled_and_late_states_with_a_gyro() {
     }
 }
 
-/// The flight core is given a state when one arrives, and extrapolates between them: PID alone, which holds each for 60
-/// ms, loses the vehicle within 8 s.
+/// The flight core gets a state when one arrives, and extrapolates between states. PID alone, which holds each state
+/// for 60 ms, loses the vehicle within 8 s.
 #[test]
 fn the_flight_core_extrapolates_between_the_samples_of_a_scenario() {
     let flown = |core| sampled(ControllerKind::Pid, [0.06, 0.0], false, core).1;
@@ -142,7 +142,7 @@ fn the_flight_core_extrapolates_between_the_samples_of_a_scenario() {
 }
 
 /// AFBC flies all of `hardware` on 50 states per second without a gyroscope, in the flight core and alone. On 30, the
-/// flight core loses it where the thrust falls by 40 %, and INDI and MPC too.
+/// flight core loses the vehicle where the thrust falls by 40 %, and so do INDI and MPC.
 #[test]
 fn afbc_flies_on_50_states_per_second() {
     for core in [true, false] {

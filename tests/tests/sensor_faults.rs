@@ -1,6 +1,6 @@
-//! Faults of the vehicle's own sensors, inside the flight core: what becomes of the vehicle. Compares the table of
+//! Faults of the vehicle's own sensors inside the flight core, and their results. Compares the table of
 //! `docs/sensor-faults.md`, or writes it with `WRITE=1`.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)] // what cannot be flown must stop the test
+#![allow(clippy::unwrap_used, clippy::panic, missing_docs)] // a failed flight must stop the test
 
 use afbc::Profile;
 use afbc_campaign::suite::SUITES;
@@ -18,39 +18,40 @@ const END: &str = "<!-- end -->\n";
 
 /// Onset of every fault \[s\].
 const ONSET_S: f64 = 10.0;
-/// Height of a vehicle that is about to touch the ground, of the 15 m from which it descends \[m\].
+/// Height below which a vehicle that descends from 15 m is about to touch the ground \[m\].
 const NEARLY_DOWN_M: f64 = 0.5;
 /// Height of the centre of mass below which a vehicle touches the ground \[m\].
 const GROUND_M: f64 = 0.15;
-/// Fastest touch-down of a vehicle that knows its attitude, and of one without a height \[m/s\].
+/// Fastest touch-down of a vehicle that knows its attitude \[m/s\]. `HEIGHTLESS_M_S` applies to a vehicle without a
+/// height.
 const TOUCH_M_S: f64 = 0.8;
 const HEIGHTLESS_M_S: f64 = 2.0;
-/// Those without a height.
+/// Flights without a height.
 const HEIGHTLESS: [&str; 2] = ["tracker-and-barometer-lost", "gnss-and-barometer-lost"];
-/// Seeds of every fault.
+/// Number of seeds of every fault.
 const SEEDS: u64 = 4;
-/// Without an inertial sensor and a tracker there is no attitude: blind descent, whose end is a fall.
+/// Flights without inertial sensor and tracker. They have no attitude, so they descend blind and end in a fall.
 const BLIND: [&str; 4] = ["imu-stuck-outdoors", "imu-dead-outdoors", "tracker-and-imu-lost", "imu-then-tracker-lost"];
-/// Two degrees per second of error that come at once: the filter may take longer to find the bias than it takes to
-/// fall.
+/// Flights with a sudden gyroscope error of two degrees per second. The filter may need longer to find the bias than
+/// the vehicle needs to fall.
 const TOO_MUCH: [&str; 1] = ["gyro-biased-outdoors"];
-/// Without a position outdoors it drifts, touches the ground at up to 4 m/s along it, and may tip over there; or the
-/// flight ends, too far away, when it has nearly come down.
+/// Flights without a position outdoors. The vehicle drifts, touches the ground at up to 4 m/s sideways and may tip over
+/// there, or the flight ends because it is too far away when it has nearly come down.
 const ADRIFT: [&str; 2] = ["gnss-lost", "magnetometer-and-gnss-lost"];
 
-/// What became of a vehicle, from the onset on.
+/// Result of a flight from the onset on.
 #[derive(Clone, Debug, Default)]
 struct Outcome {
-    /// Largest distance from the reference before it touched the ground \[m\].
+    /// Largest distance from the reference before the vehicle touched the ground \[m\].
     off_m: f64,
-    /// Largest tilt before that \[rad\].
+    /// Largest tilt before the vehicle touched the ground \[rad\].
     tilt_rad: f64,
-    /// Vertical speed at which it first touched the ground \[m/s\].
+    /// Vertical speed of the first touch-down \[m/s\].
     touched_m_s: Option<f64>,
     /// Height at which the motors stopped \[m\].
     stopped_m: Option<f64>,
     tumbled: bool,
-    /// Height where the flight ends \[m\].
+    /// Height at the end of the flight \[m\].
     end_m: f64,
     /// Fastest touch-down that counts as a landing \[m/s\].
     gentle_m_s: f64,
@@ -87,19 +88,19 @@ impl Outcome {
         !self.tumbled && self.touched_m_s.is_none() && self.stopped_m.is_none()
     }
 
-    /// True if it came down upright and gently, and the motors stopped on the ground.
+    /// True if the vehicle came down upright and gently, and the motors stopped on the ground.
     fn lands(&self) -> bool {
         !self.tumbled
             && self.touched_m_s.is_some_and(|speed| speed < self.gentle_m_s)
             && self.stopped_m.is_some_and(|height| height < GROUND_M)
     }
 
-    /// True if it came down upright and gently, and tipped over on the ground.
+    /// True if the vehicle came down upright and gently, and then tipped over on the ground.
     fn tips_over(&self) -> bool {
         self.tumbled && self.tilt_rad < 0.5 && self.touched_m_s.is_some_and(|speed| speed < self.gentle_m_s)
     }
 
-    /// True if the flight ends, far away, with the vehicle upright and nearly down.
+    /// True if the flight ended too far away, with the vehicle upright and nearly down.
     fn drifts_off(&self) -> bool {
         self.off_m > LOST_DISTANCE_M && self.tilt_rad < 0.5 && self.end_m < NEARLY_DOWN_M && self.stopped_m.is_none()
     }
@@ -144,7 +145,7 @@ fn all(scenarios: impl IntoIterator<Item = Scenario>) -> Vec<(Scenario, Outcome)
     })
 }
 
-/// Whoever knows the attitude flies on or lands, wherever the vehicle is.
+/// A vehicle that knows its attitude flies on or lands, wherever it is.
 #[test]
 fn no_fault_stops_the_motors_in_the_air_but_the_loss_of_the_attitude() {
     for seed in 1..=SEEDS {
@@ -154,15 +155,15 @@ fn no_fault_stops_the_motors_in_the_air_but_the_loss_of_the_attitude() {
             let name = format!("{}, seed {seed}: {outcome:?}", scenario.name);
             let may_end = among(&ADRIFT) && (outcome.tips_over() || outcome.drifts_off());
             assert!(is_blind || among(&TOO_MUCH) || may_end || outcome.flies_on() || outcome.lands(), "{name}");
-            // None is excused without need.
+            // A flight listed as blind must not fly on.
             assert!(!is_blind || !outcome.flies_on(), "{name}");
         }
     }
 }
 
-/// On a tracker's poses alone the vehicle is flown by a model of itself, which need not be right: rotors of half and
-/// twice the thrust, an inertia of 0.6 and 1.5, a payload of two fifths of its weight, and other trackers: 30 Hz, 40 ms
-/// late, 5 mm and 0.01 rad of noise, one outlier in fifty, a frame that jumps.
+/// On a tracker's poses alone, the vehicle is flown with a model of itself, which may be wrong: half or twice the
+/// thrust, 0.6 or 1.5 times the inertia, a payload of two fifths of the weight. Other trackers are tried as well: 30
+/// Hz, 40 ms late, noise of 5 mm and 0.01 rad, one outlier in fifty, a frame that jumps.
 #[test]
 fn the_model_that_stands_in_for_the_inertial_sensor_need_not_be_right() {
     let base = suite().into_iter().find(|scenario| scenario.name == "imu-dead-indoors").unwrap();
@@ -194,7 +195,7 @@ fn the_model_that_stands_in_for_the_inertial_sensor_need_not_be_right() {
     ];
     for (scenario, outcome) in all(scenarios.into_iter().map(|flight| Scenario { duration_s: 30.0, ..flight })) {
         let name = format!("{}: {outcome:?}", scenario.name);
-        // A jump and a turn of the frame: 0.5 m, and 0.3 m at 1 m from the origin.
+        // The frame jumps by 0.5 m, and its turn moves a point 1 m from the origin by 0.3 m.
         let allowed_m = if scenario.name == "jumped" { 0.9 } else { 0.1 };
         assert!(outcome.flies_on() && outcome.off_m < allowed_m, "{name}");
     }

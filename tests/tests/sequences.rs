@@ -1,8 +1,8 @@
-//! Random sequences of modes, links, weather and faults in closed loop: what [`airborne::checker`] demands holds at
-//! every tick, and afterwards the vehicle stands disarmed or flies where it should.
+//! Random sequences of modes, links, weather and faults in the closed loop. The rules of [`airborne::checker`] hold at
+//! every tick, and afterwards the vehicle is disarmed or flies where it should.
 //!
-//! `SEQUENCES=1000 cargo test --release -p flight-tests --test all sequences::` flies a thousand; `FIRST=17
-//! SEQUENCES=1` the seventeenth alone.
+//! `SEQUENCES=1000 cargo test --release -p flight-tests --test all sequences::` flies a thousand sequences; `FIRST=17
+//! SEQUENCES=1` flies only number seventeen.
 
 use crate::airborne;
 use afbc_guidance::FlightMode;
@@ -17,31 +17,32 @@ use proptest::strategy::ValueTree;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use std::env;
 
-/// Sequences of an ordinary run.
+/// Number of sequences in an ordinary run.
 const SEQUENCES: u64 = 150;
-/// Time before the first step, in which a vehicle indoors and outdoors becomes ready \[ms\].
+/// Time before the first step, in which an indoor vehicle becomes ready \[ms\]. `READY_OUTDOORS_MS` is for an outdoor
+/// vehicle.
 const READY_MS: u32 = 4000;
 const READY_OUTDOORS_MS: u32 = 9000;
-/// Time for which a station is lost \[s\], and what lands it after that \[ms\].
+/// Silence after which a station counts as lost \[s\]. `LANDS_MS` is the time in which the vehicle then lands \[ms\].
 const LOST_S: f32 = 3.0;
 const LANDS_MS: u32 = 45_000;
-/// Bounds of what sequences may do: wind, turns in all directions at up to 5 m/s, a fence of 25 m by 12 m.
+/// Bounds for the sequences, which have wind, turns in all directions at up to 5 m/s, and a fence of 25 m by 12 m.
 const BOUNDS: Bounds =
     Bounds { tilt_rad: 1.2, speed_m_s: 11.0, height_m: 22.0, radius_m: 60.0, touch_m_s: 1.6, cut: false };
-/// Radius and height of the fence \[m\].
+/// Parameters of the fence's radius and height \[m\].
 const FENCE: [(&str, f32); 2] = [("GF_MAX_HOR_DIST", 25.0), ("GF_MAX_VER_DIST", 12.0)];
 
 #[derive(Clone, Debug)]
 enum Step {
     /// A station sends a message.
     Say(Address, Uplink),
-    /// A station sends a target again and again, or no more.
+    /// A station sends a target repeatedly, or stops doing so.
     Stream(Address, Option<Uplink>),
     Reach(Address, bool),
     Breaks(Address, u32),
     Noise(Vec<u8>),
     Upload(Address, [f32; 3], bool),
-    /// Weather or a fault.
+    /// Changes weather or causes a fault.
     Line(String),
     Wait(u32),
 }
@@ -72,7 +73,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
         1 => Just(Command::Other(31_999)),
         1 => Just(Command::Denied(400)),
     ];
-    // Rare: it ends a flight.
+    // Kill is rare, since it ends a flight.
     let command = prop_oneof![60 => command, 1 => Just(Command::Kill)];
     let target = prop_oneof![
         (-20.0_f32..20.0, -20.0_f32..20.0, 0.5_f32..10.0).prop_map(|(x, y, z)| place(x, y, z)),
@@ -105,7 +106,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     proptest::collection::vec(step, 10..45)
 }
 
-/// Returns the steps of a sequence. Half of them begin with a flight.
+/// Returns the steps of a sequence. Half of the sequences begin with a flight.
 fn sequence(number: u64) -> Vec<Step> {
     let mut seed = [0; 32];
     seed.iter_mut().zip(number.to_le_bytes()).for_each(|(to, from)| *to = from);
@@ -118,14 +119,14 @@ fn sequence(number: u64) -> Vec<Step> {
     begin.iter().cloned().chain(drawn).collect()
 }
 
-/// A sequence as it went.
+/// Result of a sequence.
 struct Flown {
     checker: Checker,
     end: End,
     flew: bool,
 }
 
-/// Flies a sequence; passes each tick to `see` as well.
+/// Flies a sequence. Also passes each tick to `see`.
 fn fly(number: u64, mut see: impl FnMut(&Tick)) -> Flown {
     let indoors = number % 2 == 1;
     let mut session = Session::new(indoors, number);
@@ -159,7 +160,7 @@ fn fly(number: u64, mut see: impl FnMut(&Tick)) -> Flown {
         }
         run(&mut session, &mut checker, 20);
     }
-    // Healed; the stations fall silent, or go on and order nothing more.
+    // All faults are removed. The stations fall silent, or stay without giving more orders.
     session.line("clear");
     session.line("wind 0 0 0");
     let silent = !number.is_multiple_of(3);
@@ -174,13 +175,13 @@ fn fly(number: u64, mut see: impl FnMut(&Tick)) -> Flown {
         run(&mut session, &mut checker, 500);
         waited_ms += 500;
     }
-    // The rotors stop.
+    // The rotors have time to stop.
     run(&mut session, &mut checker, 500);
     let end = checker.end();
     Flown { checker, end, flew }
 }
 
-/// Returns what does not hold. What is killed falls; whoever is heard no more lands.
+/// Returns the rules that do not hold. A killed vehicle falls; a vehicle without stations lands.
 fn complaints(number: u64, flown: &Flown) -> Vec<String> {
     let mut complaints = flown.checker.complaints.clone();
     let silent = !number.is_multiple_of(3);
@@ -220,7 +221,7 @@ fn random_sequences_end_where_they_should() {
     assert!(count < 10 || flew * 2 > numbers.len(), "{flew} of {count} flew");
 }
 
-/// The checker is no rubber stamp: each of these falsified records makes it complain.
+/// Tests the checker itself: it must complain about each of these falsified records.
 #[test]
 fn the_checker_complains_of_falsified_records() {
     let mut session = Session::new(true, 1);

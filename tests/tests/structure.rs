@@ -1,4 +1,4 @@
-//! Structure of the code: no circular imports between modules, no crate larger than a fifth of the whole.
+//! Structure of the code: no circular imports between modules, and no crate larger than a fifth of the whole.
 
 use crate::imports::{Crate, circles, within};
 use std::collections::BTreeSet;
@@ -61,7 +61,7 @@ fn no_module_imports_one_that_imports_it() {
     assert_eq!(all.difference(&seen).collect::<Vec<_>>(), Vec::<&PathBuf>::new(), "belong to no crate");
 }
 
-/// Returns the circles of a crate whose files, but for a root file that only declares them, are given with their text.
+/// Returns the circles of a crate with these files. Its root file only declares them.
 fn found(files: &[(&str, &str)]) -> Vec<Vec<String>> {
     let declared = files.iter().filter_map(|(name, _)| name.strip_suffix(".rs").filter(|name| !name.contains('/')));
     let root: String = declared.map(|name| format!("mod {name};\n")).collect();
@@ -74,7 +74,7 @@ fn found(files: &[(&str, &str)]) -> Vec<Vec<String>> {
     circles(&imports).iter().map(|circle| circle.iter().map(name).collect()).collect()
 }
 
-/// Every form in which `a` may name something of `b`, which imports `a`.
+/// Tries every form in which `a` may name an item of `b`, which imports `a`.
 #[test]
 fn a_circle_is_found() {
     let forms = [
@@ -124,7 +124,7 @@ fn a_circle_is_found() {
     for form in forms {
         let a = format!("pub struct A; {form}");
         let circles = found(&[("b.rs", b), ("c.rs", c), ("a.rs", &a)]);
-        // What hands a name on is a part of the circle only if it is imported whole.
+        // A file that re-exports a name is part of the circle only if it is imported as a whole.
         let is_found = circles.iter().any(|circle| circle.contains(&"a.rs".into()) && circle.contains(&"b.rs".into()));
         assert!(is_found, "{form}: {circles:?}");
     }
@@ -148,7 +148,7 @@ fn what_is_no_circle_is_not_found() {
         let circles = found(&[("a.rs", &format!("pub struct A; {form}")), ("b.rs", b)]);
         assert!(circles.is_empty(), "{form}: {circles:?}");
     }
-    // A module and a function, or a macro, of the same name.
+    // A module and a function, or a macro, may have the same name.
     let twice = [("a.rs", "mod f; pub use f::f; pub struct A;"), ("a/f.rs", "pub fn f() {}"), ("b.rs", b)];
     assert!(found(&twice).is_empty());
     let twice =
@@ -161,7 +161,7 @@ fn what_is_no_circle_is_not_found() {
     assert!(found(&twice).is_empty());
 }
 
-/// A crate whose tests are one program names every file of them there: another would never run.
+/// If all tests of a crate are one program, the program names every test file. A forgotten file would never run.
 #[test]
 fn every_test_is_in_its_program() {
     let mut programs = 0;
@@ -182,7 +182,8 @@ fn every_test_is_in_its_program() {
     assert!(programs >= 10, "{programs} programs");
 }
 
-/// A parent that only declares its children and hands on their items is in no circle; one that uses them may be.
+/// A parent that only declares its children and re-exports their items is in no circle. A parent that uses the items
+/// may be.
 #[test]
 fn parents_are_distinguished_from_their_children() {
     let parent = ("p.rs", "mod a; mod b; pub use a::A; pub use b::{B, C};");
@@ -199,19 +200,20 @@ fn parents_are_distinguished_from_their_children() {
         let child = ("p/a.rs", "use super::P; pub fn f() {}");
         assert_eq!(found(&[("p.rs", parent), child]), [["p/a.rs", "p.rs"]], "{parent}");
     }
-    // What a parent imports for itself, a child imports from it.
+    // A child that uses a private import of its parent imports from the parent.
     let parent = "mod a; mod b; use a::A; use b::f;";
     assert_eq!(
         found(&[("p.rs", parent), ("p/a.rs", "pub struct A;"), ("p/b.rs", "use super::A; pub fn f() {}")]),
         [["p/b.rs", "p.rs"]]
     );
-    // Circles apart are told apart.
+    // Separate circles are reported separately.
     let pairs =
         [("a.rs", "use crate::b::B;"), ("b.rs", "use crate::a::A; use crate::c::C;"), ("c.rs", "use crate::d::D;")];
     assert_eq!(found(&[&pairs[..], &[("d.rs", "use crate::c::C;")]].concat()), [["a.rs", "b.rs"], ["c.rs", "d.rs"]]);
 }
 
-/// Metadata and files that a registry requires or shows; `scripts/check-packages` packs and compiles each crate.
+/// Checks the metadata and files that a registry requires or shows. `scripts/check-packages` packs and compiles each
+/// crate.
 #[test]
 fn crates_to_be_published_have_complete_metadata() {
     let mut published = Vec::new();
@@ -219,7 +221,7 @@ fn crates_to_be_published_have_complete_metadata() {
         let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
         let has = |start: &str| manifest.lines().any(|line| line.starts_with(start));
         if has("publish") {
-            // Inherited from the workspace, where it is false, too.
+            // Inherited from the workspace, where publishing is off too.
             assert!(has("publish.workspace = true") || has("publish = false"), "{}", folder.display());
             continue;
         }

@@ -1,4 +1,4 @@
-//! The built-in suites fly what they say, and docs/suites.md and docs/faults.md show what flew.
+//! The built-in suites fly as described, and docs/suites.md and docs/faults.md show their results.
 
 use afbc::Profile;
 use afbc_campaign::compare::{self, standard_and_monitored};
@@ -17,8 +17,8 @@ fn built_in(name: &str) -> Suite {
     BuiltIn::named(&SUITES, name).unwrap().read().unwrap()
 }
 
-/// True if numbers differ by at most their last digit, or by the 2 % that another host's rounding may change a flight
-/// by, and the words are the same.
+/// True if the words are the same and the numbers differ by at most their last digit, or by 2 %, by which another
+/// host's rounding may change a flight.
 fn agree(page: &str, code: &str) -> bool {
     let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     let (page, code) = (words(page), words(code));
@@ -29,7 +29,7 @@ fn agree(page: &str, code: &str) -> bool {
         })
 }
 
-/// Flies a suite under its contenders, and compares the page's table with what it writes.
+/// Flies a suite under its contenders, and compares the result with the page's table.
 fn compared(name: &str, page: &str) {
     let suite = built_in(name);
     let scenarios = suite.under(&standard_and_monitored()).unwrap();
@@ -54,8 +54,8 @@ fn the_page_of_the_field_is_what_flies() {
     compared("field", include_str!("../../docs/suites.md"));
 }
 
-/// What the pages say about AFBC and others is what `sitl compare --suite field` prints, as far as the field's table,
-/// of one seed and rounded, can tell.
+/// The pages' statements about AFBC and other laws agree with `sitl compare --suite field`, as far as the field's table
+/// shows: it is rounded and has one seed.
 #[test]
 fn pages_say_where_afbc_leads() {
     let [begin, end] = suite::markers("field");
@@ -72,7 +72,8 @@ fn pages_say_where_afbc_leads() {
         .map(cells)
         .map(|cells| (cells[0].split('`').nth(1).unwrap().to_owned(), columns.map(|column| distance(&cells[column]))))
         .collect();
-    // The command tells these over ten seeds, the page one to four digits: what is surely level, and what may be.
+    // The command compares over ten seeds, the page shows one seed to four digits. So distances are surely level or
+    // possibly level.
     let number = |text: &Option<String>| text.as_ref().map_or(f64::INFINITY, |text| text.parse().unwrap());
     let is_level = |law: usize, distances: &[Option<String>; 7], rounding_m: f64| {
         let best = distances.iter().map(number).fold(f64::INFINITY, f64::min);
@@ -120,7 +121,7 @@ fn the_page_of_faults_is_what_flies() {
     compared("faults", include_str!("../../docs/faults.md"));
 }
 
-/// The figures of a suite are those of its steps: distances from 5 s to the end, losses, trips.
+/// A suite's figures follow from the flight's steps: distances from 5 s to the end, losses, trips.
 #[test]
 fn a_suites_figures_are_those_of_the_flight() {
     let suite = built_in("faults");
@@ -148,7 +149,7 @@ fn a_suites_figures_are_those_of_the_flight() {
     }
 }
 
-/// Speeds, accelerations and winds of the field's flights are those in their names, on the vehicles they name.
+/// Flights of the field have the speed, acceleration or wind in their names, on the vehicles that they name.
 #[test]
 fn the_flights_of_the_field_are_those_it_names() {
     let suite = built_in("field");
@@ -171,7 +172,7 @@ fn the_flights_of_the_field_are_those_it_names() {
             "circle" => {
                 let acceleration_m_s2 = peak(flight, |reference| reference.acceleration_m_s2.norm());
                 assert!((acceleration_m_s2 - 0.981 * number).abs() < 1e-3, "{name}: {acceleration_m_s2} m/s2");
-                // The start is banked to it, to a milliradian.
+                // The start is banked for this acceleration, to a milliradian.
                 let tilt_rad = (acceleration_m_s2 / 9.81).atan();
                 assert!((flight.scenario.initial.attitude_rad.y + tilt_rad).abs() < 1e-3, "{name}");
                 assert_eq!(vehicle(flight).as_deref(), Some("racer"));
@@ -221,7 +222,8 @@ fn the_flights_of_the_field_are_those_it_names() {
     }
 }
 
-/// Every rotor at every share; the model's errors both ways; a wrong sign on every axis, measured and of the moments.
+/// The faults cover every rotor at every remaining thrust, model errors in both directions, and wrong signs of the
+/// measurement and of the moments on every axis.
 #[test]
 fn the_faults_are_complete() {
     let suite = built_in("faults");
@@ -254,7 +256,7 @@ fn the_faults_are_complete() {
     }
 }
 
-/// A suite's tilt is that of every law's own limit where there is one, and of the cascade; nothing is lowered.
+/// A suite's tilt limit raises every law's own limit, if it has one, and the cascade's. No limit is lowered.
 #[test]
 fn every_law_may_tilt_as_far() {
     let tilts = |contender: &Contender| {

@@ -1,5 +1,5 @@
-//! Every built-in vehicle takes off in wind, on the estimate from an inertial sensor and a tracker: its feet slide,
-//! hold and let go.
+//! Every built-in vehicle takes off in wind, on the estimate from an inertial sensor and a tracker. Its feet slide,
+//! hold and leave the ground.
 
 use afbc::Profile;
 use afbc_plant::Start;
@@ -13,7 +13,7 @@ use proptest::prelude::*;
 
 const DURATION_S: f64 = 9.0;
 
-/// Returns a climb to 3 m from 1 s to 5 s, from the ground with idling rotors, in this wind \[m/s\].
+/// Returns a climb to 3 m from 1 s to 5 s in this wind \[m/s\]. It begins on the ground with idling rotors.
 fn take_off(vehicle: &Vehicle, wind_m_s: [f64; 2], yaw_rad: f64, seed: u64) -> Scenario {
     let mut scenario = built_in("mocap").unwrap().read().unwrap();
     let ground = vehicle.realism.contact.unwrap();
@@ -32,7 +32,7 @@ fn take_off(vehicle: &Vehicle, wind_m_s: [f64; 2], yaw_rad: f64, seed: u64) -> S
     scenario
 }
 
-/// Flies it and returns its last distance from the reference \[m\], or why it was lost or handed over.
+/// Flies the scenario. Returns the last distance from the reference \[m\], or the reason of a loss or trip.
 fn flown(scenario: &Scenario) -> Result<f64, String> {
     let (mut distance_m, mut trip) = (f64::NAN, None);
     let [contender] = scenario.contenders.as_slice() else { return Err("one contender flies".into()) };

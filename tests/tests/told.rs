@@ -1,4 +1,4 @@
-//! What a vehicle is told of its instruments, beside what they do.
+//! Tests of `[told]`, the estimator's knowledge of the instruments, as opposed to their behaviour.
 #![allow(clippy::unwrap_used, missing_docs)] // tests
 
 use afbc::Profile;
@@ -18,7 +18,7 @@ fn scenario(text: &str) -> Scenario {
     parse("example", &format!("{hover}{text}"), "example").unwrap()
 }
 
-/// Every bit of the motion, and of what the estimator makes of its readings.
+/// Returns every bit of the motion and of the estimate.
 fn bits(scenario: &Scenario) -> Vec<u64> {
     let mut bits = Vec::new();
     let contender = Contender::of(ControllerKind::Afbc, Profile::Flight);
@@ -32,7 +32,8 @@ fn bits(scenario: &Scenario) -> Vec<u64> {
     bits
 }
 
-/// Told what is so, in whatever way, a flight has the bits of one without the table; told anything else it has others.
+/// If `[told]` states the instruments as they are, in any form, a flight has the same bits as without the table. With
+/// other values it has other bits.
 #[test]
 fn told_what_the_instruments_say_a_flight_is_the_same_in_every_bit() {
     let plain = bits(&scenario(INSTRUMENTS));
@@ -51,7 +52,7 @@ fn told_what_the_instruments_say_a_flight_is_the_same_in_every_bit() {
     }
 }
 
-/// What differs is told; the rest is as in the file, key by key.
+/// `[told]` overrides the file's instruments key by key.
 #[test]
 fn what_is_told_is_read_key_by_key() {
     let told =
@@ -66,13 +67,13 @@ fn what_is_told_is_read_key_by_key() {
     };
     assert_eq!((scenario.told.clone(), scenario.told()), (Told::Suite(Box::new(wanted)), wanted));
     assert_eq!(there.barometer, Some(Barometer::DPS310));
-    // Whatever becomes of the instruments; but of one that is gone, nothing is told.
+    // The told values stay when the instruments change. Nothing is told about an instrument that is gone.
     let mut drawn = scenario.clone();
     drawn.instruments = InstrumentSuite { imu: Some(Imu::MPU_6000), tracker: None, ..there };
     assert_eq!(drawn.told(), InstrumentSuite { tracker: None, ..wanted });
 }
 
-/// A vehicle's file that names its part, or states a setting, is what the vehicle knows; `[told]` is nearer.
+/// The estimator knows the part that a vehicle file names and the settings that it states. `[told]` takes precedence.
 #[test]
 fn a_vehicles_file_says_what_it_knows() {
     let plain = scenario(INSTRUMENTS);

@@ -1,5 +1,5 @@
-//! Reference trajectories: analytic derivatives compared with differences, continuity, and shape.
-#![allow(clippy::indexing_slicing, missing_docs)] // what is missing must stop the test
+//! Tests of reference trajectories: derivatives compared with finite differences, continuity, and shape.
+#![allow(clippy::indexing_slicing, missing_docs)] // missing data must stop the test
 
 use afbc_scenario::trajectory::{Reference, Sine, Trajectory, Waypoint};
 use nalgebra::Vector3;
@@ -29,7 +29,7 @@ fn waypoints() -> impl Strategy<Value = Vec<Waypoint>> {
     })
 }
 
-/// Every kind of smooth trajectory.
+/// Draws smooth trajectories of every kind.
 fn smooth() -> impl Strategy<Value = Trajectory> {
     prop_oneof![
         Just(Trajectory::Paper),
@@ -43,7 +43,7 @@ fn smooth() -> impl Strategy<Value = Trajectory> {
     ]
 }
 
-/// \[x, y, z, yaw\] and their derivatives, by order.
+/// Returns \[x, y, z, yaw\] and their first and second derivatives.
 fn orders(r: &Reference) -> [[f64; 4]; 3] {
     let four = |v: Vector3<f64>, yaw| [v.x, v.y, v.z, yaw];
     [
@@ -53,7 +53,7 @@ fn orders(r: &Reference) -> [[f64; 4]; 3] {
     ]
 }
 
-/// Longest and shortest time scale of the trajectory, for bounds on its derivatives.
+/// Returns the longest and the shortest time scale of the trajectory, for bounds on its derivatives.
 fn pace(trajectory: &Trajectory) -> (f64, f64) {
     match trajectory {
         Trajectory::Paper => (60.0, 60.0),
@@ -67,12 +67,12 @@ fn pace(trajectory: &Trajectory) -> (f64, f64) {
             let legs = waypoints.windows(2).map(|pair| pair[1].time_s - pair[0].time_s);
             (legs.clone().fold(0.5, f64::max), legs.fold(20.0, f64::min))
         }
-        // Never drawn here: `crates/scenario/tests/paths.rs` is about them.
+        // Never drawn here: `crates/scenario/tests/paths.rs` tests polynomials.
         Trajectory::Polynomials(_) => (1.0, 1.0),
     }
 }
 
-/// \[x, y, z\], from the acceleration to the snap.
+/// Returns acceleration, jerk and snap along x, y, z.
 fn higher(r: &Reference) -> [Vector3<f64>; 3] {
     [r.acceleration_m_s2, r.jerk_m_s3, r.snap_m_s4]
 }
@@ -84,13 +84,13 @@ proptest! {
     fn derivatives_are_those_of_the_position(trajectory in smooth(), t in 0.0_f64..80.0) {
         let h = 1e-4;
         if let Trajectory::Waypoints(waypoints) = &trajectory {
-            // The third derivative jumps at a waypoint; differences across it are left to the next test.
+            // The third derivative jumps at a waypoint. The next test covers differences across it.
             prop_assume!(waypoints.iter().all(|waypoint| (waypoint.time_s - t).abs() > 2.0 * h));
         }
         let [back, here, ahead] = [t - h, t, t + h].map(|t| orders(&trajectory.at(t)));
-        // Sizes up to 40 m over the shortest time: the third derivative is at most 40 (2 pi / T)^3, or 60 * 40 / T^3
-        // for minimum jerk, the fourth 360 * 40 / T^4 (or 40 (2 pi / T)^4). Differences are off by h^2/6 of those, and
-        // by the rounding of 40 m (and of times up to 80 s) over h.
+        // Paths are up to 40 m long. With the shortest time T, the third derivative is at most 40 (2 pi / T)^3, or 60 *
+        // 40 / T^3 for minimum jerk, and the fourth 360 * 40 / T^4 (or 40 (2 pi / T)^4). Differences have an error of
+        // h^2/6 of these, and the rounding errors of 40 m and of times up to 80 s, divided by h.
         let shortest = pace(&trajectory).1;
         let third = 40.0 * 248.0 / shortest.powi(3);
         let fourth = 40.0 * 1559.0 / shortest.powi(4);
@@ -112,7 +112,7 @@ proptest! {
         }
     }
 
-    /// Fourth order differences of the acceleration: jerk and snap.
+    /// Compares jerk and snap with fourth-order differences of the acceleration.
     #[test]
     fn jerk_and_snap_are_the_derivatives_of_the_acceleration(trajectory in smooth(), t in 0.0_f64..80.0) {
         let (shortest, h) = (pace(&trajectory).1, 1e-3 * pace(&trajectory).1);
@@ -125,8 +125,9 @@ proptest! {
             let [a, b, c, d] = [0, 1, 3, 4].map(|k: usize| at[k][order]);
             (a - d + (c - b) * 8.0) / (12.0 * h)
         });
-        // Sizes up to 40 m. Differences are off by h^4/30 of a fifth derivative more, and by the rounding of the value
-        // and of times up to 80 s over h; a derivative of order n is at most 40 (2 pi / T)^n, or 360 * 40 / T^n.
+        // Paths are up to 40 m long. Differences have an error of h^4/30 of the derivative five orders higher, and the
+        // rounding errors of the value and of times up to 80 s, divided by h. A derivative of order n is at most 40 (2
+        // pi / T)^n, or 360 * 40 / T^n.
         let bound = |order: i32| {
             let size = |n: i32| 40.0 * (6.3_f64.powi(n) + 360.0) / shortest.powi(n);
             let rounding = f64::EPSILON * (size(order) + 80.0 * size(order + 1));
@@ -154,7 +155,7 @@ proptest! {
                 }
             }
         }
-        // At rest before the first and after the last.
+        // The reference is at rest before the first and after the last waypoint.
         if let (Some(first), Some(last)) = (waypoints.first(), waypoints.last()) {
             prop_assert_eq!(trajectory.at(first.time_s - 1.0), Reference::rest(first.position_m, first.yaw_rad));
             prop_assert_eq!(trajectory.at(last.time_s + 1.0), Reference::rest(last.position_m, last.yaw_rad));
@@ -212,7 +213,7 @@ proptest! {
         prop_assert_eq!(step.at(at_s + 100.0), Reference::rest(to_m, yaw_rad + turn_rad));
     }
 
-    /// Section IV as printed, with its sines and phases.
+    /// Compares with section IV as printed, with its sines and phases.
     #[test]
     fn the_papers_trajectory_is_the_printed_one(t in 0.0_f64..120.0) {
         use core::f64::consts::{FRAC_PI_2, PI};

@@ -1,11 +1,11 @@
-//! The costs of the gains that fly, in the training and the held-out flights, are those of docs/tuning.md.
+//! The costs of the flight gains, in the training and the held-out flights, are those in docs/tuning.md.
 
 use afbc::Profile;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_tune::{LOST, by_hand, conditions, conditions_on, costs, held_out, held_out_on, mean, training, training_on};
 use afbc_vehicles::BUILT_IN;
 
-/// Returns the law with the gains found by `sitl tune`; AFBC under its monitor, as in the search.
+/// Returns the law with the gains found by `sitl tune`. AFBC is under its monitor, as in the search.
 fn found(kind: ControllerKind) -> Contender {
     Contender::of(kind, Profile::Flight).monitored()
 }
@@ -14,7 +14,7 @@ fn found(kind: ControllerKind) -> Contender {
 fn the_gains_that_fly_cost_what_is_documented() {
     let page = include_str!("../../docs/tuning.md");
     let flights = [training().unwrap(), held_out().unwrap()];
-    // Backstepping of the profile flies with AFBC's gains.
+    // Backstepping in this profile flies with AFBC's gains.
     let kinds: Vec<_> = ControllerKind::ALL.into_iter().filter(|kind| *kind != ControllerKind::Backstepping).collect();
     let mut missing = Vec::new();
     let mut expect = |begin: String, end: String| {
@@ -48,8 +48,8 @@ fn the_gains_that_fly_cost_what_is_documented() {
     assert!(missing.is_empty(), "docs/tuning.md lacks these rows:\n{}", missing.join("\n"));
 }
 
-/// Backstepping alone, which learns nothing, does not meet them: a Crazyflie's thrust falls with its battery. Nor do
-/// the gains from which AFBC's search starts.
+/// Backstepping alone does not meet the conditions, since it does not adapt, and a Crazyflie's thrust falls with its
+/// battery. The starting gains of AFBC's search do not meet them either.
 #[test]
 fn the_gains_that_fly_meet_every_condition() {
     let conditions = conditions().unwrap();
@@ -64,8 +64,8 @@ fn the_gains_that_fly_meet_every_condition() {
     assert!(by_hand.iter().any(|name| name.starts_with("robustness")), "{by_hand:?}");
 }
 
-/// The gains in the vehicles' files, found by `sitl tune --fleet`, survive every flight and meet every condition there,
-/// at the documented cost; beside it that of the paper's vehicle's gains, by rule.
+/// The gains in the vehicle files, found by `sitl tune --fleet`, survive every flight and meet every condition, at the
+/// documented cost. The documented cost of the paper's vehicle's gains, by rule, is checked too.
 #[test]
 fn every_vehicles_gains_cost_what_is_documented() {
     let page = include_str!("../../docs/tuning.md");

@@ -1,5 +1,5 @@
 //! The files of `vehicles/`: each vehicle is physically possible and has enough thrust, each value has a source, and
-//! the figures of `docs/vehicles.md` follow from them.
+//! the figures of `docs/vehicles.md` follow from the values.
 
 use afbc::guarded::HOVER_AUTHORITY;
 use afbc_control::mixer::HOVER_MARGIN;
@@ -48,7 +48,7 @@ impl Vehicle {
         self.vector("vehicle.inertia_kg_m2")
     }
 
-    /// Position and spin of each rotor.
+    /// Returns position and spin of each rotor.
     fn rotors(&self) -> Vec<(Vector3<f64>, f64)> {
         let spins = (0..).map_while(|i| Some((i, self.values.get(&format!("rotor.{i}.spin"))?.as_str())));
         let rotor = |(i, spin)| {
@@ -62,7 +62,7 @@ impl Vehicle {
         spins.map(rotor).collect()
     }
 
-    /// Force of each rotor in hover, all being equal \[N\].
+    /// Returns the force of each rotor in hover, if all are equal \[N\].
     fn hover_n(&self) -> f64 {
         self.number("vehicle", "mass_kg") * GRAVITY_M_S2 / self.rotors().len() as f64
     }
@@ -75,7 +75,8 @@ impl Vehicle {
         self.number("rotors", "force_max_n") / self.hover_n()
     }
 
-    /// Angular acceleration about each axis with every rotor at its smaller margin up or down \[rad/s2\].
+    /// Returns the angular acceleration about each axis, with every rotor using its smaller margin up or down
+    /// \[rad/s2\].
     fn authority_rad_s2(&self) -> Vector3<f64> {
         let room_n = self.hover_n().min(self.number("rotors", "force_max_n") - self.hover_n());
         let lever = self.number("vehicle", "drag_factor_n_m_s2") / self.number("vehicle", "thrust_factor_n_s2");
@@ -84,7 +85,7 @@ impl Vehicle {
         (levers * room_n).component_div(&self.inertia_kg_m2())
     }
 
-    /// Shaft power in hover \[W\].
+    /// Returns the shaft power in hover \[W\].
     fn hover_w(&self) -> f64 {
         let drag = self.number("vehicle", "drag_factor_n_m_s2");
         self.rotors().len() as f64 * drag * self.hover_rad_s().powi(3)
@@ -126,7 +127,8 @@ fn the_papers_vehicle_is_the_papers() {
             gravity_m_s2: GRAVITY_M_S2,
         }
     );
-    // `afbc_types`: 1 at -y, 2 at +x, 3 at +y, 4 at -x; 1 and 3 yaw the body positively, against their spin.
+    // By `afbc_types`, rotor 1 is at -y, 2 at +x, 3 at +y, 4 at -x. Rotors 1 and 3 yaw the body positively, against
+    // their spin.
     let frame: Vec<_> = vehicles["paper"].rotors().iter().map(|(at, spin)| (at.x, at.y, *spin)).collect();
     assert_eq!(frame, [(0.0, -0.25, -1.0), (0.25, 0.0, 1.0), (0.0, 0.25, -1.0), (-0.25, 0.0, 1.0)]);
 }
@@ -145,7 +147,7 @@ fn each_could_exist() {
             (arms_m.iter().sum::<f64>() / arms_m.len() as f64, arms_m.iter().fold(0.0, |a, b| b.max(a)));
         let mass_kg = vehicle.number("vehicle", "mass_kg");
         assert!((mean_m / vehicle.number("vehicle", "arm_m") - 1.0).abs() < 1e-3, "{name}: arm {mean_m}");
-        // No moment of inertia exceeds the sum of the others, and not all of the mass is at the rotors.
+        // No moment of inertia exceeds the sum of the others, and some of the mass is not at the rotors.
         assert!(i.min() > 0.0 && 2.0 * i.max() <= i.sum() * 1.0001, "{name}: {i}");
         assert!(i.z < mass_kg * max_m * max_m, "{name}: {}", i.z);
         // Full throttle reaches the largest force.
@@ -172,8 +174,8 @@ fn each_flies_with_margin() {
     }
 }
 
-/// Each value's line names a source listed at the top of the file, or says that it is estimated or follows from others,
-/// or a comment above it in the same paragraph does.
+/// Each value's line names a source listed at the top of the file, or says that the value is estimated or follows from
+/// others. A comment above it in the same paragraph may do so instead.
 #[test]
 fn each_says_where_its_parameters_come_from() {
     for (name, vehicle) in vehicles() {
@@ -193,10 +195,10 @@ fn each_says_where_its_parameters_come_from() {
             !cited.is_empty() || words.iter().any(|word| comment.contains(word))
         };
         let mut values = 0;
-        // Gains that a search has found come last, and say so themselves.
+        // Gains found by a search come last, and their own comment says so.
         let text = vehicle.text.split("# Gains found by").next().unwrap();
         for paragraph in text.split("\n\n").filter(|paragraph| !paragraph.contains("description = ")) {
-            // The sources of the rotors are above the first one.
+            // The rotors' sources are above the first rotor.
             let mut above = paragraph.starts_with("[[rotor]]");
             for line in paragraph.lines() {
                 if line.starts_with('#') {

@@ -9,7 +9,8 @@ use afbc_types::{Axis, Parameters};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-/// Returns the hover scenario for this vehicle, with rotors of 20 ms and this largest force, with an initial error.
+/// Returns the hover scenario for this vehicle, with a rotor lag of 20 ms, this largest force per rotor, and an initial
+/// error.
 fn scenario(vehicle: Parameters<f64>, force_max_n: f64) -> Scenario {
     let hardware = built_in("hardware").unwrap().read().unwrap();
     let mut scenario = built_in("hover").unwrap().read().unwrap();
@@ -22,7 +23,8 @@ fn scenario(vehicle: Parameters<f64>, force_max_n: f64) -> Scenario {
     scenario
 }
 
-/// Flies it with rotors of `margin` times the hover force; returns the final distance \[m\], or why it was refused.
+/// Flies the vehicle with rotors of `margin` times the hover force. Returns the final distance \[m\], or the reason of
+/// a refusal.
 fn hovers(kind: ControllerKind, vehicle: Parameters<f64>, margin: f64) -> Result<f64, String> {
     let force_max_n = margin * vehicle.mass_kg * vehicle.gravity_m_s2 / 4.0;
     let scenario = scenario(vehicle, force_max_n);
@@ -39,7 +41,7 @@ fn hovers(kind: ControllerKind, vehicle: Parameters<f64>, margin: f64) -> Result
     Ok(distance_m)
 }
 
-/// Returns a vehicle of this mass and size; `spread` sets the share of mass at the rotors.
+/// Returns a vehicle of this mass and size. `spread` sets the share of the mass at the rotors.
 fn vehicle(mass_kg: f64, arm_m: f64, spread: f64) -> Parameters<f64> {
     let inertia = spread * mass_kg * arm_m * arm_m;
     Parameters {
@@ -69,7 +71,7 @@ fn every_law_hovers_vehicles_from_50_g_to_3_kg() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Every vehicle is refused by name or hovers.
+    /// Every vehicle hovers or is refused by name.
     #[test]
     fn what_is_not_refused_hovers(
         mass_kg in 0.05..3.5_f64,
@@ -84,13 +86,14 @@ proptest! {
             Ok(distance_m) => prop_assert!(margin > 1.299 && authority > 79.9 && distance_m < 0.03, "{distance_m} m"),
             Err(error) if error.contains("rotor_force_max_n") => prop_assert!(margin < 1.301, "{error}"),
             Err(error) if error.contains("hover_authority_rad_s2") => prop_assert!(authority < 80.1, "{error}"),
-            // For the heaviest vehicles, the gain of yaw would be out of range.
+            // For the heaviest vehicles, the yaw gain would be out of range.
             Err(error) => prop_assert!(error.contains("gamma") && vehicle.inertia_kg_m2.z > 0.1, "{error}"),
         }
     }
 }
 
-/// Found by the property above before such vehicles were refused: the first stayed 0.2 m away, the others tripped.
+/// The property test above found these vehicles before they were refused: the first stayed 0.2 m away, the others
+/// tripped.
 #[test]
 fn vehicles_that_turn_too_slowly_are_refused() {
     for (mass_kg, arm_m, spread, margin) in [
@@ -103,7 +106,7 @@ fn vehicles_that_turn_too_slowly_are_refused() {
     }
 }
 
-/// `Guarded` of the profile `flight` does not trip in an ideal hover, whatever the vehicle's weight.
+/// `Guarded` of the profile `flight` does not trip in an ideal hover, at any weight of the vehicle.
 #[test]
 fn a_perfect_hover_does_not_trip() {
     use afbc_control::FlightController;

@@ -1,5 +1,5 @@
-//! What must hold at every tick of every flight, by a model that knows the vehicle from outside: by what its stations
-//! send and hear, and by what is true. Whatever does not hold is a complaint.
+//! Checks what must hold at every tick of every flight. A model follows the vehicle from outside, by the messages of
+//! its stations and the true motion, and complains of everything that must not happen.
 
 use super::{Tick, Truth};
 use afbc_guidance::FlightMode;
@@ -8,33 +8,36 @@ use afbc_link::{
 };
 use afbc_station::services::modes;
 
-/// Time within which a command is answered \[ms\].
+/// Time within which a command must be answered \[ms\].
 const ANSWERED_MS: u32 = 1000;
-/// Time in which rotors without a command stop, by their lag \[ms\], and what counts as turning \[rad/s\].
+/// Time in which rotors without a command stop, because of their lag \[ms\]. `TURNS_RAD_S` is the speed from which a
+/// rotor counts as turning \[rad/s\].
 const STOPS_MS: u32 = 300;
 const TURNS_RAD_S: f64 = 5.0;
-/// Height of the centre of mass above which the vehicle is in the air for sure \[m\].
+/// Height of the centre of mass above which the vehicle is certainly in the air \[m\].
 const AIR_M: f64 = 0.3;
-/// Slowest fastest rotor in the air, for longer than that time \[rad/s, ms\]: half of what hovering takes.
+/// In the air, the fastest rotor must not stay below this speed for longer than `UNCARRIED_MS` \[rad/s, ms\]. It is
+/// half of the hover speed.
 const CARRIES_RAD_S: f64 = 100.0;
 const UNCARRIED_MS: u32 = 300;
-/// Largest tilt, speed and rate of what may be armed: those of the flight core, and a little for the estimate's error.
+/// Largest tilt and speed at which the vehicle may be armed: the flight core's limits plus a margin for the estimate's
+/// error.
 const ARMS_RAD: f64 = 0.3;
 const ARMS_M_S: f64 = 0.7;
-/// What the link's clock and the estimate may be off \[ms\].
+/// Tolerance for the link's clock and the estimate \[ms\].
 const SOON_MS: u32 = 60;
-/// Age at which targets are lost, by the default of COM_OF_LOSS_T \[ms\].
+/// Age at which targets count as lost, the default of COM_OF_LOSS_T \[ms\].
 const TARGETS_MS: u32 = 500;
 
-/// Largest coordinate of a target \[m\].
+/// Largest accepted coordinate of a target \[m\].
 const PLACE_MAX_M: f32 = 1e5;
 
-/// Announcements by which the flight core stops the motors in the air.
+/// Announcements with which the flight core may stop the motors in the air.
 pub const CUTS: [&str; 2] = ["tumbled: motors stopped", "no state for 2.25 s: motors stopped"];
 const DESCENDS: &str = "no state for 0.25 s: descending";
 const DISARMS: &str = "on the ground: disarming";
 
-/// Bounds of a flight from arming on, until the motors are stopped by force.
+/// Bounds of a flight from arming on, until the motors are stopped in the air.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
     pub tilt_rad: f64,
@@ -42,9 +45,9 @@ pub struct Bounds {
     /// Largest height and distance from the start \[m\].
     pub height_m: f64,
     pub radius_m: f64,
-    /// Fastest touch-down \[m/s\].
+    /// Fastest allowed touch-down \[m/s\].
     pub touch_m_s: f64,
-    /// True if the flight core may stop the motors in the air, announced.
+    /// True if the flight core may stop the motors in the air, with an announcement.
     pub cut: bool,
 }
 
@@ -63,16 +66,16 @@ pub struct Extremes {
     pub touch_m_s: Option<f64>,
 }
 
-/// The model, and what it complains of.
+/// The model of the vehicle and its complaints.
 pub struct Checker {
     bounds: Bounds,
-    /// Silence after which a station is lost, and whether something is done about it.
+    /// Silence after which a station counts as lost \[ms\]. `acts_on_station` is true if the vehicle then acts.
     station_lost_ms: u32,
     acts_on_station: bool,
     open: Vec<(u32, Address, Command)>,
-    /// The station in control and when it was heard.
+    /// Address of the station in control, and the time when it was last heard.
     holder: Option<(Address, u32)>,
-    /// When the station in control was heard, whoever that was.
+    /// Time when the last station in control was heard, whichever it was.
     commander_ms: Option<u32>,
     target_ms: Option<u32>,
     armed: bool,
@@ -82,20 +85,20 @@ pub struct Checker {
     descends: Option<u32>,
     disarms_told: bool,
     station_told: bool,
-    /// True after the motors were stopped in the air, until the vehicle stands.
+    /// True from a stop of the motors in the air until the vehicle stands.
     falls: bool,
     flown: bool,
     uncarried_ms: u32,
     last: Option<Truth>,
     last_ms: u32,
     pub extremes: Extremes,
-    /// Texts, without repetitions in a row.
+    /// Announced texts, without immediate repetitions.
     pub texts: Vec<String>,
     pub complaints: Vec<String>,
 }
 
 impl Checker {
-    /// Checks a vehicle that is powered up; `station_lost_s` is COM_DL_LOSS_T.
+    /// Makes the checker of a vehicle that has just been powered up. `station_lost_s` is COM_DL_LOSS_T.
     pub fn new(bounds: Bounds, station_lost_s: f32, acts_on_station: bool) -> Self {
         Checker {
             bounds,
@@ -132,13 +135,13 @@ impl Checker {
     }
 
     fn complain(&mut self, time_ms: u32, what: &str) {
-        // The first ones tell the story.
+        // The first complaints tell the most, so later ones are dropped.
         if self.complaints.len() < 8 {
             self.complaints.push(format!("{:.3} s: {what}", f64::from(time_ms) * 1e-3));
         }
     }
 
-    /// Looks at a tick.
+    /// Checks a tick.
     pub fn see(&mut self, tick: &Tick) {
         let time_ms = tick.time_ms;
         tick.sent.iter().for_each(|(from, message)| self.hear(time_ms, *from, message));
@@ -158,12 +161,12 @@ impl Checker {
         (self.last, self.last_ms) = (Some(tick.truth), time_ms);
     }
 
-    /// A message reaches the vehicle: who is in control from now on?
+    /// Follows a message to the vehicle, and which station is then in control.
     fn hear(&mut self, time_ms: u32, from: Address, message: &Uplink) {
         if let Uplink::Target(ExternalTarget::Motion(target)) = message
             && target.position_m.iter().any(|place_m| place_m.abs() > PLACE_MAX_M)
         {
-            // Dropped where it is read.
+            // The vehicle drops such a target when it reads it.
             return;
         }
         if let Uplink::Command(command) = message {
@@ -180,7 +183,7 @@ impl Checker {
                 matches!(message, Mission::Count(..) | Mission::Clear(_) | Mission::SetCurrent(_))
             }
             Uplink::Control(ControlRequest::Release) if holder == Some(from) => {
-                // Heard, and gone.
+                // The station has given up control.
                 self.commander_ms = Some(time_ms);
                 return self.holder = None;
             }
@@ -195,7 +198,7 @@ impl Checker {
         }
     }
 
-    /// Each command is answered once, soon; returns those that are accepted in this tick.
+    /// Checks that each command is answered once, and soon. Returns the commands accepted in this tick.
     fn answers(&mut self, tick: &Tick) -> Vec<(Address, Command)> {
         let mut accepted = Vec::new();
         for message in &tick.heard {
@@ -222,7 +225,8 @@ impl Checker {
         accepted
     }
 
-    /// It is armed by an accepted command alone, where it stands, and disarmed there, by force, or announced.
+    /// Checks arming: only an accepted command arms, and only at rest. The vehicle disarms on the ground, by force or
+    /// with an announcement.
     fn arming(&mut self, tick: &Tick, accepted: &[(Address, Command)], texts: &[String]) {
         let Some(armed) = super::session::is_armed(tick) else { return };
         let (was, time_ms, truth) = (self.armed, tick.time_ms, tick.truth);
@@ -256,7 +260,7 @@ impl Checker {
         }
     }
 
-    /// A transition is one that its reason allows.
+    /// Checks that the reason of an announced transition allows it.
     fn announced(&mut self, time_ms: u32, text: &str, accepted: &[(Address, Command)]) {
         match text {
             DESCENDS => (self.descends, self.mode, self.mode_ms) = (Some(time_ms), FlightMode::Land, time_ms),
@@ -279,7 +283,7 @@ impl Checker {
             "station lost" => silent_ms + SOON_MS > self.station_lost_ms,
             "the state is back" => self.mode == FlightMode::Land && self.descends.is_some(),
             "no targets" => self.mode == FlightMode::Offboard && targetless_ms + SOON_MS > TARGETS_MS,
-            // What the safety net acts on; the flights that cause it say which.
+            // The safety net may select these modes. The tests that provoke it check which one.
             _ => matches!(mode, FlightMode::Hold | FlightMode::Return | FlightMode::Land),
         };
         if mode == self.mode {
@@ -290,7 +294,7 @@ impl Checker {
         (self.mode, self.mode_ms) = (mode, time_ms);
     }
 
-    /// Its mode is the one that was announced last.
+    /// Checks that heartbeats show the mode announced last.
     fn heartbeats(&mut self, tick: &Tick) {
         for message in &tick.heard {
             let Downlink::Heartbeat { armed, mode, .. } = *message else { continue };
@@ -304,7 +308,7 @@ impl Checker {
         }
     }
 
-    /// What falls silent is noticed.
+    /// Checks that silence of stations and targets is noticed.
     fn silences(&mut self, time_ms: u32) {
         let silent_ms = self.commander_ms.map_or(0, |heard_ms| time_ms.saturating_sub(heard_ms));
         if silent_ms + SOON_MS < self.station_lost_ms {
@@ -323,7 +327,7 @@ impl Checker {
         }
     }
 
-    /// Motors turn only while armed, and carry the vehicle in the air.
+    /// Checks that motors only turn while armed, and carry the vehicle in the air.
     fn motors(&mut self, tick: &Tick) {
         for message in &tick.heard {
             if let Downlink::Rotors { armed: false, speeds, .. } = message
@@ -343,7 +347,7 @@ impl Checker {
         }
     }
 
-    /// It stays within its bounds, and touches down gently.
+    /// Checks that the vehicle stays within its bounds and touches down gently.
     fn motion(&mut self, tick: &Tick) {
         let (truth, bounds) = (tick.truth, self.bounds);
         if !self.armed {
@@ -379,7 +383,7 @@ impl Checker {
         beyond.into_iter().for_each(|what| self.complain(tick.time_ms, &what));
     }
 
-    /// Where it ends: disarmed on the ground, motors still, or in the air, holding a place.
+    /// Returns how the flight ended.
     pub fn end(&mut self) -> End {
         let Some(truth) = self.last else { return End::Lost };
         let end = match (self.armed, !truth.on_ground) {
@@ -394,22 +398,22 @@ impl Checker {
         end
     }
 
-    /// Returns what is true at the end.
+    /// Returns the true motion after the last tick.
     pub fn last(&self) -> Option<Truth> {
         self.last
     }
 }
 
-/// How a flight ends.
+/// End of a flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// On the ground.
+    /// Disarmed on the ground, with the motors still.
     Disarmed,
-    /// In the air, at a place, in hold.
+    /// In the air and nearly still, in hold.
     Holds,
-    /// In the air, in another mode or fast.
+    /// In the air, in another mode or moving.
     Flies,
-    /// Neither.
+    /// None of the above.
     Lost,
 }
 
@@ -420,7 +424,7 @@ fn text(message: &Downlink) -> Option<String> {
     }
 }
 
-/// True if only the station in control may give it, by docs/security.md.
+/// True if only the station in control may give the command (docs/security.md).
 fn needs_control(command: &Command) -> bool {
     matches!(
         command,
@@ -442,7 +446,7 @@ fn needs_control(command: &Command) -> bool {
     )
 }
 
-/// Returns the mode that a command asks for.
+/// Returns the mode that a command requests.
 fn wanted(command: &Command) -> Option<FlightMode> {
     match command {
         Command::TakeOff(_) => Some(FlightMode::Takeoff),

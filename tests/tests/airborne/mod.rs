@@ -1,4 +1,4 @@
-//! Flights of the vehicle as the server has it, by what stations send, and what they hear of it.
+//! Flights of the server's vehicle, observed through the messages that stations send and receive.
 
 pub mod checker;
 pub mod session;
@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use std::sync::Mutex;
 use std::thread;
 
-/// What is true of the vehicle after a tick.
+/// True motion of the vehicle after a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth {
     pub position_m: Vector3<f64>,
@@ -23,17 +23,17 @@ pub struct Truth {
     pub rotor_rad_s: f64,
 }
 
-/// What stations send and hear in a tick, and what is true after it.
+/// Messages that stations send and receive in a tick, and the true motion after it.
 #[derive(Clone, Debug)]
 pub struct Tick {
     pub time_ms: u32,
-    /// Frames that have reached the vehicle unbroken.
+    /// Messages whose frames reached the vehicle intact.
     pub sent: Vec<(Address, Uplink)>,
     pub heard: Vec<Downlink>,
     pub truth: Truth,
 }
 
-/// A target of a velocity, along the axes of the local frame \[m/s\].
+/// Returns a velocity target along the axes of the local frame \[m/s\].
 pub fn velocity(x: f32, y: f32, z: f32) -> Uplink {
     Uplink::Target(ExternalTarget::Motion(PositionTarget {
         velocity_m_s: Vector3::new(x, y, z),
@@ -41,12 +41,12 @@ pub fn velocity(x: f32, y: f32, z: f32) -> Uplink {
     }))
 }
 
-/// A target of a place in the local frame \[m\].
+/// Returns a position target in the local frame \[m\].
 pub fn place(x: f32, y: f32, z: f32) -> Uplink {
     Uplink::Target(ExternalTarget::Motion(PositionTarget { position_m: Vector3::new(x, y, z), ..PositionTarget::NONE }))
 }
 
-/// Does `work` for each of `jobs` on all cores; returns the results in their order.
+/// Does `work` for each of `jobs` on all cores. Returns the results in the order of the jobs.
 pub fn on_all_cores<J: Send + Sync, R: Send>(jobs: &[J], work: impl Fn(&J) -> R + Sync) -> Vec<R> {
     let (next, results) = (Mutex::new(0), Mutex::new(Vec::new()));
     thread::scope(|threads| {

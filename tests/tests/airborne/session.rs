@@ -1,4 +1,4 @@
-//! The vehicle on the server, and its stations.
+//! A session with the server's vehicle and its stations.
 
 use super::{Tick, Truth};
 use afbc_ground::{Client, Patience};
@@ -10,12 +10,12 @@ use nalgebra::Vector3;
 
 pub const STATION: Address = Client::STATION;
 pub const COMPANION: Address = Address { system: 245, component: 191 };
-/// HIL_ACTUATOR_CONTROLS: whether it is armed, and the commands to the rotors, every tick.
+/// Message id of HIL_ACTUATOR_CONTROLS, which has the armed flag and the rotor commands of every tick.
 const ROTORS: u32 = 93;
 /// Time between heartbeats of a station, and between targets of a stream \[ms\].
 const HEARTBEAT_MS: u64 = 500;
 const TARGET_MS: u32 = 50;
-/// Time between two tries to arm, and after which it is given up \[ms\].
+/// Time between two attempts to arm \[ms\]. After `ARMS_MS`, arming counts as failed.
 const TRY_MS: u32 = 250;
 const ARMS_MS: u32 = 30_000;
 /// Time in which the vehicle may ask for an item of a mission again, over links that lose most of it.
@@ -27,7 +27,7 @@ struct Station {
     client: Client,
     /// False while nothing of it gets through.
     reaches: bool,
-    /// Every so many of its frames are broken; 0: none.
+    /// One in this number of the station's frames is broken; 0 means none.
     breaks: u32,
     frames: u32,
     stream: Option<Uplink>,
@@ -49,7 +49,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// Powers it up, indoors in front of a tracker, or outdoors in a breeze.
+    /// Powers the vehicle up, indoors with a tracker or outdoors in a breeze.
     pub fn new(indoors: bool, seed: u64) -> Self {
         let scenario = built_in(if indoors { "mocap" } else { "outdoor" }).unwrap().read().unwrap();
         Session::of(&Scenario { seed, ..scenario })
@@ -61,7 +61,7 @@ impl Session {
         let stations = [STATION, COMPANION].map(Station::new);
         let mut session = Session { server, stations, decoder: Decoder::new(STATION), time_ms: 0, garbage: Vec::new() };
         session.say(STATION, Uplink::Command(Command::SetInterval { message: ROTORS, interval_us: 1000 }));
-        // Only the first station is there from the start.
+        // At first, only the first station is in reach.
         session.station(COMPANION).reaches = false;
         session
     }
@@ -84,37 +84,37 @@ impl Session {
         self.station(STATION).client.set_parameter(name, value);
     }
 
-    /// Lets a station fall silent, or be heard again.
+    /// Sets whether the station's frames reach the vehicle.
     pub fn reach(&mut self, of: Address, reaches: bool) {
         self.station(of).reaches = reaches;
     }
 
-    /// Sends a target again and again, or no more.
+    /// Sends a target repeatedly, or stops doing so.
     pub fn stream(&mut self, from: Address, target: Option<Uplink>) {
         self.station(from).stream = target;
     }
 
-    /// Breaks one of so many frames of a station; 0: none.
+    /// Breaks one in `one_of` frames of a station; 0 breaks none.
     pub fn breaks(&mut self, of: Address, one_of: u32) {
         self.station(of).breaks = one_of;
     }
 
-    /// Sends bytes of no station.
+    /// Sends bytes that belong to no station's frames.
     pub fn noise(&mut self, bytes: &[u8]) {
         self.garbage.extend_from_slice(bytes);
     }
 
-    /// Begins the upload of a mission, whose items follow as they are asked for.
+    /// Begins the upload of a mission. Its items follow when the vehicle requests them.
     pub fn upload(&mut self, from: Address, items: Vec<MissionItem>) {
         self.station(from).client.upload([(Plan::MISSION, items)], UPLOAD);
     }
 
-    /// Changes weather or faults, by a line of the server's protocol.
+    /// Changes weather or faults with a line of the server's protocol.
     pub fn line(&mut self, line: &str) {
         assert_eq!(self.server.line(line).lines, [format!("ok {line}")]);
     }
 
-    /// Runs a millisecond.
+    /// Runs one millisecond.
     pub fn step(&mut self) -> Tick {
         let time_ms = self.time_ms;
         let mut sent = Vec::new();
@@ -156,7 +156,7 @@ impl Session {
         Tick { time_ms, sent, heard, truth: self.truth() }
     }
 
-    /// Returns what is true of the vehicle.
+    /// Returns the true motion of the vehicle.
     pub fn truth(&self) -> Truth {
         let plant = self.server.vehicles()[0].world().plant();
         let (motion, telemetry) = (plant.motion(), plant.telemetry().unwrap());
@@ -170,7 +170,7 @@ impl Session {
         }
     }
 
-    /// Arms it as soon as that is possible. Passes each tick to `see`.
+    /// Arms the vehicle as soon as that is possible. Passes each tick to `see`.
     pub fn arm(&mut self, mut see: impl FnMut(&Tick)) {
         let begin_ms = self.time_ms;
         while self.time_ms < begin_ms + ARMS_MS {
@@ -187,7 +187,7 @@ impl Session {
     }
 }
 
-/// Returns whether the motors may turn, if the tick tells.
+/// Returns whether the vehicle is armed, if the tick's messages say so.
 pub fn is_armed(tick: &Tick) -> Option<bool> {
     tick.heard.iter().find_map(|message| match message {
         Downlink::Rotors { armed, .. } => Some(*armed),
@@ -195,7 +195,7 @@ pub fn is_armed(tick: &Tick) -> Option<bool> {
     })
 }
 
-/// A place of the local frame of the vehicle outdoors \[m\], as stations say it.
+/// Returns a place of the local frame \[m\] of the outdoor vehicle in global coordinates.
 pub fn global(x: f32, y: f32, z: f32) -> Place {
     let origin = EarthOrigin::new(EarthOrigin::SIMULATED).unwrap();
     let global = origin.global(&Vector3::new(x, y, z));
@@ -204,7 +204,7 @@ pub fn global(x: f32, y: f32, z: f32) -> Place {
     Place { latitude_e7, longitude_e7, height }
 }
 
-/// An item of a mission at a place of the local frame \[m\], north, west, up.
+/// Returns a mission item at a place of the local frame \[m\]: north, west, up.
 pub fn item(number: u16, command: u16, [x, y, z]: [f32; 3]) -> MissionItem {
     let e4 = |metres: f32| (metres * 1e4) as i32;
     MissionItem {

@@ -1,4 +1,5 @@
-//! Boards that are a table (`chip_stm32f4::flight_controller!`): reading it, and its page's table of wires.
+//! Reader of boards that are tables (`chip_stm32f4::flight_controller!`), and writer of the wiring tables on their
+//! pages.
 
 mod page;
 mod read;

@@ -1,10 +1,10 @@
-//! The table of wires on a board's page, and its row in the list of boards.
+//! Writes the wiring table of a board's page, and its row in the list of boards.
 
 use super::read::Radio;
 use super::{BoardTable, Stream};
 use std::fmt::Write;
 
-/// Returns the table.
+/// Returns the wiring table.
 pub(crate) fn wiring(board: &BoardTable) -> String {
     let BoardTable { link, gnss, escs, imu, i2c, .. } = board;
     let mut rows = vec![
@@ -104,13 +104,13 @@ pub(crate) fn wiring(board: &BoardTable) -> String {
     table
 }
 
-/// Returns its row in the list of boards.
+/// Returns the board's row in the list of boards.
 pub(crate) fn row(name: &str, chip: &str, board: &BoardTable) -> String {
     let [imu, barometer] = [&board.imu.parts, &board.i2c.barometers].map(|parts| names(parts));
     format!("| [`{name}`](boards/{name}.md) | {chip} | {imu} | {barometer} | {} |\n", board.outputs)
 }
 
-/// Returns the names of parts as their makers write them.
+/// Returns the names of parts in their makers' spelling.
 fn names(parts: &[String]) -> String {
     let name = |part: &String| match part.as_str() {
         "Bmi270" => "BMI270",
@@ -127,7 +127,7 @@ fn names(parts: &[String]) -> String {
     parts.iter().map(name).collect::<Vec<_>>().join(" or ")
 }
 
-/// Returns streams as `DMA2 streams 3 and 0`.
+/// Returns DMA streams in the form `DMA2 streams 3 and 0`.
 fn streams(streams: &[Stream]) -> String {
     let parts: Vec<_> = streams.iter().map(|stream| stream.line.split_once("_STREAM").unwrap()).collect();
     let numbers: Vec<_> = parts.iter().map(|(_, number)| *number).collect();

@@ -4,7 +4,7 @@ use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use std::fs;
 use std::path::Path;
 
-/// A DMA stream by its peripheral (`DMA1_CH6`) and its interrupt (`DMA1_STREAM6`).
+/// A DMA stream, with its channel type (`DMA1_CH6`) and its interrupt (`DMA1_STREAM6`).
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Stream {
     pub(crate) channel: String,
@@ -19,7 +19,7 @@ pub(crate) struct Uart {
     pub(crate) rx: String,
 }
 
-/// The radio receiver's UART, the pad of its inverter, and what switches that.
+/// UART of the radio receiver, the pad of its inverter, and the pin that switches the inverter.
 #[derive(Debug)]
 pub(crate) struct Radio {
     pub(crate) uart: Uart,
@@ -27,7 +27,7 @@ pub(crate) struct Radio {
     pub(crate) inverter: Option<String>,
 }
 
-/// The pin of a part's interrupt, its line (`EXTI5`) and that one's interrupt (`EXTI9_5`).
+/// Interrupt pin of a part, its EXTI line (`EXTI5`) and the interrupt of that line (`EXTI9_5`).
 #[derive(Debug)]
 pub(crate) struct ReadyPin {
     pub(crate) pin: String,
@@ -35,7 +35,7 @@ pub(crate) struct ReadyPin {
     pub(crate) line: String,
 }
 
-/// The IMU's bus.
+/// SPI bus of the IMU.
 #[derive(Debug)]
 pub(crate) struct Spi {
     pub(crate) name: String,
@@ -43,27 +43,27 @@ pub(crate) struct Spi {
     pub(crate) out: String,
     pub(crate) into: String,
     pub(crate) select: String,
-    /// Out, in.
+    /// Streams for sending and receiving.
     pub(crate) streams: [Stream; 2],
     pub(crate) ready: ReadyPin,
     pub(crate) parts: Vec<String>,
     pub(crate) alignment: String,
 }
 
-/// The bus of barometer and compass.
+/// I2C bus of barometer and compass.
 #[derive(Debug)]
 pub(crate) struct I2c {
     pub(crate) name: String,
     pub(crate) clock: String,
     pub(crate) data: String,
-    /// Event, error.
+    /// Event interrupt, error interrupt.
     pub(crate) lines: [String; 2],
-    /// Out, in.
+    /// Streams for sending and receiving.
     pub(crate) streams: [Stream; 2],
     pub(crate) barometers: Vec<String>,
 }
 
-/// Where the battery is measured, and what a volt there means.
+/// Pins that measure the battery, and the scales of their voltages.
 #[derive(Debug)]
 pub(crate) struct Battery {
     pub(crate) converter: String,
@@ -73,7 +73,7 @@ pub(crate) struct Battery {
     pub(crate) amperes_per_volt: f64,
 }
 
-/// The bus of the memory card, or of the flash chip, for logs.
+/// SPI bus of the memory card or flash chip for logs.
 #[derive(Debug)]
 pub(crate) struct LogBus {
     pub(crate) is_flash: bool,
@@ -82,11 +82,11 @@ pub(crate) struct LogBus {
     pub(crate) out: String,
     pub(crate) into: String,
     pub(crate) select: String,
-    /// Select pins of what else is there.
+    /// Select pins of other parts on the bus.
     pub(crate) quiet: Vec<String>,
 }
 
-/// What a channel of a timer drives.
+/// Motor output at a timer channel.
 #[derive(Debug)]
 pub(crate) struct Motor {
     pub(crate) pin: String,
@@ -95,31 +95,31 @@ pub(crate) struct Motor {
     pub(crate) number: usize,
 }
 
-/// A timer of motors.
+/// A timer that drives motors.
 #[derive(Debug)]
 pub(crate) struct Timer {
     pub(crate) name: String,
     pub(crate) word: String,
     pub(crate) stream: Stream,
-    /// Channels 1 to 4.
+    /// Outputs of channels 1 to 4.
     pub(crate) channels: Vec<Option<Motor>>,
 }
 
-/// A board.
+/// A board that is a table.
 #[derive(Debug)]
 pub(crate) struct BoardTable {
     pub(crate) crystal_hz: u32,
     pub(crate) link: Uart,
     pub(crate) gnss: Uart,
     pub(crate) radio: Option<Radio>,
-    /// Where the motor controllers' telemetry comes in.
+    /// UART that receives the ESC telemetry.
     pub(crate) escs: Option<Uart>,
     pub(crate) imu: Spi,
     pub(crate) i2c: I2c,
     pub(crate) battery: Battery,
     pub(crate) led: Option<String>,
     pub(crate) buzzer: String,
-    /// The enable pin of the board's Bluetooth.
+    /// Enable pin of the board's Bluetooth module.
     pub(crate) bluetooth: Option<String>,
     pub(crate) logs: Option<LogBus>,
     pub(crate) outputs: usize,
@@ -200,7 +200,7 @@ impl BoardTable {
         words.expect("{");
         let mut timers = Vec::new();
         while words.peek() != "}" {
-            words.after(""); // name of the task
+            words.after(""); // the task's name
             let (name, word) = (words.after(":"), words.after("<"));
             words.expect(">");
             let stream = words.stream();
@@ -241,7 +241,7 @@ impl BoardTable {
         buses.chain(self.timers.iter().map(|timer| &timer.stream)).collect()
     }
 
-    /// Returns every pin that is used, once for each use.
+    /// Returns every used pin, once for each use.
     pub(crate) fn pins(&self) -> Vec<&str> {
         let radio = self.radio.as_ref().map(|radio| &radio.uart);
         let inverter = self.radio.iter().flat_map(|radio| &radio.inverter);
@@ -269,7 +269,7 @@ impl BoardTable {
     }
 }
 
-/// Words of a table, without commas, last one first.
+/// Words of a table without commas, in reverse order.
 struct Words(Vec<String>);
 
 impl Words {
@@ -287,7 +287,7 @@ impl Words {
         assert_eq!(self.0.pop().as_deref(), Some(word), "before {:?}", self.0.iter().rev().take(8).collect::<Vec<_>>());
     }
 
-    /// Returns the word after those of `key`.
+    /// Returns the word that follows the words of `key`.
     fn after(&mut self, key: &str) -> String {
         key.split_whitespace().for_each(|word| self.expect(word));
         self.0.pop().unwrap()
@@ -317,7 +317,7 @@ impl Words {
         [self.stream(), self.stream()]
     }
 
-    /// Returns the words of a tuple, without what is between angle brackets.
+    /// Returns the words of a tuple, without generic arguments in angle brackets.
     fn parts(&mut self, key: &str) -> Vec<String> {
         let mut parts = Vec::new();
         let mut word = self.after(&format!("{key} ("));
@@ -358,7 +358,7 @@ impl Words {
     }
 }
 
-/// Returns the words of tokens.
+/// Returns the words of a token stream.
 fn flat(tokens: TokenStream) -> Vec<String> {
     let words = |token: TokenTree| match token {
         TokenTree::Group(group) => {

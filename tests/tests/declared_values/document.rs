@@ -1,4 +1,4 @@
-//! A file as tables of keys, and what else each value might be.
+//! A file as tables of keys, with other values to try for each.
 
 use afbc_files::read::words;
 use afbc_types::{Declaration, Declared, Value};
@@ -6,7 +6,7 @@ use core::convert::Infallible;
 use core::fmt::{self, Write};
 use std::collections::BTreeMap;
 
-/// A file.
+/// A file with its tables and keys.
 #[derive(Default)]
 pub(crate) struct Document {
     tables: Vec<(String, Vec<Entry>)>,
@@ -15,21 +15,21 @@ pub(crate) struct Document {
 struct Entry {
     key: String,
     value: String,
-    /// Its declaration; none if it is read by hand.
+    /// Declaration of the value; none if its key is read by hand.
     declaration: Option<Declaration>,
     cases: Vec<(Option<char>, Vec<String>)>,
 }
 
-/// A value to be changed: one number of a vector, or the value itself.
+/// A value to be changed: a number of a vector, or a whole value.
 pub(crate) struct Case {
     table: usize,
     entry: usize,
-    /// Header of its table, without brackets.
+    /// Header of the value's table, without brackets.
     pub(crate) header: String,
     pub(crate) key: String,
     pub(crate) coordinate: Option<char>,
     pub(crate) declaration: Option<Declaration>,
-    /// What it might be instead; some may be refused.
+    /// Other values to try. Some may be refused.
     pub(crate) others: Vec<String>,
 }
 
@@ -41,7 +41,7 @@ impl fmt::Display for Case {
 }
 
 impl Document {
-    /// Adds keys that are read by hand, with what each might be instead.
+    /// Adds keys that are read by hand, with other values to try.
     pub(crate) fn plain(mut self, header: &str, entries: &[(&str, String, &[&str])]) -> Self {
         let entries = entries.iter().map(|(key, value, others)| {
             let others: Vec<_> = others.iter().map(|other| (*other).to_owned()).collect();
@@ -52,7 +52,7 @@ impl Document {
         self
     }
 
-    /// Adds the parameters of this group, but those whose key is `elsewhere`.
+    /// Adds the parameters of this group, except those whose keys are `elsewhere`.
     pub(crate) fn group(mut self, header: &str, parameters: &impl Declared, group: &str, elsewhere: &[&str]) -> Self {
         let entries = self.entries(header);
         let Ok(()) = parameters.visit(&mut |declaration, value| {
@@ -78,7 +78,7 @@ impl Document {
         self.lines(|_, _| None)
     }
 
-    /// The text with another value.
+    /// Returns the text with another value.
     pub(crate) fn with(&self, case: &Case, other: &str) -> String {
         self.lines(|table, entry| (table == case.table && entry == case.entry).then_some(other))
     }
@@ -94,7 +94,7 @@ impl Document {
         text
     }
 
-    /// Every declared value, by table, header and key.
+    /// Returns every declared value, by table, header and key.
     pub(crate) fn declared(&self) -> BTreeMap<(usize, String), String> {
         let tables = self.tables.iter().enumerate();
         let all = tables.flat_map(|(at, (header, entries))| entries.iter().map(move |entry| (at, header, entry)));
@@ -104,7 +104,7 @@ impl Document {
             .collect()
     }
 
-    /// Which of them another document has otherwise.
+    /// Returns the names and values of `other` that differ.
     pub(crate) fn differing(&self, other: &Document) -> Vec<(String, String)> {
         let (own, others) = (self.declared(), other.declared());
         assert_eq!(own.keys().collect::<Vec<_>>(), others.keys().collect::<Vec<_>>());
@@ -113,7 +113,7 @@ impl Document {
         differing.map(|(((_, name), _), other)| (name, other)).collect()
     }
 
-    /// Every value to be changed.
+    /// Returns every value to be changed.
     pub(crate) fn cases(&self) -> Vec<Case> {
         let mut all = Vec::new();
         for (table, (header, entries)) in self.tables.iter().enumerate() {
@@ -133,7 +133,7 @@ impl Document {
     }
 }
 
-/// What else a value might be, coordinate by coordinate.
+/// Returns other values to try, coordinate by coordinate.
 fn cases(declaration: &Declaration, value: &Value<'_>) -> Vec<(Option<char>, Vec<String>)> {
     let range = declaration.range;
     let near = |number: f64| {

@@ -1,4 +1,4 @@
-//! Files with every declared value, and what changes with each.
+//! Files with every declared value, and the effects of changing each value.
 
 mod document;
 mod scenario;

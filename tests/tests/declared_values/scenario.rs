@@ -1,4 +1,4 @@
-//! The declared values of a scenario's file.
+//! The declared values of a scenario file.
 
 use super::document::{Case, Document};
 use super::subject::{Responses, Subject, change_each, compare, fields};
@@ -78,9 +78,9 @@ impl Subject for Scenario {
             document = document.group("[instruments.barometer]", barometer, "", &[]);
             document = document.group("[instruments.magnetometer]", magnetometer, "", &[]);
         }
-        // The step is the file's, all else a contender's own.
+        // The time step belongs to the file, all other settings to a contender.
         let dt_s = format!("{:?}", self.contenders[0].settings.common.dt_s);
-        // With an estimator it is a millisecond.
+        // With an estimator, the step must be a millisecond.
         let others: &[&str] = if is_measured { &["0.0005"] } else { &[] };
         document = document.plain("[settings]", &[("dt_s", dt_s, others)]);
         self.contenders.iter().fold(document, |document, contender| {
@@ -90,7 +90,7 @@ impl Subject for Scenario {
             let document = groups.into_iter().fold(document, |document, group| {
                 document.group(&sub("contender.gains", group), &contender.law, group, &[])
             });
-            // The peers' are their own gains.
+            // Laws outside the cascade only have their gains.
             if !contender.kind().in_cascade() {
                 return document;
             }
@@ -108,7 +108,7 @@ impl Subject for Scenario {
     }
 
     fn responds(&self, base: &Self, _: &Case) -> bool {
-        // Under the law that is changed, or under one after the other.
+        // Flies under the law whose values differ, or under all laws in turn.
         let differs = |kind: &ControllerKind| self.contender(*kind) != base.contender(*kind);
         let changed = ControllerKind::ALL.into_iter().find(differs);
         let kinds = changed.map_or(ControllerKind::ALL.to_vec(), |kind| vec![kind]);
@@ -120,7 +120,7 @@ fn sub(header: &str, group: &str) -> String {
     if group.is_empty() { format!("[{header}]") } else { format!("[{header}.{group}]") }
 }
 
-/// Every step of a flight under the first contender of this kind.
+/// Returns a hash of every step of a flight under the first contender of this kind.
 pub(crate) fn trace(scenario: &Scenario, kind: ControllerKind) -> Vec<u64> {
     let Some(contender) = scenario.contender(kind) else { return Vec::new() };
     let mut trace = Vec::new();
@@ -135,7 +135,7 @@ pub(crate) fn trace(scenario: &Scenario, kind: ControllerKind) -> Vec<u64> {
     trace
 }
 
-/// A flight of measured states in all the weather that there is, from the ground to a circle far above and away.
+/// Returns a flight with measured states, from the ground to a circle far above and away, with every kind of weather.
 fn measured() -> Scenario {
     let controllers = ControllerKind::ALL.map(ControllerKind::name);
     let text = format!(
@@ -149,9 +149,9 @@ fn measured() -> Scenario {
     );
     let mut scenario = Scenario::read(&text).unwrap();
     scenario.contenders.iter_mut().for_each(|it| it.settings.common.drag.rotor_drag_1_s = 0.1);
-    // The profile's bound is not reached in this flight.
+    // The flight would not reach the profile's bound, so the bound is lower here.
     scenario.contenders.iter_mut().for_each(|it| it.settings.common.raised_thrust_max = 0.1);
-    // One law without a reference model, behind which no limit is reached.
+    // One law has no reference model, which would keep it away from its limits.
     let law =
         scenario.contenders.iter_mut().find(|contender| contender.kind() == ControllerKind::Backstepping).unwrap();
     let reference = &mut law.settings.reference;
@@ -159,7 +159,7 @@ fn measured() -> Scenario {
     Scenario::read(&scenario.document().text()).unwrap()
 }
 
-/// A flight on an estimate, with every instrument.
+/// Returns a flight on an estimate, with every instrument.
 fn estimated() -> Scenario {
     let text = "controllers = [\"afbc\"]\nprofile = \"flight\"\nduration_s = 2.0\nseed = 1\n\
          [trajectory]\nkind = \"circle\"\ncentre_m = [0.0, 0.0, 1.0]\nradius_m = 1.0\nacceleration_m_s2 = 1.0\n\
@@ -173,7 +173,7 @@ fn estimated() -> Scenario {
     Scenario::read(text).unwrap()
 }
 
-/// Why no flight responds to a value.
+/// Keys to which no flight responds, with the reasons.
 const IDLE: &[(&str, &[&str])] = &[
     (
         "beyond what the flight measures",
@@ -182,7 +182,8 @@ const IDLE: &[(&str, &[&str])] = &[
     ("faster than the setpoints turn", &["contender.settings.reference_yaw_rate_rad_s"]),
     ("it takes off at once", &["contender.settings.freeze_on_ground"]),
 ];
-/// Fields below these that no key of a declared struct changes.
+/// Prefixes of the fields that this test covers. `FIXED` lists the fields among them that no key of a declared struct
+/// changes.
 const PARTS: [&str; 5] = ["vehicle.", "realism.", "sensing.", "instruments.", "contenders."];
 const FIXED: &[(&str, &str)] = &[
     ("contenders.name", "not declared: crates/campaign/tests/fingerprint.rs"),
@@ -206,7 +207,7 @@ fn every_declared_value_of_a_scenario_counts() {
     let unchanged: Vec<_> = all
         .difference(&changed)
         .filter(|field| PARTS.iter().any(|part| field.starts_with(part)) && !fixed.contains(field.as_str()))
-        // What one of the two scenarios has not, the other has.
+        // A field missing in one of the two scenarios may be present in the other.
         .filter(|field| !all.iter().any(|other| other.starts_with(&format!("{field}."))))
         .collect();
     assert!(unchanged.is_empty(), "no key of a file changes {unchanged:#?}");

@@ -1,4 +1,4 @@
-//! Flights of the vehicle on the server, each with what happens in it: what is sent, heard and true, tick by tick.
+//! Flights of the server's vehicle with a story each: messages sent and received and the true motion, tick by tick.
 
 use super::document::Case;
 use crate::airborne::session::{is_armed, item};
@@ -10,27 +10,27 @@ use afbc_station::services::modes;
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
 
-/// What happens in a flight, after take-off.
+/// Event in a flight after take-off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Story {
     /// Flies a mission, returns and lands.
     Journey,
-    /// Is not flown after arming.
+    /// Stays on the ground after arming.
     Ground,
-    /// Is flown through the geofence, out or up.
+    /// Flies through the geofence: outwards, or upwards for `Ceiling`.
     Fence,
     Ceiling,
-    /// Loses the station, the targets of offboard mode, and the sticks.
+    /// Loses the station; the other two lose the targets of offboard mode, or the sticks.
     Silence,
     Targets,
     Sticks,
     /// Loses the barometer.
     Sensors,
-    /// The battery becomes empty.
+    /// Empties the battery.
     Battery,
 }
 
-/// Times of the first try to arm, of the last, and of the first thing that happens [ms].
+/// Times of the first and the last attempt to arm \[ms\]. `BEGINS_MS` is the time of the first event.
 const ARMS_MS: [u32; 2] = [4_000, 10_000];
 const BEGINS_MS: u32 = 10_000;
 
@@ -47,7 +47,7 @@ fn select(mode: FlightMode) -> Act {
 }
 
 impl Story {
-    /// The flight that a key asks for.
+    /// Returns the flight that shows the effect of a key.
     pub(crate) fn of(case: &Case) -> Self {
         match case.key.as_str() {
             "fence_radius_m" | "fence_action" => Story::Fence,
@@ -72,12 +72,12 @@ impl Story {
         }
     }
 
-    /// The scenario that it is flown in: outdoors if it needs a barometer.
+    /// Returns the scenario to fly: outdoors if the story needs a barometer.
     pub(crate) fn scenario(self) -> &'static str {
         if self == Story::Sensors { "outdoor" } else { "mocap" }
     }
 
-    /// What happens, by the time since it began [ms], and how long that takes.
+    /// Returns the events, by the time since the first one \[ms\], and the duration of the story.
     fn acts(self) -> (Vec<(u32, Act)>, u32) {
         let (offboard, hold) = (|| select(FlightMode::Offboard), 5_000);
         let mut acts = vec![(0, select(FlightMode::Takeoff))];
@@ -107,7 +107,7 @@ impl Story {
         (acts, hold + then.1)
     }
 
-    /// Flies the scenario of `vehicle`; calls `see` with a hash of each tick until it returns false.
+    /// Flies the scenario. Calls `see` with a hash of each tick until it returns false.
     fn fly(self, scenario: &Scenario, mut see: impl FnMut(u64) -> bool) {
         let mut session = Session::of(scenario);
         let (acts, lasts_ms) = self.acts();
@@ -141,7 +141,7 @@ impl Story {
         }
     }
 
-    /// The hashes of a whole flight.
+    /// Returns the hashes of a whole flight.
     pub(crate) fn trace(self, scenario: &Scenario) -> Vec<u64> {
         let mut trace = Vec::new();
         self.fly(scenario, |hash| {

@@ -1,4 +1,4 @@
-//! A file of a kind, of which each value is changed.
+//! A file of any kind, whose values are changed one by one.
 
 use super::document::{Case, Document};
 use crate::airborne;
@@ -7,32 +7,32 @@ use afbc_scenario::Scenario;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// What a subject of this test is: a file of a kind.
+/// An object that is read from a file of one kind.
 pub(crate) trait Subject: Sized + serde::Serialize + Sync {
-    /// Reads it from the text of a file.
+    /// Reads the object from the text of a file.
     fn read(text: &str) -> Result<Self, String>;
 
-    /// Writes it as a file.
+    /// Writes the object as a file.
     fn document(&self) -> Document;
 
-    /// A scenario with it.
+    /// Returns a scenario that uses the object.
     fn scenario(&self) -> Scenario;
 
-    /// Checks what the image and a station have of it.
+    /// Checks the changed value in the firmware's image and at a station.
     fn check_on_board(&self, _base: &Self, _case: &Case, _changed: &str) {}
 
-    /// True if a flight with it differs from one with `base`.
+    /// True if a flight with this object differs from one with `base`.
     fn responds(&self, base: &Self, case: &Case) -> bool;
 }
 
-/// Values with which a flight is tried before none is said to respond.
+/// Number of values that are flown before a key counts as having no response.
 const TRIES: usize = 4;
 
-/// Whether a flight has responded to a key.
+/// For each key, true if a flight has responded to it.
 pub(crate) type Responses = BTreeMap<String, bool>;
 
-/// Changes every value of the file of `base`; returns which fields a change of a key has changed. Adds whether a flight
-/// has responded to `responses`.
+/// Changes every value of the file of `base`. Returns the fields that changed, and records in `responses` whether a
+/// flight responded.
 pub(crate) fn change_each<S: Subject>(base: &S, responses: &mut Responses) -> BTreeSet<String> {
     let text = base.document().text();
     let again = S::read(&text).unwrap_or_else(|error| panic!("{error} in\n{text}"));
@@ -58,7 +58,7 @@ pub(crate) fn change_each<S: Subject>(base: &S, responses: &mut Responses) -> BT
             };
             let what = || format!("{case}: {other}");
             accepted += 1;
-            // This value alone, if it is a declared one.
+            // If the value is declared, exactly this value must have changed.
             let read = document.differing(&subject.document());
             let expected = case.declaration.map(|_| (format!("[{}] {}", case.header, case.key), other.clone()));
             assert_eq!(read, Vec::from_iter(expected), "{}", what());
@@ -81,7 +81,7 @@ pub(crate) fn change_each<S: Subject>(base: &S, responses: &mut Responses) -> BT
     results.into_iter().flat_map(|(changed, ..)| changed).collect()
 }
 
-/// Asks that the keys without response are those listed, each with a reason.
+/// Checks that the keys without a response are those listed, each with a reason.
 pub(crate) fn compare(responses: &Responses, listed: &[(&str, &[&str])]) {
     let listed: BTreeSet<&str> = listed.iter().flat_map(|(_, keys)| keys.iter().copied()).collect();
     let idle = responses.iter().filter(|(_, responds)| !**responds).map(|(key, _)| key.as_str()).collect();
@@ -91,7 +91,7 @@ pub(crate) fn compare(responses: &Responses, listed: &[(&str, &[&str])]) {
     assert!(active.is_empty(), "a flight responds to what is listed as without effect: {active:#?}");
 }
 
-/// Every field that serde writes, by path; places of lists are left out.
+/// Returns every field that serde writes, by path, without list indices.
 pub(crate) fn fields(subject: &impl serde::Serialize) -> BTreeMap<String, String> {
     fn walk(path: &str, value: &serde_json::Value, fields: &mut BTreeMap<String, String>) {
         let join = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
@@ -108,7 +108,7 @@ pub(crate) fn fields(subject: &impl serde::Serialize) -> BTreeMap<String, String
     fields
 }
 
-/// The fingerprint of a campaign with it.
+/// Returns the fingerprint of a campaign with the object.
 fn fingerprint(subject: &impl Subject) -> String {
     let plain = campaign::parse("f", "flights = 1\nscenario = \"hover\"", "f", Path::new("")).unwrap();
     let scenario = subject.scenario();

@@ -1,4 +1,4 @@
-//! The values of a vehicle's file.
+//! The declared values of a vehicle file.
 
 use super::document::{Case, Document};
 use super::stories::Story;
@@ -16,7 +16,7 @@ use afbc_vehicles::Vehicle;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, OnceLock};
 
-/// Tables of a file, and the prefix of their parameters on a station.
+/// Tables of a file, and the prefixes of their parameters at a station.
 const PREFIXES: [(&str, &str); 8] = [
     ("vehicle", "V_"),
     ("motor", "MOT_"),
@@ -75,7 +75,7 @@ impl Subject for Vehicle {
         })
     }
 
-    /// Under every law, in front of a tracker; on the ground for its stories.
+    /// All laws, with a tracker. Stories begin on the ground.
     fn scenario(&self) -> Scenario {
         in_scenario("mocap", self).unwrap()
     }
@@ -113,25 +113,25 @@ impl Subject for Vehicle {
     }
 }
 
-/// A built-in scenario on a vehicle, unless it cannot fly that.
+/// Returns a built-in scenario on a vehicle, or an error if the vehicle cannot fly it.
 fn in_scenario(name: &str, vehicle: &Vehicle) -> Result<Scenario, String> {
     built_in(name).unwrap().read().unwrap().on(vehicle, Profile::Flight).map_err(|error| error.to_string())
 }
 
-/// The flight of a story on the vehicle of this test, which is flown once.
+/// Returns the trace of a story with the unchanged vehicle, which is flown only once.
 fn trace(story: Story, base: &Vehicle) -> Vec<u64> {
     static TRACES: OnceLock<Mutex<BTreeMap<Story, Vec<u64>>>> = OnceLock::new();
     let mut traces = TRACES.get_or_init(Mutex::default).lock().unwrap();
     traces.entry(story).or_insert_with(|| story.trace(&in_scenario(story.scenario(), base).unwrap())).clone()
 }
 
-/// A short flight under a law.
+/// Returns the trace of a short flight under a law.
 fn flown(vehicle: &Vehicle, kind: ControllerKind) -> Vec<u64> {
     let scenario = in_scenario("wind", vehicle).unwrap();
     super::scenario::trace(&Scenario { duration_s: 3.0, ..scenario }, kind)
 }
 
-/// What a station reads over the link.
+/// Returns a parameter as a station reads it over the link.
 fn read_by_station(vehicle: &Vehicle, name: &str) -> f32 {
     let (mut host, mut sender) = (Host::for_vehicle(vehicle).unwrap(), Sender::new(STATION));
     let mut letters = [0; 16];
@@ -156,7 +156,7 @@ fn read_by_station(vehicle: &Vehicle, name: &str) -> f32 {
     panic!("no answer about {name}")
 }
 
-/// A vehicle whose limits and battery are met in the stories.
+/// Returns a vehicle whose limits and battery are reached in the stories.
 fn base() -> Vehicle {
     let mut vehicle = afbc_vehicles::built_in("iris").unwrap().read().unwrap();
     let battery = vehicle.realism.rotors.battery.unwrap();
@@ -181,12 +181,12 @@ fn base() -> Vehicle {
         land_slow_m: 2.0,
         ..flying
     };
-    // Enough to lift it without feed-forward.
+    // Large enough to lift the vehicle without feed-forward.
     vehicle.flight_gains.z.safeguards.theta_max = 80.0;
     Vehicle::read(&vehicle.document().text()).unwrap()
 }
 
-/// Why no flight responds to a value.
+/// Keys to which no flight responds, with the reasons.
 const IDLE: &[(&str, &[&str])] = &[
     ("armed at rest on level ground, where it is to be", &["arming.setpoint_distance_max_m", "arming.tilt_max_rad"]),
     (
@@ -259,7 +259,8 @@ fn every_value_of_a_vehicles_file_counts() {
     compare(&responses, IDLE);
 }
 
-/// What a station may set is in a vehicle's file, but for what follows from another key, or is not the vehicle's.
+/// Every parameter of a station is in the vehicle file, except those that follow from another key or do not belong to
+/// the vehicle.
 #[test]
 fn every_parameter_of_a_station_is_in_the_file() {
     const ELSEWHERE: [(&str, &str); 27] = [
@@ -317,7 +318,7 @@ fn every_parameter_of_a_station_is_in_the_file() {
     assert_eq!(missing, elsewhere);
 }
 
-/// The configuration without a file is that of the paper's.
+/// The configuration without a vehicle file equals that of the paper's vehicle.
 #[test]
 fn the_default_configuration_is_the_papers() {
     let paper = afbc_vehicles::built_in("paper").unwrap().read().unwrap();

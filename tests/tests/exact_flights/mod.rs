@@ -1,4 +1,4 @@
-//! Flights of the firmware's code with their exact logs.
+//! Flights of the firmware's code, with their exact logs.
 
 use afbc_hil::Host;
 use afbc_link::telemetry::BatteryStatus;
@@ -14,13 +14,13 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 const STATION: Address = Address { system: 255, component: 190 };
-/// Types of parameters, as MAV_PARAM_TYPE.
+/// Values of MAV_PARAM_TYPE.
 const INT32: u8 = 6;
 const REAL32: u8 = 9;
-/// From the ground, outdoors.
+/// A scenario outdoors that begins on the ground.
 pub(crate) const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../twin/scenarios/hover.toml");
 
-/// What a station sends in this millisecond, if anything: a flight with whatever comes to a tester's mind.
+/// Returns the message that a station sends in this millisecond, if any. The flight has random commands of many kinds.
 fn sends(ms: u64, random: &mut Xoshiro256PlusPlus) -> Option<Uplink> {
     let command = |command| Some(Uplink::Command(command));
     match ms {
@@ -32,7 +32,7 @@ fn sends(ms: u64, random: &mut Xoshiro256PlusPlus) -> Option<Uplink> {
         _ => {}
     }
     match random.next_u32() % 300 {
-        // Parameters alone before it flies.
+        // Before it flies, the station only sends parameters.
         number if ms < 9_500 && number != 4 => None,
         0 => command(Command::Speed(1.0 + (random.next_u32() % 5) as f32)),
         1 => command(Command::Engage),
@@ -48,19 +48,19 @@ fn sends(ms: u64, random: &mut Xoshiro256PlusPlus) -> Option<Uplink> {
     }
 }
 
-/// Sets a parameter.
+/// Returns a message that sets a parameter.
 fn set(name: &[u8], value: [u8; 4], kind: u8) -> Uplink {
     let mut letters = [0; 16];
     letters.iter_mut().zip(name).for_each(|(to, from)| *to = *from);
     Uplink::Parameter(ParameterRequest::Set { name: letters, value, kind })
 }
 
-/// Flies, with noise on the link, and returns the log.
+/// Flies with noise on the link and returns the log.
 pub(crate) fn fly(scenario: &Scenario, seed: u64, ticks: u64) -> Vec<u8> {
     fly_with(Host::new().unwrap(), scenario, seed, ticks, false)
 }
 
-/// The same by this host; with `faults`, sensors and a rotor fail now and then.
+/// Flies with this host and returns the log. With `faults`, sensors and a rotor fail now and then.
 pub(crate) fn fly_with(mut host: Host, scenario: &Scenario, seed: u64, ticks: u64, faults: bool) -> Vec<u8> {
     let log = Rc::new(RefCell::new(Vec::new()));
     let sink = Rc::clone(&log);
@@ -91,7 +91,7 @@ pub(crate) fn fly_with(mut host: Host, scenario: &Scenario, seed: u64, ticks: u6
         if random.next_u32() % 50 == 0 {
             bytes.extend((0..random.next_u32() % 40).map(|_| random.next_u32() as u8));
         }
-        // Late ticks, too.
+        // Ticks are also late, by up to 20 us.
         let tick = host.tick(&bytes, 1_000 * (ms + 1) + u64::from(random.next_u32() % 20), 50.0);
         speeds = tick.report.motors;
         if fault == Some(3) {

@@ -1,9 +1,9 @@
-//! Imports between the files of a crate, and circles among them.
+//! Finds the imports between the files of a crate, and circles among them.
 //!
-//! A file imports another if its code names something that the other defines: in a `use`, by a path, or in the tokens
-//! of a macro. A name is followed through every module that hands it on (`pub use`) to the file that defines it. So a
-//! parent that only declares its children and hands on their items imports none of them, but one that also uses them
-//! does. Code for tests (`#[cfg(test)]`) counts only where it has a file of its own.
+//! A file imports another one if its code names an item that the other defines: in a `use`, by a path, or in the tokens
+//! of a macro. A name is followed through every module that re-exports it (`pub use`) to the file that defines it. So a
+//! parent that only declares its children and re-exports their items imports none of them; a parent that also uses the
+//! items does. Test code (`#[cfg(test)]`) counts only if it has its own file.
 
 mod paths;
 mod read;
@@ -14,10 +14,10 @@ pub(crate) use read::Crate;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-/// The imports of each file: the other file, and a path by which it is named.
+/// Imports of each file: the other files, each with a path by which it is named.
 pub(crate) type Imports = BTreeMap<PathBuf, BTreeMap<PathBuf, String>>;
 
-/// Returns the circles: sets of files each of which imports, directly or not, every other.
+/// Returns the circles: sets of files in which every file imports every other, directly or indirectly.
 pub(crate) fn circles(imports: &Imports) -> Vec<BTreeSet<PathBuf>> {
     let reached = |from: &PathBuf| {
         let (mut reached, mut ahead) = (BTreeSet::new(), vec![from]);
@@ -36,7 +36,7 @@ pub(crate) fn circles(imports: &Imports) -> Vec<BTreeSet<PathBuf>> {
     found.into_iter().collect()
 }
 
-/// Returns the imports within a circle, a line each.
+/// Returns the imports within a circle, one per line.
 pub(crate) fn within(imports: &Imports, circle: &BTreeSet<PathBuf>) -> String {
     let of = |file: &PathBuf| {
         let targets = imports.get(file).into_iter().flatten().filter(|(target, _)| circle.contains(*target));

@@ -1,22 +1,22 @@
-//! Paths in code: of `use` trees, and in the tokens of macros and attributes.
+//! Finds paths in code: in `use` trees, and in the tokens of macros and attributes.
 
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use std::iter::Peekable;
 use syn::{UseTree, Visibility};
 
-/// A path's names, from the first to the last; `crate` for `$crate`.
+/// Names of a path, from first to last. `$crate` is `crate`.
 pub(crate) type Path = Vec<String>;
 
 /// One name that a `use` brings into scope.
 pub(crate) struct Use {
-    /// The name; none for `*`, which brings every name of the module at `path`.
+    /// The name; none for `*`, which brings every name of the module at `path` into scope.
     pub(crate) name: Option<String>,
     pub(crate) path: Path,
     /// True if other modules can import the name from here.
     pub(crate) is_public: bool,
 }
 
-/// Returns what a `use` brings into scope.
+/// Returns the names that a `use` brings into scope.
 pub(crate) fn uses(tree: &UseTree, visibility: &Visibility) -> Vec<Use> {
     let mut found = Vec::new();
     leaves(tree, &mut Vec::new(), !matches!(visibility, Visibility::Inherited), &mut found);
@@ -42,7 +42,7 @@ fn leaves(tree: &UseTree, prefix: &mut Path, is_public: bool, found: &mut Vec<Us
     }
 }
 
-/// A path in tokens, and whether it names a macro that is called.
+/// A path in tokens, and true if it names a macro that is called.
 pub(crate) type Named = (Path, bool);
 
 /// Returns every path in the tokens of a macro or an attribute.
@@ -52,7 +52,7 @@ pub(crate) fn in_tokens(tokens: &TokenStream) -> Vec<Named> {
     found
 }
 
-/// Returns the paths that are strings in an attribute: `#[serde(with = "crate::a")]`.
+/// Returns the paths that are strings in an attribute, as in `#[serde(with = "crate::a")]`.
 pub(crate) fn in_strings(tokens: &TokenStream) -> Vec<Named> {
     let of = |token| match token {
         TokenTree::Literal(literal) => {
@@ -69,7 +69,7 @@ pub(crate) fn in_strings(tokens: &TokenStream) -> Vec<Named> {
 
 fn walk(tokens: &TokenStream, prefix: &[String], found: &mut Vec<Named>) {
     let mut tokens = tokens.clone().into_iter().peekable();
-    // The last token, if it tells that the next word is no path: a field, a lifetime, a variable of the macro.
+    // The last token, if it shows that the next word is not a path but a field, a lifetime or a variable of the macro.
     let mut before = ' ';
     while let Some(token) = tokens.next() {
         match token {
@@ -82,7 +82,7 @@ fn walk(tokens: &TokenStream, prefix: &[String], found: &mut Vec<Named>) {
                 walk(&group.stream(), prefix, found);
                 before = ' ';
             }
-            // Two dots are a range, or the rest of a struct.
+            // Two dots are a range, or stand for the remaining fields of a struct.
             TokenTree::Punct(mark) => {
                 before = if (before, mark.as_char()) == ('.', '.') { ' ' } else { mark.as_char() }
             }
@@ -104,7 +104,7 @@ fn path(mut names: Path, tokens: &mut Peekable<impl Iterator<Item = TokenTree> +
         }
         match ahead.next() {
             Some(TokenTree::Ident(word)) => names.push(word.to_string()),
-            // A tree: crate::{a, b::c}.
+            // A tree of paths, such as crate::{a, b::c}.
             Some(TokenTree::Group(group)) if group.delimiter() == Delimiter::Brace => {
                 *tokens = ahead;
                 return walk(&group.stream(), &names, found);

@@ -1,4 +1,4 @@
-//! The modules of a crate, read from its root file on.
+//! Reads the modules of a crate, starting at its root file.
 
 use super::paths::{Named, Path, Use, in_strings, in_tokens, uses};
 use proc_macro2::TokenStream;
@@ -7,35 +7,35 @@ use std::path::{Path as FilePath, PathBuf};
 use syn::visit::{self, Visit};
 use syn::{Attribute, Expr, ExprLit, Item, Lit, Meta};
 
-/// A module: a file, or a part of one.
+/// A module: a file or a part of one.
 #[derive(Default)]
 pub(crate) struct Module {
     pub(crate) file: PathBuf,
     pub(crate) parent: Option<usize>,
-    /// Modules within, by name.
+    /// Child modules, by name.
     pub(crate) children: BTreeMap<String, usize>,
-    /// Names of what it defines.
+    /// Names of the items that the module defines.
     pub(crate) items: BTreeSet<String>,
     pub(crate) uses: Vec<Use>,
-    /// Paths in its code, and whether each names a macro that is called.
+    /// Paths in the module's code; the flag is true for macros that are called.
     pub(crate) paths: Vec<Named>,
 }
 
-/// A macro's body, and the module that defines it.
+/// Paths in a macro's body, and the module that defines the macro.
 pub(crate) struct Macro {
     pub(crate) module: usize,
     pub(crate) exported: bool,
     pub(crate) paths: Vec<Named>,
 }
 
-/// A crate: a program or library with the modules that it declares. The first is its root.
+/// A program or library with all modules that it declares. The first module is the root.
 pub(crate) struct Crate {
     pub(crate) modules: Vec<Module>,
     pub(crate) macros: BTreeMap<String, Vec<Macro>>,
 }
 
 impl Crate {
-    /// Reads a crate from its root file on; `read` returns the text of a file, if there is one.
+    /// Reads a crate from its root file. `read` returns the text of a file; none if there is no such file.
     pub(crate) fn read(root: &FilePath, read: &dyn Fn(&FilePath) -> Option<String>) -> Self {
         let mut reader = Reader { of: Crate { modules: Vec::new(), macros: BTreeMap::new() }, read, module: 0 };
         let text = read(root).unwrap_or_else(|| panic!("{}: no such file", root.display()));
@@ -52,12 +52,12 @@ impl Crate {
 struct Reader<'a> {
     of: Crate,
     read: &'a dyn Fn(&FilePath) -> Option<String>,
-    /// The module that is being read.
+    /// Index of the module that is being read.
     module: usize,
 }
 
 impl Reader<'_> {
-    /// Reads a file as a module; modules that it declares are in `folder`.
+    /// Reads a file as a module. The modules that it declares are in `folder`.
     fn file(&mut self, file: &FilePath, text: &str, parent: Option<usize>, folder: &FilePath) -> usize {
         let parsed = syn::parse_file(text).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
         self.inside(&parsed.items, file, parent, folder)
@@ -124,7 +124,7 @@ impl<'ast> Visit<'ast> for Reader<'_> {
         }
     }
 
-    /// A module within a function is read as a part of the module around it.
+    /// A module within a function counts as a child of the surrounding module.
     fn visit_item_mod(&mut self, item: &'ast syn::ItemMod) {
         let (file, folder) = (self.here().file.clone(), PathBuf::new());
         self.declared(item, &file, &folder);
@@ -147,7 +147,7 @@ impl<'ast> Visit<'ast> for Reader<'_> {
         let Some(name) = &item.ident else { return visit::visit_item_macro(self, item) };
         let exported = item.attrs.iter().any(|attribute| attribute.path().is_ident("macro_export"));
         let (module, paths) = (self.module, in_tokens(&item.mac.tokens));
-        // Other paths mean something only where the macro is called.
+        // Other paths have a meaning only where the macro is called.
         let rooted = paths.iter().filter(|(path, _)| path.first().is_some_and(|first| first == "crate")).cloned();
         self.here().paths.extend(rooted);
         self.here().items.insert(name.to_string());
@@ -191,7 +191,7 @@ fn segments(path: &syn::Path) -> Path {
     path.segments.iter().map(|segment| segment.ident.to_string()).collect()
 }
 
-/// True for what is compiled for tests only.
+/// True for code that is compiled for tests only.
 fn for_tests(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|attribute| match &attribute.meta {
         Meta::List(list) if list.path.is_ident("cfg") => {

@@ -1,11 +1,11 @@
-//! Which files a crate's paths lead to.
+//! Resolves a crate's paths to files.
 
 use super::Imports;
 use super::paths::{Named, Path, Use};
 use super::read::Crate;
 use std::collections::BTreeSet;
 
-/// Imports that are being followed, each a module and its index there: none helps to find what it imports itself.
+/// Imports that are being followed, each as a module and an index in its list. An import cannot help to resolve itself.
 type Seen = BTreeSet<(usize, usize)>;
 
 impl Crate {
@@ -25,12 +25,12 @@ impl Crate {
         imports
     }
 
-    /// Returns the modules that a module's code names, and by which paths.
+    /// Returns the modules that a module's code names, with the paths used.
     fn of_module(&self, module: usize) -> Vec<(usize, Path)> {
         let mut found = Vec::new();
         for import in &self.modules[module].uses {
             let targets = self.named(module, &import.path);
-            // What a parent hands on of its children it does not use by that.
+            // A parent that re-exports an item of its child does not thereby use the child.
             let uses = targets.into_iter().filter(|target| !import.is_public || !self.is_within(*target, module));
             found.extend(uses.map(|target| (target, import.path.clone())));
         }
@@ -38,7 +38,8 @@ impl Crate {
         let mut ahead: Vec<&Named> = self.modules[module].paths.iter().collect();
         while let Some((path, is_call)) = ahead.pop() {
             let Some(name) = path.last() else { continue };
-            // A single word is never a module: a variable of its name, `self` as a value, `crate` in a visibility.
+            // A single word is never a module. It may be a variable of the same name, `self` as a value, or `crate` in
+            // a visibility.
             let is_module =
                 ["crate", "self", "super"].contains(&name.as_str()) || self.modules[module].children.contains_key(name);
             if path.len() == 1 && !is_call && is_module {
@@ -47,7 +48,7 @@ impl Crate {
             let mut targets = self.named(module, path);
             if *is_call {
                 let macros = self.macros.get(name).map_or(&[][..], Vec::as_slice);
-                // A macro may also be in scope by its place in the text.
+                // A macro may also be in scope because it stands earlier in the text.
                 let in_text = path.len() == 1 && macros.iter().all(|it| !targets.contains(&it.module));
                 let meant: Vec<_> = macros.iter().filter(|it| in_text || targets.contains(&it.module)).collect();
                 targets = meant.iter().map(|it| it.module).collect();
@@ -60,13 +61,13 @@ impl Crate {
         found
     }
 
-    /// True if a module is another's descendant.
+    /// True if `module` is a descendant of `other`.
     fn is_within(&self, module: usize, other: usize) -> bool {
         self.modules[module].parent.is_some_and(|parent| parent == other || self.is_within(parent, other))
     }
 
-    /// Returns the modules that define what a path names where it is written in `module`, and those that import it for
-    /// themselves on the way; none if it leads out of the crate.
+    /// Returns the modules that define the item of a path in `module`, and modules on the way that import it privately.
+    /// Returns none if the path leads out of the crate.
     fn named(&self, module: usize, path: &[String]) -> BTreeSet<usize> {
         self.from(module, path, &mut Seen::new())
     }
@@ -83,11 +84,12 @@ impl Crate {
             (rest, rooted) = (others, true);
         }
         let found = self.inside(base, rest, base == module, seen);
-        // What is nowhere to be seen is made by a macro of the module.
+        // A macro of the module defines a name that is found nowhere else.
         if found.is_empty() && rooted { [base].into() } else { found }
     }
 
-    /// Returns where the rest of a path leads from within a module; `own` if it is written there.
+    /// Returns the modules to which the rest of a path leads within a module. `own` is true if the path is written in
+    /// that module.
     fn inside(&self, module: usize, path: &[String], own: bool, seen: &mut Seen) -> BTreeSet<usize> {
         let [name, rest @ ..] = path else { return [module].into() };
         if name == "self" {
@@ -100,7 +102,7 @@ impl Crate {
             let within = self.inside(child, rest, false, seen);
             found.extend(if within.is_empty() { [child].into() } else { within });
         }
-        // What is within a child is nothing that an import of the same name brings: `use a::a;`.
+        // An import with a child's name does not bring the child's contents into scope: `use a::a;`.
         let named = |import: &Use| import.name.as_ref() == Some(name) && (child.is_none() || rest.is_empty());
         for (index, import) in it.uses.iter().enumerate().filter(|(_, import)| named(import)) {
             if seen.insert((module, index)) {

@@ -1,4 +1,4 @@
-//! A case: what happens, and what is expected.
+//! A case of the safety tests: events and the expected result.
 
 use crate::airborne::STATION;
 use crate::airborne::checker::{Bounds, End};
@@ -9,35 +9,35 @@ use afbc_link::{
 };
 use afbc_station::services::modes;
 
-/// What happens.
+/// An event.
 #[derive(Clone, Debug)]
 pub(crate) enum Do {
     Say(Address, Uplink),
-    /// Weather or a fault, as the server's line.
+    /// Changes weather or causes a fault, by a line of the server's protocol.
     Line(&'static str),
     Silent(Address),
     Back(Address),
-    /// The station sends this target again and again.
+    /// The station sends this target repeatedly, or stops doing so.
     Stream(Option<Uplink>),
-    /// One of so many frames of the station is broken.
+    /// One in this number of the station's frames is broken.
     Breaks(u32),
     Upload(Vec<MissionItem>),
-    /// So many bytes that are no frames.
+    /// This number of bytes arrives that belong to no frame.
     Noise(usize),
 }
 
-/// Where a case begins.
+/// Start of a case.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Start {
     /// Disarmed, 12 s after power-up.
     PowerUp,
     /// Just armed.
     Ground,
-    /// In hold, this high \[m\].
+    /// In hold at this height \[m\].
     Air(f32),
 }
 
-/// A fault or several, and what is expected.
+/// One or several faults, and the expected result.
 #[derive(Clone, Debug)]
 pub(crate) struct Case {
     pub(crate) name: &'static str,
@@ -45,21 +45,21 @@ pub(crate) struct Case {
     pub(crate) indoors: bool,
     pub(crate) set: Vec<(&'static str, f32)>,
     pub(crate) start: Start,
-    /// What happens at power-up.
+    /// Events at power-up.
     pub(crate) before: Vec<Do>,
-    /// What happens, by the time since the case began \[s\].
+    /// Events by the time since the case began \[s\].
     pub(crate) steps: Vec<(f64, Do)>,
     pub(crate) lasts_s: f64,
-    /// Texts that are heard in this order, and that are not.
+    /// Texts that must be heard in this order. `never` lists texts that must not be heard.
     pub(crate) heard: Vec<&'static str>,
     pub(crate) never: Vec<&'static str>,
     pub(crate) bounds: Bounds,
     pub(crate) end: End,
-    /// Where it ends, and within which distance \[m\].
+    /// Position at the end, and the largest distance from it \[m\].
     pub(crate) near: Option<([f64; 2], f64)>,
 }
 
-/// A case in hold 3 m above the ground, indoors, that ends there: all else is said.
+/// Returns a case that begins and ends in hold, 3 m above the ground, indoors. All else must be added.
 pub(crate) fn case(name: &'static str, what: &'static str) -> Case {
     let bounds = Bounds { height_m: 6.0, radius_m: 25.0, ..Bounds::DEFAULT };
     Case {
@@ -81,7 +81,7 @@ pub(crate) fn case(name: &'static str, what: &'static str) -> Case {
 
 impl Case {
     pub(crate) fn outdoors(self) -> Self {
-        // The receiver's error.
+        // The bounds are wider by the receiver's error.
         let bounds = Bounds { radius_m: 30.0, height_m: self.bounds.height_m + 4.0, ..self.bounds };
         Case { indoors: false, bounds, ..self }
     }
@@ -124,7 +124,7 @@ impl Case {
         self
     }
 
-    /// Ends disarmed on the ground.
+    /// Expects the vehicle to end disarmed on the ground.
     pub(crate) fn lands(self) -> Self {
         Case { end: End::Disarmed, ..self }
     }
@@ -137,7 +137,7 @@ impl Case {
         Case { near: Some(([x, y], within_m)), ..self }
     }
 
-    /// The flight core stops the motors in the air, announced.
+    /// Expects the flight core to stop the motors in the air, with this announcement.
     pub(crate) fn falls(self, text: &'static str) -> Self {
         let bounds = Bounds { cut: true, tilt_rad: 4.0, speed_m_s: 20.0, touch_m_s: 12.0, ..self.bounds };
         Case { bounds, end: End::Disarmed, ..self }.hears(&[text])
@@ -148,7 +148,7 @@ impl Case {
         self.at(0.0, Do::Stream(Some(target))).at(0.2, say(select(FlightMode::Offboard)))
     }
 
-    /// Flies a mission from the beginning on.
+    /// Flies a mission from the beginning of the case.
     pub(crate) fn mission(self, places: &[[f32; 3]]) -> Self {
         let items = (0..).zip(places).map(|(number, at)| item(number, WAYPOINT, *at)).collect();
         self.before(Do::Upload(items)).at(0.1, say(Command::StartMission(0, None)))
@@ -161,7 +161,7 @@ impl Case {
         cells.into_iter().chain(charges).fold(self, |case, (name, value)| case.set(name, value))
     }
 
-    /// A fence of 10 m by 8 m.
+    /// Adds a geofence with a radius of 10 m and a height of 8 m.
     pub(crate) fn fenced(self, action: f32) -> Self {
         self.set("GF_MAX_HOR_DIST", 10.0).set("GF_MAX_VER_DIST", 8.0).set("GF_ACTION", action)
     }
@@ -186,7 +186,7 @@ pub(crate) fn go_to(x: f32, y: f32, z: f32) -> Command {
     Command::Reposition { place: global(x, y, z), yaw_rad: f32::NAN, speed_m_s: None, changes_mode: true }
 }
 
-/// Leans towards the north and climbs a little.
+/// Returns a target that tilts towards the north and climbs a little.
 pub(crate) fn leaning() -> Uplink {
     let q = nalgebra::UnitQuaternion::from_euler_angles(0.0_f32, 0.15, 0.0);
     let attitude = [q.w, q.i, q.j, q.k];

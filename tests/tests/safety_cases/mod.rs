@@ -1,4 +1,4 @@
-//! The faults, and what is expected of each.
+//! Faults, and the expected result of each.
 
 mod case;
 mod pairs;
@@ -6,7 +6,7 @@ mod singles;
 
 pub(crate) use case::{Case, Do, Start};
 
-/// Every case.
+/// Returns all cases.
 pub(crate) fn cases() -> Vec<Case> {
     [singles::cases(), pairs::cases()].concat()
 }

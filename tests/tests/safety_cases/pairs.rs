@@ -1,11 +1,11 @@
-//! Faults that meet.
+//! Faults that happen together.
 
 use super::case::*;
 use crate::airborne::{COMPANION, STATION, velocity};
 use afbc_guidance::FlightMode;
 use afbc_link::{Command, Uplink};
 
-/// Every case of several faults.
+/// Returns all cases with several faults.
 pub(super) fn cases() -> Vec<Case> {
     let line = Do::Line;
     let silent = || Do::Silent(STATION);
@@ -122,7 +122,8 @@ pub(super) fn cases() -> Vec<Case> {
             .at(2.0, silent())
             .lasts(26.0)
             .hears(&["inertial sensor failed: flying on tracker's poses", "return: station lost", "on the ground"])
-            // Turning back on poses alone, whose velocity is late, it tilts beyond what its acceleration takes.
+            // When it turns back on poses alone, whose velocity is late, the vehicle tilts more than its acceleration
+            // needs.
             .bound(|bounds| bounds.tilt_rad = 0.7)
             .lands()
             .near(0.0, 0.0, 0.8),

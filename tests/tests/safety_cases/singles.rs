@@ -1,4 +1,4 @@
-//! One fault at a time.
+//! Single faults.
 
 use super::case::*;
 use crate::airborne::checker::CUTS;
@@ -7,7 +7,7 @@ use crate::airborne::{COMPANION, STATION, place, velocity};
 use afbc_guidance::FlightMode;
 use afbc_link::{Command, Uplink};
 
-/// Every case of one fault.
+/// Returns all cases with one fault.
 pub(super) fn cases() -> Vec<Case> {
     [station(), targets(), fence(), battery(), sensors(), airframe(), link()].concat()
 }
@@ -304,8 +304,8 @@ fn battery() -> Vec<Case> {
     ]
 }
 
-/// Largest tilt \[rad\] of a vehicle that touches the ground within seconds after it has lost its position: what the
-/// estimate makes of the contact, the law answers, until it stands.
+/// Largest tilt \[rad\] of a vehicle that touches the ground within seconds after losing its position. The contact
+/// disturbs the estimate, and the law responds to this until the vehicle stands.
 const ON_GROUND_RAD: f64 = 1.0;
 
 fn sensors() -> Vec<Case> {
