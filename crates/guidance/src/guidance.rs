@@ -50,8 +50,8 @@ pub struct GuidanceInputs<'a> {
     pub lift: Lift,
 }
 
-/// Outputs of a tick of the guidance.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Outputs of a tick of the guidance, for the flight core, stations and logs.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Guided {
     /// Setpoint for the flight core; none without a state.
     pub setpoint: Option<Setpoint>,
@@ -74,8 +74,8 @@ pub struct Guided {
     pub home_m: Option<Vector3<f32>>,
     /// Failsafe cause that selected the present mode; none once a pilot or a station has selected another mode.
     pub failsafe: Option<Cause>,
-    /// Reasons of the guidance against arming, as of the last disarmed tick.
-    pub against: Reasons,
+    /// True if the vehicle is armed and in the air.
+    pub airborne: bool,
     /// Charge of the battery, 0 to 1.
     pub charge: Option<f32>,
     /// True while flying an ordered orbit.
@@ -217,6 +217,12 @@ impl Guidance {
         self.memory.rates.as_ref()
     }
 
+    /// Returns what it has against arming, as it was while the vehicle was disarmed.
+    // Not in what a tick gives, of which the firmware has a queue: the flight core's reasons include these.
+    pub fn against(&self) -> Reasons {
+        self.memory.against
+    }
+
     /// Returns the flight mode.
     pub fn mode(&self) -> FlightMode {
         self.memory.mode
@@ -322,7 +328,7 @@ impl Memory {
             reached,
             home_m: self.home_m,
             failsafe: self.failsafe,
-            against: self.against,
+            airborne,
             charge: self.watch.charge(),
             orbits: matches!(self.plan, Plan::Orbit(_)),
         }

@@ -90,7 +90,8 @@ fn what_bars_arming_has_its_limits() {
         fixture.battery = Some(BatteryReading { voltage_v: 11.7, current_a: 0.0, charge: None });
         fixture.run(1100);
         change(&mut fixture);
-        fixture.tick().against.iter().collect::<Vec<_>>()
+        fixture.tick();
+        fixture.guidance.against().iter().collect::<Vec<_>>()
     };
     assert_eq!(bars(&|_| ()), []);
     assert_eq!(bars(&|fixture| fixture.state.as_mut().unwrap().position_m.x = 10.9), [], "10 m from home, at x = 1 m");
@@ -108,11 +109,14 @@ fn what_bars_arming_has_its_limits() {
     });
     assert_eq!(both, [Refusal::SensorFailed, Refusal::OutsideFence]);
     // A battery without cells is not monitored. With cells, its charge is unknown before the first plausible reading.
-    assert!(Fixture::new(Settings::DEFAULT).run(1100).against.is_empty());
+    let mut fixture = Fixture::new(Settings::DEFAULT);
+    fixture.run(1100);
+    assert!(fixture.guidance.against().is_empty());
     let net = Net { cells: 3, ..Net::DEFAULT };
     let mut fixture = Fixture::new(Settings { net, ..Settings::DEFAULT });
     fixture.battery = Some(BatteryReading { voltage_v: NAN, current_a: 0.0, charge: None });
-    assert!(fixture.run(1100).against.iter().eq([Refusal::BatteryLow]));
+    fixture.run(1100);
+    assert!(fixture.guidance.against().iter().eq([Refusal::BatteryLow]));
 }
 
 /// The setpoint restarts at a vehicle farther away than a limit, which is tighter when the mode changes or the state

@@ -278,10 +278,10 @@ fn outside_the_uploaded_fence_nothing_takes_off() {
     let mut bench = Bench::new(settings());
     bench.orders.fence = Some(FenceView { leaves: true, outside: true });
     bench.run(1.5);
-    assert!(bench.last.unwrap().against.iter().any(|reason| reason == afbc_flight_core::Refusal::OutsideFence));
+    assert!(bench.guidance.against().iter().any(|reason| reason == afbc_flight_core::Refusal::OutsideFence));
     bench.orders.fence = Some(FenceView { leaves: true, outside: false });
     bench.run(0.1);
-    assert!(bench.last.unwrap().against.iter().count() == 0);
+    assert!(bench.guidance.against().iter().count() == 0);
     bench.aim(OffboardTarget::Motion(motion(Vector3::new(1.0, 0.0, 5.0))));
 }
 

@@ -345,7 +345,8 @@ fn the_guidance_bars_arming_for_its_own_reasons_only() {
     bench.run(1.5);
     let against = |bench: &Bench, sight: &GuidanceInputs<'_>| {
         let mut guidance = bench.guidance;
-        guidance.tick(sight, &Orders::default()).against.iter().collect::<Vec<_>>()
+        let _ = guidance.tick(sight, &Orders::default());
+        guidance.against().iter().collect::<Vec<_>>()
     };
     let far = State { position_m: Vector3::new(1e3, 0.0, 0.0), ..here };
     let tilted = State { attitude_rad: Vector3::new(0.0, 0.8, 0.0), velocity_m_s: Vector3::new(9.0, 0.0, 0.0), ..here };

@@ -250,7 +250,7 @@ proptest! {
             let mut asked = None;
             match step {
                 Step::Arm => {
-                    if bench.core == Mode::Disarmed && bench.rested() && bench.last.unwrap().against.is_empty() {
+                    if bench.core == Mode::Disarmed && bench.rested() && bench.guidance.against().is_empty() {
                         bench.core = Mode::Flying;
                         bench.landing = afbc_flight_core::landing::LandDetector::new(&bench.state, 9.81);
                     }

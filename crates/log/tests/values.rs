@@ -7,6 +7,7 @@ mod strict;
 use afbc_estimator::{Aid, Estimate, Measurement, Origin, Validity};
 use afbc_flight_core::{Mode, Stamped};
 use afbc_guidance::FlightMode;
+use afbc_guidance::notice::Cause;
 use afbc_log::ulog::{BlackBox, LogRing, LogStart, LoggedTick, TakenInputs};
 use afbc_onboard::parameters::ParameterTable;
 use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, FlightView, Readings, Report};
@@ -378,13 +379,13 @@ fn modes_have_px4s_numbers() {
             FlightMode::Land => 18.0,
         };
         for core in [Mode::Disarmed, Mode::Flying, Mode::Coasting, Mode::Descending] {
-            for failsafe in [false, true] {
+            for failsafe in [None, Some(Cause::Station)] {
                 let log = told(|tick| {
                     (tick.report.mode, tick.report.guided.mode) = (core, mode);
                     tick.report.guided.failsafe = failsafe;
                 });
                 let descends = core == Mode::Descending;
-                let fails = f64::from(u8::from(failsafe || descends));
+                let fails = f64::from(u8::from(failsafe.is_some() || descends));
                 let state = if descends { 12.0 } else { wanted };
                 let arming = if core == Mode::Disarmed { 1.0 } else { 2.0 };
                 let all = [("nav_state", state), ("failsafe", fails), ("arming_state", arming)];

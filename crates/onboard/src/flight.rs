@@ -4,7 +4,7 @@ use crate::configuration::Configuration;
 use crate::control_inputs::ControlInputs;
 use crate::flight_view::FlightView;
 use crate::front_end::{Corrections, EstimatorFrontEnd};
-use crate::guided::{Core, GuidanceResult, Guide};
+use crate::guided::{Core, Guide};
 use crate::imu_selector::ImuSelector;
 use crate::law::FlightLaw;
 use crate::readings::Readings;
@@ -14,6 +14,7 @@ use afbc::monitor::Norm;
 use afbc_control::Trace;
 use afbc_estimator::{Estimator, OutputFilter, VelocityNotch};
 use afbc_flight_core::{EndReason, FlightCore, FlightCoreMemory, Mode, Motor, Reasons, RequestAnswer, TickHealth};
+use afbc_guidance::Guided;
 use afbc_types::{Axis, Declared, OutOfRange, ROTORS_MAX, RotorSpeeds, State};
 use core::array;
 
@@ -128,7 +129,7 @@ pub struct Report<const N: usize = 4> {
     /// What spoke against arming in this tick, by which a request to arm was or would have been answered.
     pub against: Reasons,
     /// What the guidance decided.
-    pub guided: GuidanceResult,
+    pub guided: Guided,
 }
 
 impl<const N: usize> Report<N> {

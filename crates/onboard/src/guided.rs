@@ -5,40 +5,11 @@ use crate::control_inputs::ControlInputs;
 use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::{Mode, Stamped, Ticketed};
 use afbc_guidance::net::FailedSensors;
-use afbc_guidance::notice::Notices;
-use afbc_guidance::{FlightMode, Guidance, GuidanceInputs, Lift, OrderRefusal};
-use afbc_types::{OutOfRange, Setpoint, State};
-use nalgebra::Vector3;
+use afbc_guidance::{Guidance, GuidanceInputs, Guided, Lift};
+use afbc_types::{OutOfRange, State};
 
 /// Ticket of the guidance's own requests, whose answers nobody waits for.
 const OWN: u8 = u8::MAX;
-
-/// Result of the guidance in a tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct GuidanceResult {
-    /// The flight mode.
-    pub mode: FlightMode,
-    /// Setpoint for the flight core; none without a state.
-    pub setpoint: Option<Setpoint>,
-    /// Ticket of an order and the answer to it.
-    pub answer: Option<(u8, Result<(), OrderRefusal>)>,
-    /// Number of the mission's item that it wants, and flies in mode [`FlightMode::Mission`].
-    pub wanted: u16,
-    /// Number of the mission's item that was reached in this tick.
-    pub reached: Option<u16>,
-    /// Home in the local frame, once there is one \[m\].
-    pub home_m: Option<Vector3<f32>>,
-    /// True if the vehicle is armed and in the air.
-    pub airborne: bool,
-    /// True if the safety net has taken over.
-    pub failsafe: bool,
-    /// Announcements of this tick.
-    pub notices: Notices,
-    /// Charge of the battery, 0 to 1.
-    pub charge: Option<f32>,
-    /// True while it flies a circle that was ordered.
-    pub orbits: bool,
-}
 
 /// The guidance of a vehicle, and what it knows of it.
 #[derive(Clone, Debug)]
@@ -92,7 +63,7 @@ impl Guide {
 
     /// Runs a tick: takes the oldest order, and puts setpoint and requests into the flight core's inbox.
     #[inline(always)]
-    pub(crate) fn tick(&mut self, now_us: u64, inputs: &mut ControlInputs, core: &Core<'_>) -> GuidanceResult {
+    pub(crate) fn tick(&mut self, now_us: u64, inputs: &mut ControlInputs, core: &Core<'_>) -> Guided {
         let ControlInputs { inbox, orders, battery, .. } = inputs;
         let fresh = inbox.state().filter(|state| state.age_us(now_us) <= COAST_US);
         let state = fresh.map(|state| &state.value).or(core.observed);
@@ -118,7 +89,7 @@ impl Guide {
         }
         inbox.set_idle_on_ground(guided.idle_on_ground);
         inbox.command_rates(self.guidance.rates());
-        inbox.inhibit(guided.against);
+        inbox.inhibit(self.guidance.against());
         if let Some(request) = guided.request {
             // A station's request goes first.
             if inbox.asked().is_none() {
@@ -128,18 +99,6 @@ impl Guide {
         if guided.answer.is_some() {
             inputs.orders.given.pop_front();
         }
-        GuidanceResult {
-            mode: guided.mode,
-            setpoint: guided.setpoint,
-            answer: guided.answer,
-            wanted: guided.wanted,
-            reached: guided.reached,
-            home_m: guided.home_m,
-            airborne: core.airborne,
-            failsafe: guided.failsafe.is_some(),
-            notices: guided.notices,
-            charge: guided.charge,
-            orbits: guided.orbits,
-        }
+        guided
     }
 }

@@ -60,7 +60,7 @@ impl Indication {
     pub fn of<const N: usize>(report: &Report<N>) -> Self {
         let clock_failed = report.health.rate.clock_failed;
         if report.mode.armed() {
-            let takes_over = report.mode != Mode::Flying || report.health.observed || report.guided.failsafe;
+            let takes_over = report.mode != Mode::Flying || report.health.observed || report.guided.failsafe.is_some();
             return if takes_over || clock_failed { Indication::Failsafe } else { Indication::Armed };
         }
         let broken = [Refusal::SensorFailed, Refusal::Unhealthy].iter().any(|reason| report.against.contains(*reason));
@@ -117,6 +117,7 @@ mod tests {
     use crate::control_inputs::ControlInputs;
     use crate::flight::Flight;
     use crate::readings::Readings;
+    use afbc_guidance::notice::Cause;
     use std::string::String;
     use std::vec::Vec;
 
@@ -151,9 +152,9 @@ mod tests {
         // Armed: what speaks against arming does not matter, nor the time.
         (report.against, report.time_us) = (Refusal::AlreadyArmed.into(), 1_000);
         assert_eq!(Indication::of(&report), Indication::Armed);
-        report.guided.failsafe = true;
+        report.guided.failsafe = Some(Cause::Station);
         assert_eq!(Indication::of(&report), Indication::Failsafe);
-        report.guided.failsafe = false;
+        report.guided.failsafe = None;
         for mode in [Mode::Coasting, Mode::Descending] {
             report.mode = mode;
             assert_eq!(Indication::of(&report), Indication::Failsafe, "{mode:?}");

@@ -48,7 +48,6 @@ pub use esc_telemetry::EscTelemetry;
 pub use flight::{Flight, Prepare, Prepared, Report};
 pub use flight_view::FlightView;
 pub use front_end::{EstimatorFrontEnd, tracker_aid};
-pub use guided::GuidanceResult;
 pub use imu_lanes::OtherSensors;
 pub use imu_selector::{ImuPair, ImuSelector};
 pub use law::FlightLaw;

@@ -43,7 +43,7 @@ impl Failsafes {
             (*ended == Some(EndReason::StateLost)).then_some(STATE_LOST),
             (*ended == Some(EndReason::Tumbled)).then_some(TUMBLED),
         ];
-        let failsafe = given_up || health.observed || report.guided.failsafe;
+        let failsafe = given_up || health.observed || report.guided.failsafe.is_some();
         if matches!(mode, Mode::Coasting | Mode::Descending) || failsafe {
             self.last = Some(tick);
         }

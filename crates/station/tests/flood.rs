@@ -5,13 +5,13 @@
 
 use afbc_flight_core::inbox::QUEUE_MAX;
 use afbc_flight_core::{Refusal, Request, Ticketed};
-use afbc_guidance::{FlightMode, Order, OrderRefusal};
+use afbc_guidance::{FlightMode, Guided, Order, OrderRefusal};
 use afbc_link::{
     Address, Answer, Command, ControlRequest, Counters, Decoder, Downlink, ExternalTarget, FRAME_MAX, Key, Message,
     Mission, ParameterRequest, SIGNED_FRAME_MAX, Sender, SetupSigning, Stamp, Uplink,
 };
 use afbc_onboard::parameters::ParameterTable;
-use afbc_onboard::{Configuration, ControlInputs, Flight, GuidanceResult, Readings, Report};
+use afbc_onboard::{Configuration, ControlInputs, Flight, Readings, Report};
 use afbc_station::services::control::{SILENT_US, is_needed_for};
 use afbc_station::services::origin::EarthOrigin;
 use afbc_station::{AuxSensors, Comms, REPORT_MAX};
@@ -212,12 +212,12 @@ fn every_command_is_answered_once_to_its_sender() {
             let declined = random.of(&[OrderRefusal::NotArmed, OrderRefusal::NoTargets, OrderRefusal::OutOfRange]);
             (order.ticket, if random.below(2) == 0 { Ok(()) } else { Err(declined) })
         });
-        let guided = GuidanceResult {
+        let guided = Guided {
             mode: random.of(&FlightMode::ALL),
             answer: ordered,
             wanted: random.below(4) as u16,
             reached: (random.below(50) == 0).then(|| random.below(4) as u16),
-            ..GuidanceResult::default()
+            ..Guided::default()
         };
         let estimate = (random.below(2) == 0).then(State::default);
         let report = Report { answer, guided, estimate, ..idle };

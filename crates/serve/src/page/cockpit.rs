@@ -112,7 +112,7 @@ impl Cockpit {
             airborne: guided.is_some_and(|guided| guided.airborne),
             core: report.map_or("disarmed", |report| core_name(report.mode)),
             mode: guided.map_or("", |guided| guided.mode.name()),
-            failsafe: guided.is_some_and(|guided| guided.failsafe),
+            failsafe: guided.is_some_and(|guided| guided.failsafe.is_some()),
             law: vehicle.law().name(),
             fallback: report.and_then(|report| report.health.control.fallback),
             truth: outlook::truth(&vehicle.world().plant().motion()),

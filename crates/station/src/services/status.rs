@@ -3,9 +3,9 @@
 use crate::services::origin::EarthOrigin;
 use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::{Mode, Reasons, TickHealth};
-use afbc_guidance::FlightMode;
+use afbc_guidance::{FlightMode, Guided};
 use afbc_link::telemetry::BatteryStatus;
-use afbc_onboard::{EscTelemetry, GuidanceResult, Report};
+use afbc_onboard::{EscTelemetry, Report};
 use afbc_radio::Channels;
 use afbc_types::{ROTORS_MAX, State};
 
@@ -59,7 +59,7 @@ pub struct VehicleStatus {
     /// Mode of the flight core.
     pub mode: Mode,
     /// What the guidance decided.
-    pub guided: GuidanceResult,
+    pub guided: Guided,
     /// The newest state, its own or the link's.
     pub state: Option<State>,
     /// True if the vehicle has an inertial sensor.

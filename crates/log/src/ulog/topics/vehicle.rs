@@ -39,7 +39,7 @@ impl VehicleState {
             arming_state: if report.mode.armed() { ARMED } else { STANDBY },
             nav_state: nav_state(report.mode, report.guided.mode),
             vehicle_type: ROTARY_WING,
-            failsafe: report.guided.failsafe || report.mode == Mode::Descending,
+            failsafe: report.guided.failsafe.is_some() || report.mode == Mode::Descending,
             system_type: match moment.known.rotors {
                 // MAV_TYPE has no number for five or seven rotors.
                 6 => 13,
