@@ -12,9 +12,9 @@ use crate::recording::{self, ExactLog};
 use crate::samples::{self, Sampler as _};
 use crate::self_tests;
 use crate::ticks::{self, Tick};
-use crate::vehicle::ParameterTable;
+use crate::vehicle::{ParameterTable, ROTORS};
 use afbc_onboard::parameters::RecordChange;
-use afbc_onboard::{ControlInputs, EscTelemetry};
+use afbc_onboard::{ControlInputs, EscTelemetry, TickRecord};
 pub use afbc_station::Comms;
 use afbc_station::services::imus::{self, ImuNews};
 use afbc_station::services::signing::Signing;
@@ -99,6 +99,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
     let mut outgoing = Vec::<u8, REPORT_MAX>::new();
     let mut leaving = 0;
     let mut calibrator = B::Sampler::SENSES.then(calibrator);
+    let mut details = if recording::is_possible::<B>() { ticks::details_out() } else { None };
     let mut esc_reports = (B::ESCS || B::ANSWERS).then(|| escs::reports(table));
     loop {
         match select(receive(links, &mut incoming), ticks::next()).await {
@@ -179,7 +180,14 @@ pub async fn run<B: Board, const OTHERS: usize>(
                     radio.send(comms, &tick, links, table);
                 }
                 if recording::is_possible::<B>() {
-                    record::<B>(log, black_box, table, comms.esc_telemetry());
+                    if tick.is_detailed
+                        && let Some(queue) = &mut details
+                        && let Some(details) = queue.try_receive()
+                    {
+                        let tick = TickRecord { report: &tick.report, details };
+                        record::<B>(&tick, log, black_box, table, comms.esc_telemetry());
+                        queue.receive_done();
+                    }
                     if let Some(log) = log {
                         log.send(&tick, links);
                     }
@@ -253,22 +261,21 @@ fn pass_on<B: Board>(news: &ControlInputs, log: &mut Option<&'static mut ExactLo
     }
 }
 
-/// Writes what ticks have left for exact log and black box.
+/// Writes a tick into exact log and black box.
 fn record<B: Board>(
+    tick: &TickRecord<'_, ROTORS>,
     log: &mut Option<&'static mut ExactLog>,
     black_box: &mut Option<&'static mut LinkLog>,
     table: &ParameterTable,
     escs: &EscTelemetry,
 ) {
-    while let Some(tick) = recording::pop() {
-        if let Some(log) = log {
-            log.tick(&tick);
-        }
-        if B::HAS_LOG
-            && let Some(black_box) = black_box
-        {
-            black_box.tick(&tick, table, escs);
-        }
+    if let Some(log) = log {
+        log.tick(tick);
+    }
+    if B::HAS_LOG
+        && let Some(black_box) = black_box
+    {
+        black_box.tick(tick, table, escs);
     }
 }
 

@@ -2,14 +2,14 @@
 
 use crate::board::Board;
 use crate::escs;
-use crate::logging::{self, TickViews};
-use crate::recording::{self, RecordedTick};
+use crate::logging;
+use crate::recording;
 use crate::samples::{self, Sampler as _};
 use crate::ticks::{self, Tick};
 use crate::time::{self, Stopwatch};
 use crate::vehicle::{Configuration, Flight, Prepared, Report};
-use afbc_log::ulog::TakenInputs;
-use afbc_onboard::{ControlInputs, Readings};
+use afbc_onboard::{ControlInputs, TickDetails, TickInputs};
+use afbc_types::{Pose, Stamped};
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
@@ -83,51 +83,65 @@ pub fn make(configuration: &Configuration) -> &'static mut Flight {
 
 /// Runs the ticks.
 pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
-    let (mut inputs, mut readings, mut seen) = (ControlInputs::EMPTY, Readings::NONE, Seen::default());
-    let (mut adopted, mut notch_rad_s) = (None, None);
-    let mut views = if B::HAS_LOG { TickViews::take() } else { None };
+    let (mut messages, mut inputs, mut pose) = (ControlInputs::EMPTY, TickInputs::default(), None);
+    let mut details = if recording::is_possible::<B>() { ticks::details_in() } else { None };
     loop {
         // Not a ticker, whose periods begin when it is created: just after the start of a control period, when alarms
         // are due, it would tick twice in every second period.
         Timer::at(time::next_period()).await;
         let stopwatch = Stopwatch::start();
-        let report = tick(flight, &mut inputs, &mut readings, &mut seen, board);
-        let is_logged = B::HAS_LOG && logging::is_wanted();
-        if recording::is_possible::<B>() && (recording::records() || is_logged) {
-            let Seen { number, clock_failed, taken } = seen;
-            if is_logged && let Some(views) = &mut views {
-                views.push(number, report.time_us, &taken, flight);
+        let report = tick(flight, &mut messages, &mut inputs, &mut pose, board);
+        let mut is_detailed = false;
+        if recording::is_possible::<B>()
+            && (recording::records() || B::HAS_LOG && logging::is_wanted())
+            && let Some(slot) = details.as_mut().and_then(|details| details.try_send())
+        {
+            (inputs.time_us, inputs.battery, is_detailed) = (report.time_us, messages.battery, true);
+            if B::HAS_LOG {
+                write_details(slot, flight, &inputs, pose, &messages);
+            } else {
+                // The exact log has no more of them: what tells the rest is not in the image.
+                slot.inputs = inputs;
             }
-            let battery = inputs.battery;
-            recording::push(&RecordedTick { number, clock_failed, adopted, notch_rad_s, readings, battery, report });
         }
         if B::Sampler::IS_REDUNDANT {
-            samples::cross_check(flight, &readings);
+            samples::cross_check(flight, &inputs.readings);
         }
-        (adopted, notch_rad_s) = (None, None);
+        if recording::is_possible::<B>() {
+            (inputs.adopted, inputs.notch_rad_s) = (None, None);
+        }
         if B::ESCS {
-            notch_rad_s = move_notch(flight);
+            inputs.notch_rad_s = move_notch(flight);
         }
         ARMED.store(report.mode.armed(), Ordering::Relaxed);
         if !report.mode.armed() {
-            adopted = adopt(flight);
+            inputs.adopted = adopt(flight);
         }
         let cycles = stopwatch.cycles(B::CORE_HZ);
         CYCLES.store(cycles, Ordering::Relaxed);
         CYCLES_MAX.fetch_max(cycles, Ordering::Relaxed);
-        ticks::push(Tick { report, cycles });
+        let is_queued = ticks::push(Tick { report, cycles, is_detailed });
+        // Of a tick that is not queued, the next one takes the place.
+        if is_queued
+            && is_detailed
+            && let Some(details) = &mut details
+        {
+            details.send_done();
+        }
     }
 }
 
-/// What a tick saw that is recorded only, by boards that record.
-#[derive(Clone, Copy, Default)]
-struct Seen {
-    /// Number of the tick.
-    number: u32,
-    /// True if its clock was not trusted.
-    clock_failed: bool,
-    /// What messages had brought for it.
-    taken: TakenInputs,
+/// Writes down what logs have of a tick beside its report. Out of line, since only boards that keep logs do.
+#[cold]
+#[inline(never)]
+fn write_details(
+    slot: &mut TickDetails,
+    flight: &Flight,
+    inputs: &TickInputs,
+    pose: Option<Stamped<Pose>>,
+    messages: &ControlInputs,
+) {
+    *slot = flight.details(inputs, pose, messages);
 }
 
 /// Moves the notch, if it is to be moved; returns where to \[rad/s\]. Out of line, as below.
@@ -157,9 +171,9 @@ fn adopt(flight: &mut Flight) -> Option<u16> {
 #[inline(never)]
 fn tick<B: Board>(
     flight: &mut Flight,
-    inputs: &mut ControlInputs,
-    readings: &mut Readings,
-    seen: &mut Seen,
+    messages: &mut ControlInputs,
+    inputs: &mut TickInputs,
+    pose: &mut Option<Stamped<Pose>>,
     board: &mut B,
 ) -> Report {
     let now_us = Instant::now().as_micros();
@@ -167,32 +181,33 @@ fn tick<B: Board>(
     MAIL.lock(|shared| {
         let Ok(mut shared) = shared.try_borrow_mut() else { return };
         let (mail, next) = &mut *shared;
-        mail.take_into(inputs);
+        mail.take_into(messages);
         if recording::is_possible::<B>() {
             // In place: returned beside the report, it would cost the tick a copy of that.
-            seen.number = *next;
+            inputs.number = *next;
             *next = next.wrapping_add(1);
         }
     });
 
     if B::HAS_LOG && logging::is_wanted() {
-        seen.taken = TakenInputs::of(inputs);
+        // The tick hands it over.
+        *pose = messages.inbox.pose().copied();
     }
     let clock_failed = board.clock_has_failed();
     if recording::is_possible::<B>() {
-        seen.clock_failed = clock_failed;
+        inputs.clock_failed = clock_failed;
     }
     // Flown on, by a clock that is off by up to 1 %; the vehicle is not armed again.
     if clock_failed {
         flight.distrust_clock();
     }
     if B::Sampler::SENSES {
-        samples::take(now_us, readings);
+        samples::take(now_us, &mut inputs.readings);
     } else {
         // So that the compiler leaves out what only sensors need.
-        readings.clear();
+        inputs.readings.clear();
     }
-    let report = flight.tick(now_us, inputs, readings);
+    let report = flight.tick(now_us, messages, &inputs.readings);
 
     board.drive(report.throttles);
     // A reset restarts a failed task, once it does not end a flight.

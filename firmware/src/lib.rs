@@ -114,6 +114,9 @@ fn read<B: Board>(
     // On one link, the pilot goes before the log.
     let is_free = radio::leaves_log::<B>(&table);
     let log = if recording::is_possible::<B>() && is_free { recording::ExactLog::begin::<B>(&table) } else { None };
+    if recording::is_possible::<B>() {
+        ticks::keep_details();
+    }
     let (black_box, blocks) = if B::HAS_LOG { Some(logging::LinkLog::begin::<B>()) } else { None }.unzip();
     (kept, comms::make::<B>(table, signing, log, radio, black_box), blocks)
 }

@@ -3,20 +3,16 @@
 
 use crate::aux_sensors;
 use crate::board::Board;
-use crate::recording::RecordedTick;
-use crate::vehicle::{Flight, NAME, ParameterTable};
+use crate::vehicle::{NAME, ParameterTable, ROTORS};
 use afbc_log::storage::{
     BlockSink, KeptLogs, LogBlock, LogKeeper, LogPage, LogPages, LogQuery, LogWriter, StorageState,
 };
-use afbc_log::ulog::{LogStart, LoggedTick, TakenInputs};
+use afbc_log::ulog::{BesideTick, LogStart};
 use afbc_onboard::parameters::RecordChange;
-use afbc_onboard::{ControlInputs, EscTelemetry, FlightView};
+use afbc_onboard::{EscTelemetry, TickRecord};
 use afbc_station::{Comms, LogServer, REPORT_MAX};
-use core::array;
-use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use embassy_futures::select::{Either3, select3};
-use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_sync::zerocopy_channel::{Channel, Receiver, Sender};
@@ -26,8 +22,6 @@ use static_cell::StaticCell;
 
 /// Blocks that wait, at most: of a log of 140 kB/s those of 43 ms.
 const BLOCKS: usize = 12;
-/// Ticks whose views wait for the links' task, at most.
-const VIEWS: usize = 3;
 /// Time between two looks at a storage without a log \[us\].
 const LOOK_US: u64 = 100_000;
 /// The control period \[us\].
@@ -50,24 +44,6 @@ impl LogKeeper for NoLog {
     fn answer(&mut self, _: u64, _: LogQuery, _: &mut LogPage) {}
 }
 
-/// What only the black box takes of a tick.
-#[derive(Clone)]
-pub struct TickView {
-    number: u32,
-    taken: TakenInputs,
-    view: FlightView,
-}
-
-impl TickView {
-    /// Of no tick. Out of line, so that it is in the image once.
-    #[inline(never)]
-    fn empty() -> Self {
-        TickView { number: 0, taken: TakenInputs::of(&ControlInputs::EMPTY), view: FlightView::default() }
-    }
-}
-
-type Views = Channel<'static, CriticalSectionRawMutex, TickView>;
-type ViewSender = Sender<'static, CriticalSectionRawMutex, TickView>;
 type Blocks = Channel<'static, CriticalSectionRawMutex, LogBlock>;
 
 /// What the log's task has of the links': blocks to be kept, and where it puts what is asked of the logs.
@@ -80,8 +56,6 @@ static WANTED: AtomicBool = AtomicBool::new(false);
 static STORAGE: AtomicU8 = AtomicU8::new(StorageState::Unknown as u8);
 /// What is asked of the logs that are kept.
 static ASKED: Signal<CriticalSectionRawMutex, LogQuery> = Signal::new();
-/// The control task's end of the views.
-static SENDER: Mutex<CriticalSectionRawMutex, RefCell<Option<ViewSender>>> = Mutex::new(RefCell::new(None));
 
 /// True if there is a log to be written.
 pub(crate) fn is_wanted() -> bool {
@@ -90,27 +64,6 @@ pub(crate) fn is_wanted() -> bool {
 
 fn storage() -> StorageState {
     StorageState::of(STORAGE.load(Ordering::Relaxed))
-}
-
-/// The control task's part.
-pub(crate) struct TickViews(ViewSender);
-
-impl TickViews {
-    /// Returns it, to be called once; none if there is no log.
-    pub(crate) fn take() -> Option<Self> {
-        SENDER.lock(|sender| sender.try_borrow_mut().ok()?.take()).map(TickViews)
-    }
-
-    /// Passes on what the flight knows after a tick. Out of line, since only boards that keep logs do.
-    #[cold]
-    #[inline(never)]
-    pub(crate) fn push(&mut self, number: u32, now_us: u64, taken: &TakenInputs, flight: &Flight) {
-        // Written in place, with interrupts on.
-        if let Some(slot) = self.0.try_send() {
-            *slot = TickView { number, taken: *taken, view: flight.view(now_us) };
-            self.0.send_done();
-        }
-    }
 }
 
 struct Queue(Sender<'static, CriticalSectionRawMutex, LogBlock>);
@@ -148,7 +101,6 @@ pub struct LinkLog {
     stored: KeptLogs<Pages>,
     writer: LogWriter,
     queue: Queue,
-    views: Receiver<'static, CriticalSectionRawMutex, TickView>,
     hardware: &'static str,
 }
 
@@ -158,14 +110,9 @@ impl LinkLog {
     pub(crate) fn begin<B: Board>() -> (&'static mut Self, LogEnds) {
         static LOG: StaticCell<LinkLog> = StaticCell::new();
         static BLOCKS_HELD: StaticCell<[LogBlock; BLOCKS]> = StaticCell::new();
-        static VIEWS_HELD: StaticCell<[TickView; VIEWS]> = StaticCell::new();
         static BLOCK_CHANNEL: StaticCell<Blocks> = StaticCell::new();
-        static VIEW_CHANNEL: StaticCell<Views> = StaticCell::new();
         static PAGE: StaticCell<[LogPage; 1]> = StaticCell::new();
         static PAGE_CHANNEL: StaticCell<Channel<'static, CriticalSectionRawMutex, LogPage>> = StaticCell::new();
-        let views = VIEWS_HELD.init_with(|| array::from_fn(|_| TickView::empty()));
-        let (sender, views) = VIEW_CHANNEL.init_with(|| Channel::new(views)).split();
-        SENDER.lock(|place| place.try_borrow_mut().ok().map(|mut place| *place = Some(sender)));
         let blocks = BLOCKS_HELD.init_with(|| [const { LogBlock::EMPTY }; BLOCKS]);
         let (pages, page) = PAGE_CHANNEL.init_with(|| Channel::new(PAGE.init_with(|| [LogPage::EMPTY]))).split();
         let (queue, blocks) = BLOCK_CHANNEL.init_with(|| Channel::new(blocks)).split();
@@ -174,7 +121,6 @@ impl LinkLog {
             stored: KeptLogs::new(Pages(page)),
             writer: LogWriter::new(B::SMALL_LOGS),
             queue: Queue(queue),
-            views,
             hardware: B::HARDWARE,
         });
         (log, LogEnds { blocks, pages })
@@ -196,28 +142,10 @@ impl LinkLog {
 
     /// Writes a tick.
     #[inline(never)]
-    pub(crate) fn tick(&mut self, tick: &RecordedTick, table: &ParameterTable, escs: &EscTelemetry) {
-        let LinkLog { writer, views, hardware, .. } = self;
-        let RecordedTick { number, ref readings, ref report, .. } = *tick;
-        // Ticks and views are matched by number, since either queue drops what it has no room for.
-        while let Some(view) = views.try_receive() {
-            // Of a tick that was dropped here.
-            let is_older = view.number.wrapping_sub(number) > u32::MAX / 2;
-            if view.number == number {
-                let origin = aux_sensors::frame_origin();
-                let start = LogStart { vehicle: NAME, law: LAW, hardware, ..LogStart::default() };
-                let tick =
-                    LoggedTick { report, readings, taken: view.taken, view: &view.view, escs: Some(escs), origin };
-                writer.tick(&tick, table, &start, storage(), PERIOD_US);
-            }
-            if view.number == number || is_older {
-                views.receive_done();
-            }
-            // A newer one is of a tick that is still to come here.
-            if !is_older {
-                return;
-            }
-        }
+    pub(crate) fn tick(&mut self, tick: &TickRecord<'_, ROTORS>, table: &ParameterTable, escs: &EscTelemetry) {
+        let beside = BesideTick { escs: Some(escs), origin: aux_sensors::frame_origin() };
+        let start = LogStart { vehicle: NAME, law: LAW, hardware: self.hardware, ..LogStart::default() };
+        self.writer.tick((tick, &beside), table, &start, storage(), PERIOD_US);
     }
 
     /// Writes a change of the parameters.

@@ -1,58 +1,20 @@
-//! What ticks took and gave, from the control task to the links' task, for the exact log ([`afbc_log::exact`]) and the
-//! black box ([`crate::logging`]). Nothing is kept unless one of them is written.
+//! The exact log ([`afbc_log::exact`]) on one of the links.
 
 use crate::board::{Board, Links, Transmitter};
 use crate::samples::Sampler;
 use crate::ticks::Tick;
-use crate::vehicle::{NAME, ParameterTable, Report};
-use afbc_guidance::BatteryReading;
-use afbc_log::exact::{Given, RecordQueue, TickRecord};
+use crate::vehicle::{NAME, ParameterTable, ROTORS};
+use afbc_log::exact::RecordQueue;
 use afbc_onboard::parameters::RecordChange;
-use afbc_onboard::{ControlInputs, Readings};
-use core::cell::RefCell;
+use afbc_onboard::{ControlInputs, TickRecord};
 use core::sync::atomic::{AtomicBool, Ordering};
-use embassy_sync::blocking_mutex::Mutex;
-use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use heapless::Deque;
 use static_cell::StaticCell;
 
-/// Ticks that wait, at most; further ones are missing in the log.
-const WAITING: usize = 8;
-
-/// A tick for the log.
-#[derive(Clone, Copy)]
-pub struct RecordedTick {
-    /// Its number.
-    pub number: u32,
-    /// True if its clock was not trusted.
-    pub clock_failed: bool,
-    /// Number of the configuration that it was the first to fly, if any.
-    pub adopted: Option<u16>,
-    /// Rotor speed at which the notch stands from it on, if it has moved \[rad/s\].
-    pub notch_rad_s: Option<f32>,
-    /// What it took of the sensors.
-    pub readings: Readings,
-    /// What it took of the battery.
-    pub battery: Option<BatteryReading>,
-    /// What it gave.
-    pub report: Report,
-}
-
 static RECORDS: AtomicBool = AtomicBool::new(false);
-static TICKS: Mutex<CriticalSectionRawMutex, RefCell<Deque<RecordedTick, WAITING>>> =
-    Mutex::new(RefCell::new(Deque::new()));
 
-/// True if ticks are kept for the exact log.
+/// True if the exact log is written.
 pub fn records() -> bool {
     RECORDS.load(Ordering::Relaxed)
-}
-
-/// Keeps a tick. Out of line, since few vehicles do.
-#[cold]
-#[inline(never)]
-pub fn push(tick: &RecordedTick) {
-    // Not borrowed elsewhere while it is locked; no panic in any case.
-    let _ = TICKS.lock(|ticks| ticks.try_borrow_mut().ok().map(|mut ticks| ticks.push_back(*tick).is_ok()));
 }
 
 /// True if a board may keep an exact log: it has sensors, and a link to spare. Others have none of it.
@@ -106,10 +68,8 @@ impl ExactLog {
 
     /// Records a tick.
     #[inline(never)]
-    pub fn tick(&mut self, tick: &RecordedTick) {
-        let RecordedTick { number, clock_failed, adopted, notch_rad_s, readings, battery, report } = *tick;
-        let (time_us, given) = (report.time_us, Given::of(&report));
-        self.queue.tick(&TickRecord { number, time_us, clock_failed, readings, battery, adopted, notch_rad_s, given });
+    pub fn tick(&mut self, tick: &TickRecord<'_, ROTORS>) {
+        self.queue.tick(tick);
     }
 
     /// Sends what is recorded, as far as the link takes it.
@@ -125,9 +85,4 @@ impl ExactLog {
     pub fn link(&self) -> usize {
         self.link
     }
-}
-
-/// Returns the oldest tick that is kept.
-pub fn pop() -> Option<RecordedTick> {
-    TICKS.lock(|ticks| ticks.try_borrow_mut().ok()?.pop_front())
 }

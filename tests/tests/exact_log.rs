@@ -4,7 +4,7 @@ use crate::exact_flights::{SCENARIO, fly, fly_with, log_of, records};
 use afbc::Profile;
 use afbc_files::read::FileError;
 use afbc_hil::Host;
-use afbc_log::exact::{Given, Record, TickRecord};
+use afbc_log::exact::{Given, Record};
 use afbc_onboard::Configuration;
 use afbc_replay::exact::{
     ChangeComparison, ExactReplay, FirstDifference, GivenSignal, QUANTITIES, ReplayFinding, SettingChange, replay,
@@ -59,10 +59,8 @@ fn it_says_what_is_in_the_log() {
     assert_eq!((found.vehicle.as_str(), found.law.as_str(), found.rotors), ("paper", "afbc", 4));
     assert_eq!((found.ticks, found.same_ticks, found.starts, found.lost_ticks), (13_000, 13_000, 1, 0));
     let read_records = records(&LOG);
-    let ticks = |of: fn(&TickRecord) -> bool| {
-        read_records.iter().filter(|record| matches!(record, Record::Tick(tick) if of(tick))).count() as u64
-    };
-    assert_eq!(found.armed_ticks, ticks(|tick| tick.given.throttles[0] > 0));
+    let armed = |record: &&Record| matches!(record, Record::Tick(_, given) if given.throttles[0] > 0);
+    assert_eq!(found.armed_ticks, read_records.iter().filter(armed).count() as u64);
     assert!(found.armed_ticks > 1_000 && found.flights >= 1 && found.is_same());
     let changed = read_records.iter().filter(|record| matches!(record, Record::Parameter { .. })).count();
     assert!(changed > 0 && found.parameters.len() == changed);
@@ -151,12 +149,12 @@ fn a_bit_of_an_input_is_named_at_its_tick() {
     for _ in 0..8 {
         let at = loop {
             let at = random.next_u32() as usize % whole.len();
-            if matches!(&whole[at], Record::Tick(tick) if tick.readings.imu.is_some() && tick.number > 2_000) {
+            if matches!(&whole[at], Record::Tick(tick, _) if tick.readings.imu.is_some() && tick.number > 2_000) {
                 break at;
             }
         };
         let mut changed = whole.clone();
-        let Record::Tick(tick) = &mut changed[at] else { panic!("a tick") };
+        let Record::Tick(tick, _) = &mut changed[at] else { panic!("a tick") };
         // Lower bits are left out, since rounding of the velocity may hide them.
         let (number, bit) = (tick.number, random.next_u32() % 15 + 8);
         let [_, force] = &mut tick.readings.imu.as_mut().unwrap().value;
@@ -169,7 +167,7 @@ fn a_bit_of_an_input_is_named_at_its_tick() {
         assert!((number..number + 3).contains(tick), "bit {bit}: {tick} instead of {number}");
         assert!(signals.contains(&GivenSignal::Estimate), "{signals:?}");
         // The reported byte is the position of the tick's frame.
-        let before = changed.iter().take_while(|record| !matches!(record, Record::Tick(it) if it.number == *tick));
+        let before = changed.iter().take_while(|record| !matches!(record, Record::Tick(it, _) if it.number == *tick));
         assert_eq!(*byte, log_of(&before.cloned().collect::<Vec<_>>()).len());
         let said = problem(&ReplayedLog { name: "input", replay: &found }).unwrap();
         assert!(said.contains(&format!("tick {tick}")) && said.contains("the estimate"), "{said}");
@@ -184,11 +182,11 @@ fn each_signal_is_named() {
     let names = ["mode", "the estimate", "the rotor speeds", "throttle 3"];
     for (change, name) in changes.into_iter().zip(names) {
         let mut changed = records(&LOG);
-        let tick = changed.iter_mut().find_map(|record| match record {
-            Record::Tick(tick) if tick.number == 4_321 => Some(tick),
+        let given = changed.iter_mut().find_map(|record| match record {
+            Record::Tick(tick, given) if tick.number == 4_321 => Some(given),
             _ => None,
         });
-        change(&mut tick.unwrap().given);
+        change(given.unwrap());
         let found = read("signal", &log_of(&changed), &[]).unwrap();
         assert_eq!(found.same_ticks, 4_321);
         let said = problem(&ReplayedLog { name: "signal", replay: &found }).unwrap();

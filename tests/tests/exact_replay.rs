@@ -44,12 +44,12 @@ fn what_differs_is_named() {
     for _ in 0..30 {
         let at = loop {
             let at = random.next_u32() as usize % whole.len();
-            if matches!(&whole[at], Record::Tick(tick) if tick.readings.imu.is_some() && tick.number > 2_000) {
+            if matches!(&whole[at], Record::Tick(tick, _) if tick.readings.imu.is_some() && tick.number > 2_000) {
                 break at;
             }
         };
         let mut changed = whole.clone();
-        let Record::Tick(tick) = &mut changed[at] else { panic!("a tick") };
+        let Record::Tick(tick, given) = &mut changed[at] else { panic!("a tick") };
         let number = tick.number;
         match random.next_u32() % 3 {
             0 => {
@@ -60,7 +60,7 @@ fn what_differs_is_named() {
                 assert!(matches!(difference, Some(ReplayDifference::Given { .. })), "{difference:?}");
             }
             1 => {
-                tick.given.throttles[random.next_u32() as usize % 4] ^= 1 << (random.next_u32() % 11);
+                given.throttles[random.next_u32() as usize % 4] ^= 1 << (random.next_u32() % 11);
                 let (ticks, difference) = replay(&log_of(&changed));
                 assert_eq!(ticks, number);
                 let named =
@@ -83,7 +83,7 @@ fn a_battery_counts() {
     let full = replay(&log_of(&changed));
     assert_eq!(full, (40_000, None));
     for record in &mut changed {
-        if let Record::Tick(tick) = record
+        if let Record::Tick(tick, _) = record
             && tick.number >= 10_000
         {
             tick.battery.as_mut().unwrap().voltage_v = 7.0;

@@ -371,7 +371,7 @@ fn flies_and_replays(listens: (&str, i32)) {
 
     let mut frames = Frames::default();
     let records: Vec<_> = bytes.borrow().iter().filter_map(|byte| frames.take(*byte)).collect();
-    let moved = |record: &&Record| matches!(record, Record::Tick(tick) if tick.notch_rad_s.is_some());
+    let moved = |record: &&Record| matches!(record, Record::Tick(tick, _) if tick.notch_rad_s.is_some());
     assert!(records.iter().filter(moved).count() > 10);
 
     let replay = |changed: &dyn Fn(u32) -> f32| {
@@ -379,7 +379,7 @@ fn flies_and_replays(listens: (&str, i32)) {
         let mut same = 0;
         for record in &records {
             let mut record = record.clone();
-            if let Record::Tick(tick) = &mut record {
+            if let Record::Tick(tick, _) = &mut record {
                 tick.notch_rad_s = tick.notch_rad_s.map(|notch| notch + changed(tick.number));
             }
             match replayer.take(&record) {
@@ -392,7 +392,7 @@ fn flies_and_replays(listens: (&str, i32)) {
     };
     assert_eq!(replay(&|_| 0.0), flier.ms);
     let last = records.iter().rev().find(moved).unwrap();
-    let Record::Tick(last) = last else { unreachable!() };
+    let Record::Tick(last, _) = last else { unreachable!() };
     let differs = replay(&|number| if number == last.number { 1.0 } else { 0.0 });
     assert!((u64::from(last.number)..u64::from(last.number) + 100).contains(&differs), "{differs} {}", last.number);
 }

@@ -5,24 +5,21 @@ use crate::metadata::MetadataFiles;
 use afbc::AdaptiveEstimate;
 use afbc_calibration::RawSample;
 use afbc_log::exact::Recorder;
-use afbc_log::ulog::{BlackBox, LogStart, TakenInputs};
+use afbc_log::ulog::{BlackBox, LogStart};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{
-    Configuration, ControlInputs, EscTelemetry, Flight, FlightView, ImuSelector, Link, Prepare, Readings, Report,
+    Configuration, ControlInputs, EscTelemetry, Flight, ImuSelector, Link, Prepare, Readings, Report, TickDetails,
+    TickInputs, TickRecord,
 };
 use afbc_scenario::{AnyController, FlownLaw};
 use afbc_station::{Calibrator, Comms, EscAction, EscReports, EscsHeard, RadioControl};
 use afbc_store::RecordName;
-use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX};
+use afbc_types::{OutOfRange, PerAxis, Pose, ROTORS_MAX, Stamped};
 
 /// Makes the exact log, and what takes its bytes.
 pub(crate) struct ExactLog {
     pub(crate) recorder: Recorder,
     pub(crate) write: Sink,
-    /// Number of the configuration that the next tick flies, if it is another.
-    pub(crate) adopted: Option<u16>,
-    /// Where the notch stands from the next tick on, if it has moved \[rad/s\].
-    pub(crate) notch_rad_s: Option<f32>,
 }
 
 /// A vehicle with any number of rotors.
@@ -59,8 +56,8 @@ pub(crate) trait Core {
     fn metadata(&self, vehicle: &str) -> MetadataFiles;
     /// Returns name and value of every parameter.
     fn parameter_values(&self) -> Vec<(RecordName, f32)>;
-    /// Returns what is known after the tick at `now_us`.
-    fn view(&self, now_us: u64) -> FlightView;
+    /// Returns what logs have of the last tick ([`Flight::details`]).
+    fn details(&self, inputs: &TickInputs, pose: Option<Stamped<Pose>>, messages: &ControlInputs) -> TickDetails;
     /// Returns AFBC's estimates, if it flies.
     fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>>;
     /// Flies on under this law, or the image's.
@@ -70,14 +67,13 @@ pub(crate) trait Core {
     fn log(
         &self,
         black_box: &mut HostBlackBox,
-        report: &Report<ROTORS_MAX>,
-        took: (&Readings, TakenInputs),
+        tick: &TickRecord<'_, ROTORS_MAX>,
         escs: &EscTelemetry,
         change: Option<RecordChange>,
     );
 
-    /// Records the start, or a change.
-    fn record(&self, log: &mut ExactLog, names: &[String; 2], change: Option<RecordChange>);
+    /// Records the start, or a change, and returns the number of the configuration that it makes.
+    fn record(&self, log: &mut ExactLog, names: &[String; 2], change: Option<RecordChange>) -> Option<u16>;
 }
 
 /// A vehicle under a law, its parameters, and what makes it of them.
@@ -154,8 +150,8 @@ impl<const N: usize> Core for Aircraft<N> {
         self.table.iter().map(|parameter| (parameter.name, parameter.value)).collect()
     }
 
-    fn view(&self, now_us: u64) -> FlightView {
-        self.flight.view(now_us)
+    fn details(&self, inputs: &TickInputs, pose: Option<Stamped<Pose>>, messages: &ControlInputs) -> TickDetails {
+        self.flight.details(inputs, pose, messages)
     }
 
     fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>> {
@@ -172,13 +168,11 @@ impl<const N: usize> Core for Aircraft<N> {
     fn log(
         &self,
         black_box: &mut HostBlackBox,
-        report: &Report<ROTORS_MAX>,
-        (readings, taken): (&Readings, TakenInputs),
+        tick: &TickRecord<'_, ROTORS_MAX>,
         escs: &EscTelemetry,
         change: Option<RecordChange>,
     ) {
-        let view = self.flight.view(report.time_us);
-        black_box.tick(report, readings, taken, (&view, escs), &self.table);
+        black_box.tick(tick, escs, &self.table);
         if let Some(change) = change {
             black_box.change(&self.table, change);
         }
@@ -186,13 +180,16 @@ impl<const N: usize> Core for Aircraft<N> {
 
     fn record(
         &self,
-        ExactLog { recorder, write, adopted, .. }: &mut ExactLog,
+        ExactLog { recorder, write }: &mut ExactLog,
         [vehicle, law]: &[String; 2],
         change: Option<RecordChange>,
-    ) {
+    ) -> Option<u16> {
         match change {
-            None => recorder.start([vehicle, law], &self.as_built(), write),
-            Some(change) => *adopted = Some(recorder.change(&self.table, change, write)),
+            None => {
+                recorder.start([vehicle, law], &self.as_built(), write);
+                None
+            }
+            Some(change) => Some(recorder.change(&self.table, change, write)),
         }
     }
 }

@@ -12,11 +12,12 @@ use afbc_estimator::Origin;
 use afbc_files::Flash;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, MissionItem, Uplink};
-use afbc_log::exact::{Given, Recorder, TickRecord};
-use afbc_log::ulog::{LogStart, TakenInputs};
+use afbc_log::exact::Recorder;
+use afbc_log::ulog::LogStart;
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
 use afbc_onboard::{
-    Configuration, ControlInputs, Flight, FlightView, ImuSelector, Link, Prepare, RawReadings, Readings, Report,
+    Configuration, ControlInputs, Flight, ImuSelector, Link, Prepare, RawReadings, Readings, Report, TickDetails,
+    TickInputs, TickRecord,
 };
 use afbc_plant::Plant;
 use afbc_scenario::FlownLaw;
@@ -24,7 +25,7 @@ use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_station::services::signing::{Signing, SigningRecord};
 use afbc_station::{Calibrator, Comms, EscReports, EscsHeard, RadioControl, Setup, Transfers};
 use afbc_store::{RecordName, Store};
-use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX, with_rotors};
+use afbc_types::{OutOfRange, PerAxis, Pose, ROTORS_MAX, Stamped, with_rotors};
 use afbc_vehicles::Vehicle;
 
 /// The firmware without its hardware, ticked in lockstep.
@@ -33,8 +34,11 @@ pub struct Host {
     setup: Setup,
     comms: Comms,
     inputs: ControlInputs,
-    /// What the last tick took of it.
+    /// What the last tick took of it, and the tracker's pose in it, which the tick has handed over.
     taken: ControlInputs,
+    pose: Option<Stamped<Pose>>,
+    /// What the last tick took beside.
+    took: TickInputs,
     readings: Readings,
     radio: Box<RadioControl>,
     /// What has come over the motor controllers' line since the last tick.
@@ -47,9 +51,9 @@ pub struct Host {
     calibrator: Box<Calibrator>,
     /// What the sensors have read while somebody wants to know.
     raw: RawReadings,
-    time_us: u64,
-    /// Number of the next tick, and the exact log of it all, if it is kept.
-    number: u32,
+    /// What the next tick takes that is known before: its number, and what has changed since the last one.
+    next: TickInputs,
+    /// The exact log of it all, if it is kept.
     log: Option<ExactLog>,
     black_box: Option<HostBlackBox>,
     /// Where fixes of a GNSS receiver are measured from, for logs.
@@ -164,12 +168,13 @@ impl Host {
             comms: Comms::with(setup),
             inputs: ControlInputs::EMPTY,
             taken: ControlInputs::EMPTY,
+            pose: None,
+            took: TickInputs::default(),
             readings: Readings::NONE,
             radio: Box::default(),
             calibrator: Box::default(),
             raw: RawReadings::NONE,
-            time_us: 0,
-            number: 0,
+            next: TickInputs::default(),
             log: None,
             black_box: None,
             origin: None,
@@ -206,9 +211,9 @@ impl Host {
         self.comms.plan()
     }
 
-    /// Returns what is known after the last tick.
-    pub fn view(&self) -> FlightView {
-        self.flight.view(self.time_us)
+    /// Returns what logs have of the last tick.
+    pub fn details(&self) -> TickDetails {
+        self.flight.details(&self.took, self.pose, &self.taken)
     }
 
     /// Returns AFBC's estimates in this or the last flight, if it flies.
@@ -241,8 +246,7 @@ impl Host {
 
     /// Keeps an exact log ([`afbc_log::exact`]) from now on, before the first tick; `write` takes its bytes.
     pub fn record(&mut self, write: impl FnMut(&[u8]) + 'static) {
-        let mut log =
-            ExactLog { recorder: Recorder::default(), write: Box::new(write), adopted: None, notch_rad_s: None };
+        let mut log = ExactLog { recorder: Recorder::default(), write: Box::new(write) };
         self.flight.record(&mut log, &self.names, None);
         self.log = Some(log);
     }
@@ -270,8 +274,8 @@ impl Host {
     /// Takes what messages have brought.
     fn merge(&mut self, news: &ControlInputs) {
         self.inputs.merge(news);
-        if let Some(ExactLog { recorder, write, .. }) = &mut self.log {
-            recorder.inputs(self.number, news, write);
+        if let Some(ExactLog { recorder, write }) = &mut self.log {
+            recorder.inputs(self.next.number, news, write);
         }
     }
 
@@ -328,25 +332,23 @@ impl Host {
         let news = self.receive(uplink);
         self.merge(&news);
         self.inputs.take_into(&mut self.taken);
-        let readings = core::mem::take(&mut self.readings);
-        let taken = TakenInputs::of(&self.taken);
+        let (readings, battery) = (core::mem::take(&mut self.readings), self.taken.battery);
+        self.took = TickInputs { time_us, readings, battery, ..self.next };
+        self.pose = self.taken.inbox.pose().copied();
         let mut bytes = Vec::new();
         let mut send = |frame: &[u8]| bytes.extend_from_slice(frame);
         let escs = core::mem::take(&mut self.escs);
         let heard = EscsHeard { bytes: &escs, speeds_rev_min: core::mem::take(&mut self.answers_rev_min) };
         let exchange = Exchange { comms: &mut self.comms, tick_us, send: &mut send, escs: heard };
         let (report, action) = self.flight.tick(time_us, &mut self.taken, &readings, exchange);
-        if let Some(ExactLog { recorder, write, adopted, notch_rad_s }) = &mut self.log {
-            let (number, given, battery, clock_failed) = (self.number, Given::of(&report), self.taken.battery, false);
-            let (adopted, moved) = (adopted.take(), notch_rad_s.take());
-            // What this tick has moved counts from the next one on.
-            *notch_rad_s = action.notch.map(|notch| notch.centre_rad_s());
-            let notch_rad_s = moved;
-            recorder.tick(
-                &TickRecord { number, time_us, clock_failed, readings, battery, adopted, notch_rad_s, given },
-                write,
-            );
+        // Before anything changes that it would show.
+        let details = (self.black_box.is_some() || self.files.is_some()).then(|| self.details());
+        if let Some(ExactLog { recorder, write }) = &mut self.log {
+            recorder.tick(&self.took, &report, write);
         }
+        // What this tick has moved counts from the next one on.
+        let notch_rad_s = action.notch.map(|notch| notch.centre_rad_s());
+        self.next = TickInputs { number: self.next.number, notch_rad_s, ..TickInputs::default() };
         if self.comms.takes_samples() {
             self.raw.add(time_us, &readings);
         } else {
@@ -359,33 +361,33 @@ impl Host {
             self.comms.transfer(transfers, store, &mut send);
         }
         if let (Some(log), true) = (&mut self.log, change.is_some()) {
-            self.flight.record(log, &self.names, change);
+            self.next.adopted = self.flight.record(log, &self.names, change);
         }
-        if let Some(black_box) = &mut self.black_box {
-            self.flight.log(black_box, &report, (&readings, taken), self.comms.esc_telemetry(), change);
+        let tick = details.as_ref().map(|details| TickRecord { report: &report, details });
+        if let (Some(black_box), Some(tick)) = (&mut self.black_box, &tick) {
+            self.flight.log(black_box, tick, self.comms.esc_telemetry(), change);
             black_box.sent(time_us, &bytes);
         }
-        if let Some(files) = &mut self.files
+        if let (Some(files), Some(tick)) = (&mut self.files, &tick)
             && let Some(stream) = files.1.streamed(|| new_black_box(&*self.flight, &self.names, self.origin, None))
         {
-            self.flight.log(stream, &report, (&readings, taken), self.comms.esc_telemetry(), change);
+            self.flight.log(stream, tick, self.comms.esc_telemetry(), change);
             stream.sent(time_us, &bytes);
         }
         // Before what follows is merged, which is of the next tick.
-        self.number = self.number.wrapping_add(1);
+        self.next.number = self.next.number.wrapping_add(1);
         if let Some(news) = &action.inputs {
             self.merge(news);
         }
         // Notices that there are none.
         self.hear_radio(&[]);
         self.asks_esc = action.ask;
-        self.time_us = time_us;
         HostTick { report, bytes, change, signing: self.comms.signing_record(), asks_esc: action.ask }
     }
 
     /// Runs the tick a millisecond after the previous one, with a duration of zero.
     pub fn next_tick(&mut self, uplink: &[u8]) -> HostTick {
-        self.tick(uplink, self.time_us + PERIOD_US, 0.0)
+        self.tick(uplink, self.took.time_us + PERIOD_US, 0.0)
     }
 }
 

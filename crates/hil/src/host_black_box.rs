@@ -2,9 +2,9 @@
 
 use afbc_estimator::Origin;
 use afbc_link::{Address, Decoder, Downlink};
-use afbc_log::ulog::{BlackBox, LogRing, LoggedTick, TakenInputs};
+use afbc_log::ulog::{BesideTick, BlackBox, LogRing};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
-use afbc_onboard::{EscTelemetry, FlightView, Readings, Report};
+use afbc_onboard::{EscTelemetry, TickRecord};
 use afbc_types::ROTORS_MAX;
 
 /// Bytes that wait for the end of a tick, at most: more than a log's beginning and a tick.
@@ -35,14 +35,12 @@ impl HostBlackBox {
     /// Logs a tick.
     pub(crate) fn tick<const N: usize>(
         &mut self,
-        report: &Report<ROTORS_MAX>,
-        readings: &Readings,
-        taken: TakenInputs,
-        (view, escs): (&FlightView, &EscTelemetry),
+        tick: &TickRecord<'_, ROTORS_MAX>,
+        escs: &EscTelemetry,
         table: &ParameterTable<N>,
     ) {
-        let tick = LoggedTick { report, readings, taken, view, escs: Some(escs), origin: self.origin };
-        self.log.tick(&tick, table, &mut self.ring);
+        let beside = BesideTick { escs: Some(escs), origin: self.origin };
+        self.log.tick(tick, &beside, table, &mut self.ring);
     }
 
     /// Logs a change of the parameters.

@@ -3,10 +3,10 @@
 
 use afbc_guidance::BatteryReading;
 use afbc_log::exact::{
-    FRAME_MAX, FrameError, Frames, Given, Record, Recorder, StartRecord, TickRecord, VERSION, WORD_MAX, decode, write,
+    FRAME_MAX, FrameError, Frames, Given, Record, Recorder, StartRecord, VERSION, WORD_MAX, decode, write,
 };
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
-use afbc_onboard::{Configuration, ControlInputs, Flight, Readings, Report};
+use afbc_onboard::{Configuration, ControlInputs, Flight, Readings, Report, TickInputs};
 use afbc_store::RecordName;
 use afbc_types::{RotorSpeeds, State};
 use nalgebra::Vector3;
@@ -26,7 +26,7 @@ fn record() -> impl Strategy<Value = Record> {
         any::<u16>().prop_map(|configuration| Record::Restored { configuration }),
         any::<u32>().prop_map(|tick| Record::Inputs { tick, inputs: ControlInputs::EMPTY }),
         (any::<u32>(), any::<u64>(), prop::option::of(any::<u16>())).prop_map(|(number, time_us, adopted)| {
-            Record::Tick(TickRecord { number, time_us, adopted, ..TickRecord::default() })
+            Record::Tick(TickInputs { number, time_us, adopted, ..TickInputs::default() }, Given::default())
         }),
     ]
 }

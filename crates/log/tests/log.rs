@@ -4,13 +4,14 @@
 mod strict;
 
 use afbc_drivers::esc_telemetry::EscReading;
-use afbc_estimator::Measurement;
+use afbc_estimator::{ImuSample, Measurement};
 use afbc_flight_core::{Mode, Stamped};
 use afbc_guidance::{BatteryReading, FlightMode, Sticks};
-use afbc_log::ulog::{BlackBox, LogRing, LogStart, LoggedTick, TOPICS, TakenInputs};
+use afbc_log::ulog::{BesideTick, BlackBox, LogRing, LogStart, TOPICS};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{
-    Aged, Configuration, ControlInputs, EscTelemetry, Flight, FlightView, Readings, Report, RotorFailure,
+    Aged, Configuration, ControlInputs, EscTelemetry, Flight, Readings, Report, RotorFailure, TickDetails, TickInputs,
+    TickRecord,
 };
 use afbc_store::RecordName;
 use afbc_types::{RotorSpeeds, Setpoint, State};
@@ -46,19 +47,19 @@ impl<const R: usize> Logged<R> {
     }
 
     /// Ticks with a sample of the inertial sensor, and perhaps a height.
-    fn tick(&mut self, height: bool) -> (Report, FlightView) {
+    fn tick(&mut self, height: bool) -> (Report, TickDetails) {
         self.now_us += TICK_US;
         let noise = 1e-3 * (self.now_us / TICK_US % 7) as f32;
         let imu = Some(Aged { value: [Vector3::new(0.0, noise, 0.0), Vector3::new(noise, 0.0, 9.81)], age_us: 0 });
         let aid = Aged { value: Measurement::Height { height_m: 1.5, sigma_m: 0.5 }, age_us: 300 };
         let readings = Readings { imu, aids: [height.then_some(aid), None] };
-        let mut inputs = ControlInputs::EMPTY;
-        let taken = TakenInputs::of(&inputs);
-        let report = self.flight.tick(self.now_us, &mut inputs, &readings);
-        let view = self.flight.view(self.now_us);
-        let tick = LoggedTick { report: &report, readings: &readings, taken, view: &view, escs: None, origin: None };
-        self.log.tick(&tick, &self.table, &mut self.ring);
-        (report, view)
+        let (mut messages, inputs) =
+            (ControlInputs::EMPTY, TickInputs { time_us: self.now_us, readings, ..TickInputs::default() });
+        let report = self.flight.tick(inputs.time_us, &mut messages, &readings);
+        let details = self.flight.details(&inputs, None, &messages);
+        let tick = TickRecord { report: &report, details: &details };
+        self.log.tick(&tick, &BesideTick::default(), &self.table, &mut self.ring);
+        (report, details)
     }
 
     fn change(&mut self, name: &str, value: f32) {
@@ -429,7 +430,7 @@ fn long_and_odd_dropouts_add_up() {
 #[test]
 fn values_are_px4s() {
     let mut logged = Logged::<65_536>::new();
-    let (mut report, mut view) = logged.tick(false);
+    let (mut report, mut details) = logged.tick(false);
     report.time_us = 5_000_000;
     report.mode = Mode::Flying;
     report.guided.mode = FlightMode::Mission;
@@ -443,32 +444,31 @@ fn values_are_px4s() {
     // The paper's rotors lie on the axes, so that output n drives rotor n.
     report.motors = RotorSpeeds(SVector::from([100.0, 200.0, 300.0, 400.0]));
     report.throttles = [100, 200, 300, 400];
-    view.estimate = None;
-    view.state = Some(State {
+    details.estimate = None;
+    details.state = Some(State {
         position_m: Vector3::new(4.0, 5.0, 6.0),
         velocity_m_s: Vector3::new(0.4, 0.5, 0.6),
         attitude_rad: Vector3::new(0.0, 0.0, core::f32::consts::FRAC_PI_2),
         rates_rad_s: Vector3::new(0.7, 0.8, 0.9),
     });
-    view.trace.errors.pitch.e2 = 0.25;
-    (view.trace.inputs.thrust_n, view.trace.inputs.pitch_n) = (2.0, 0.5);
-    view.trace.filtered[1].angle = 0.1;
-    let mut inputs = ControlInputs::EMPTY;
-    inputs.battery = Some(BatteryReading { voltage_v: 11.1, current_a: 4.5, charge: None });
+    details.trace.errors.pitch.e2 = 0.25;
+    (details.trace.inputs.thrust_n, details.trace.inputs.pitch_n) = (2.0, 0.5);
+    details.trace.filtered[1].angle = 0.1;
+    details.inputs.battery = Some(BatteryReading { voltage_v: 11.1, current_a: 4.5, charge: None });
     let sticks = Sticks { roll: 0.1, pitch: -0.2, throttle: 0.3, yaw: -0.4 };
-    inputs.order().sticks = Some(Stamped { value: sticks, at_us: 4_900_000 });
+    details.sticks = Some(Stamped { value: sticks, at_us: 4_900_000 });
     let field = Measurement::MagneticField { field: Vector3::new(20.0, 5.0, -40.0), sigma: 1.0 };
-    let imu = Some(Aged { value: [Vector3::new(0.1, 0.2, 0.3), Vector3::new(1.0, 2.0, 9.0)], age_us: 250 });
-    let readings = Readings { imu, aids: [Some(Aged { value: field, age_us: 2_000 }), None] };
-    let taken = TakenInputs::of(&inputs);
+    let (rates_rad_s, specific_force_m_s2) = (Vector3::new(0.1, 0.2, 0.3), Vector3::new(1.0, 2.0, 9.0));
+    details.sample = Some(ImuSample { at_us: report.time_us - 250, rates_rad_s, specific_force_m_s2 });
+    details.inputs.readings.aids = [Some(Aged { value: field, age_us: 2_000 }), None];
+    details.local = [Some(field), None];
     let mut escs = EscTelemetry { counter: 77, poles: 14, ..EscTelemetry::default() };
     let value =
         EscReading { temperature_c: -5, voltage_cv: 1_480, current_ca: 350, consumed_mah: 12, erpm_hundreds: 700 };
     escs.readings[2] = Some(Stamped { value, at_us: 4_990_000 });
     escs.failures[2] = Some(RotorFailure::Stopped);
-    let escs = Some(&escs);
-    let tick = LoggedTick { report: &report, readings: &readings, taken, view: &view, escs, origin: None };
-    logged.log.tick(&tick, &logged.table, &mut logged.ring);
+    let beside = BesideTick { escs: Some(&escs), origin: None };
+    logged.log.tick(&TickRecord { report: &report, details: &details }, &beside, &logged.table, &mut logged.ring);
     let log = read(&logged.end());
     let near = |topic: &str, name: &str, wanted: f64| {
         let is = *log.field(topic, name).last().unwrap_or_else(|| panic!("{topic}"));

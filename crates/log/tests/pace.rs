@@ -4,9 +4,9 @@
 #[allow(dead_code, reason = "other tests need the rest")]
 mod strict;
 
-use afbc_log::ulog::{BlackBox, LogRing, LogStart, LoggedTick, TakenInputs};
+use afbc_log::ulog::{BesideTick, BlackBox, LogRing, LogStart};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
-use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Readings};
+use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Readings, TickInputs, TickRecord};
 use afbc_store::RecordName;
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -36,12 +36,12 @@ fn logged(pace: Option<u16>, ticks: u64, [restored, changed]: [u64; 2]) -> (Vec<
     for number in 1..=ticks {
         let imu = Some(Aged { value: [Vector3::zeros(), Vector3::new(0.0, 0.0, 9.81)], age_us: 0 });
         let readings = Readings { imu, ..Readings::NONE };
-        let mut inputs = ControlInputs::EMPTY;
-        let taken = TakenInputs::of(&inputs);
-        let report = flight.tick(1000 * number, &mut inputs, &readings);
-        let view = flight.view(1000 * number);
-        let tick = LoggedTick { report: &report, readings: &readings, taken, view: &view, escs: None, origin: None };
-        log.tick(&tick, &table, &mut ring);
+        let (mut messages, inputs) =
+            (ControlInputs::EMPTY, TickInputs { time_us: 1000 * number, readings, ..TickInputs::default() });
+        let report = flight.tick(inputs.time_us, &mut messages, &readings);
+        let details = flight.details(&inputs, None, &messages);
+        let tick = TickRecord { report: &report, details: &details };
+        log.tick(&tick, &BesideTick::default(), &table, &mut ring);
         if number == changed {
             let name = RecordName::new("EST_GATE").unwrap();
             let value = table.set(name, 4.0).unwrap().value;

@@ -2,11 +2,11 @@
 //! whole, or lacks whole ticks and says from which on.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
-use afbc_log::exact::{
-    FRAME_MAX, Frames, Given, Record, RecordQueue, ReplayDifference, ReplayStep, Replayer, TickRecord, write,
-};
+use afbc_log::exact::{FRAME_MAX, Frames, Given, Record, RecordQueue, ReplayDifference, ReplayStep, Replayer, write};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
-use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Prepared, Readings};
+use afbc_onboard::{
+    Aged, Configuration, ControlInputs, Flight, Prepared, Readings, Report, TickDetails, TickInputs, TickRecord,
+};
 use afbc_store::RecordName;
 use afbc_types::{Pose, PoseSigmas, Stamped, State};
 use nalgebra::Vector3;
@@ -46,7 +46,7 @@ struct Vehicle {
     flight: Flight,
     table: ParameterTable,
     queue: RecordQueue,
-    ticks: VecDeque<TickRecord>,
+    ticks: VecDeque<(Report, TickDetails)>,
     ring: VecDeque<u8>,
     log: Vec<u8>,
     /// What messages have brought for the next tick, and its number.
@@ -76,11 +76,10 @@ impl Vehicle {
         let readings = Readings { imu, ..Readings::NONE };
         let mut taken = ControlInputs::EMPTY;
         self.mail.take_into(&mut taken);
-        let given = Given::of(&self.flight.tick(time_us, &mut taken, &readings));
-        let (battery, clock_failed, notch_rad_s, adopted) = (None, false, None, self.adopted.take());
+        let report = self.flight.tick(time_us, &mut taken, &readings);
+        let inputs = TickInputs { number, time_us, readings, adopted: self.adopted.take(), ..TickInputs::default() };
         if self.ticks.len() < WAITING {
-            let record = TickRecord { number, time_us, clock_failed, readings, battery, adopted, notch_rad_s, given };
-            self.ticks.push_back(record);
+            self.ticks.push_back((report, TickDetails { inputs, ..TickDetails::default() }));
         }
         if let Some((prepared, configuration)) = self.next.take() {
             self.adopted = self.flight.adopt(&prepared).then_some(configuration);
@@ -109,8 +108,8 @@ impl Vehicle {
             let configuration = self.queue.change(&self.table, RecordChange::Set(name, Some(value)));
             self.next = Some((Prepared::new(self.table.configuration()).unwrap(), configuration));
         }
-        while let Some(tick) = self.ticks.pop_front() {
-            self.queue.tick(&tick);
+        while let Some((report, details)) = self.ticks.pop_front() {
+            self.queue.tick(&TickRecord { report: &report, details: &details });
         }
         let ring = &mut self.ring;
         self.queue.send(&mut |frame| {
@@ -155,7 +154,7 @@ fn first_missing(log: &[u8], end: u32) -> Option<u32> {
     let mut frames = Frames::default();
     let mut there = vec![false; end as usize];
     for record in log.iter().filter_map(|byte| frames.take(*byte)) {
-        if let Record::Tick(tick) = record {
+        if let Record::Tick(tick, _) = record {
             there[tick.number as usize] = true;
         }
     }
@@ -211,7 +210,7 @@ fn a_link_that_comes_back_has_later_ticks() {
     assert_eq!(replay(&log), (missing, Some(ReplayDifference::Missing(missing))));
     let mut frames = Frames::default();
     let last = log.iter().filter_map(|byte| frames.take(*byte)).filter_map(|record| match record {
-        Record::Tick(tick) => Some(tick.number),
+        Record::Tick(tick, _) => Some(tick.number),
         _ => None,
     });
     assert_eq!(last.last(), Some(ticks - 1));
@@ -290,6 +289,8 @@ proptest! {
     #[test]
     fn it_is_a_queue_of_a_kilobyte(steps in prop::collection::vec(asked(), 1..200)) {
         let (mut queue, mut described, mut number) = (RecordQueue::default(), Described::default(), 0);
+        let mut flight = Flight::<4>::new(&Configuration::default()).unwrap();
+        let idle = flight.tick(1_000, &mut ControlInputs::EMPTY.clone(), &Readings::NONE);
         let frame = |record: &Record| write(record, &mut [0; FRAME_MAX]).unwrap().to_vec();
         for step in steps {
             let (takes, times) = match step {
@@ -305,10 +306,11 @@ proptest! {
                 }
                 Asked::Tick(size) => {
                     let time_us = u64::MAX >> (14 * size);
-                    let record = TickRecord { number, time_us, ..TickRecord::default() };
+                    let inputs = TickInputs { number, time_us, ..TickInputs::default() };
                     number += 1;
-                    queue.tick(&record);
-                    described.tick(frame(&Record::Tick(record)));
+                    let details = TickDetails { inputs, ..TickDetails::default() };
+                    queue.tick(&TickRecord { report: &idle, details: &details });
+                    described.tick(frame(&Record::Tick(inputs, Given::of(&idle))));
                     (0, 0)
                 }
                 Asked::Takes(takes) => (takes, 1),

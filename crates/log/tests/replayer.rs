@@ -5,11 +5,9 @@ use afbc_control::Trace;
 use afbc_estimator::{Measurement, VelocityNotch};
 use afbc_flight_core::{Request, Stamped, Ticketed};
 use afbc_guidance::{BatteryReading, Order};
-use afbc_log::exact::{
-    Given, Record, Recorder, ReplayDifference, ReplayStep, Replayer, StartRecord, TickRecord, decode,
-};
+use afbc_log::exact::{Given, Record, Recorder, ReplayDifference, ReplayStep, Replayer, StartRecord, decode};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
-use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Prepared, Readings, Report};
+use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Prepared, Readings, Report, TickInputs};
 use afbc_store::RecordName;
 use afbc_types::{Rotor, State};
 use nalgebra::Vector3;
@@ -91,9 +89,9 @@ impl Vehicle {
             self.flight.move_notch(&notch);
         }
         let report = self.flight.tick(time_us, &mut self.taken, &readings);
-        let (given, adopted) = (Given::of(&report), self.adopted.take());
-        let tick = TickRecord { number, time_us, clock_failed, readings, battery, adopted, notch_rad_s, given };
-        self.record(|recorder, _, send| recorder.tick(&tick, send));
+        let adopted = self.adopted.take();
+        let inputs = TickInputs { number, time_us, clock_failed, readings, battery, adopted, notch_rad_s };
+        self.record(|recorder, _, send| recorder.tick(&inputs, &report, send));
         report
     }
 
@@ -209,10 +207,10 @@ proptest! {
         prop_assert_eq!(replay(&mut replayer, &lacking), (at, missing));
         prop_assert_eq!(replay(&mut replayer, &vehicle.records), (50, Vec::new()));
         let mut changed = vehicle.records.clone();
-        let Record::Tick(tick) = &mut changed[1 + at] else { panic!("a tick") };
-        let now = tick.given;
-        tick.given.throttles[at % 4] = throttle;
-        let (number, then) = (tick.number, tick.given);
+        let Record::Tick(tick, given) = &mut changed[1 + at] else { panic!("a tick") };
+        let now = *given;
+        given.throttles[at % 4] = throttle;
+        let (number, then) = (tick.number, *given);
         prop_assert_eq!(
             replay(&mut replayer, &changed),
             (49, vec![ReplayDifference::Given { number, then, now }])
@@ -266,9 +264,9 @@ proptest! {
         prop_assert!(reports(&mut replayer, &vehicle.records) == flown);
         prop_assert_eq!(replayer.trace(), vehicle.flight.trace());
         prop_assert!(replayer.trace() != Trace::default());
-        let without = |change: fn(&mut TickRecord)| {
+        let without = |change: fn(&mut TickInputs)| {
             let mut records = vehicle.records.clone();
-            records.iter_mut().for_each(|record| if let Record::Tick(tick) = record { change(tick) });
+            records.iter_mut().for_each(|record| if let Record::Tick(tick, _) = record { change(tick) });
             reports(&mut self::replayer(), &records)
         };
         prop_assert!(without(|tick| tick.battery = None) != flown);
@@ -290,7 +288,7 @@ fn an_armed_vehicle_flies_no_other_configuration() {
     vehicle.tick(&seen(1_100, false), Readings::NONE);
     assert_eq!(replay(&mut self::replayer(), &vehicle.records), (1_101, Vec::new()));
     let mut wrong = vehicle.records.clone();
-    let Some(Record::Tick(last)) = wrong.last_mut() else { panic!("a tick") };
+    let Some(Record::Tick(last, _)) = wrong.last_mut() else { panic!("a tick") };
     last.adopted = Some(1);
     let impossible = (1_100, vec![ReplayDifference::Configuration(1_100)]);
     assert_eq!(replay(&mut self::replayer(), &wrong), impossible);
@@ -299,7 +297,7 @@ fn an_armed_vehicle_flies_no_other_configuration() {
     changed.change(name("EST_GATE"), 4.0).unwrap();
     assert_eq!(replay(&mut changed, &wrong), (1_101, Vec::new()));
     // The change was lost, too.
-    let Some(Record::Tick(last)) = wrong.last_mut() else { panic!("a tick") };
+    let Some(Record::Tick(last, _)) = wrong.last_mut() else { panic!("a tick") };
     last.adopted = Some(2);
     assert_eq!(replay(&mut self::replayer(), &wrong), impossible);
 }

@@ -8,9 +8,9 @@ use afbc_estimator::{Aid, Estimate, Measurement, Origin, Validity};
 use afbc_flight_core::{Mode, Stamped};
 use afbc_guidance::FlightMode;
 use afbc_guidance::notice::Cause;
-use afbc_log::ulog::{BlackBox, LogRing, LogStart, LoggedTick, TakenInputs};
+use afbc_log::ulog::{BesideTick, BlackBox, LogRing, LogStart};
 use afbc_onboard::parameters::ParameterTable;
-use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, FlightView, Readings, Report};
+use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Report, TickDetails, TickInputs, TickRecord};
 use afbc_types::{Axis, Pose, PoseSigmas, Setpoint, State};
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -22,9 +22,7 @@ const NOW_US: u64 = 5_000_000;
 /// A tick, which a test changes.
 struct Tick {
     report: Report,
-    view: FlightView,
-    readings: Readings,
-    taken: TakenInputs,
+    details: TickDetails,
     origin: Option<Origin>,
 }
 
@@ -32,14 +30,16 @@ impl Tick {
     /// Of a vehicle that has just been switched on.
     fn new() -> Self {
         let mut flight = Flight::<4>::new(&Configuration::default()).unwrap();
-        let mut report = flight.tick(1_000, &mut ControlInputs::EMPTY.clone(), &Readings::NONE);
+        let (mut messages, inputs) = (ControlInputs::EMPTY, TickInputs { time_us: 1_000, ..TickInputs::default() });
+        let mut report = flight.tick(inputs.time_us, &mut messages, &inputs.readings);
         report.time_us = NOW_US;
-        let view = flight.view(1_000);
-        Tick { report, view, readings: Readings::NONE, taken: TakenInputs::default(), origin: None }
+        Tick { report, details: flight.details(&inputs, None, &messages), origin: None }
     }
 
-    fn reads(&mut self, aids: [Option<Measurement>; 2], age_us: u32) {
-        self.readings.aids = aids.map(|aid| aid.map(|value| Aged { value, age_us }));
+    /// Reads aids, of which the estimator is offered `local`.
+    fn reads(&mut self, aids: [Option<Measurement>; 2], local: [Option<Measurement>; 2], age_us: u32) {
+        self.details.inputs.readings.aids = aids.map(|aid| aid.map(|value| Aged { value, age_us }));
+        (self.details.local, self.details.offers) = (local, true);
     }
 }
 
@@ -48,10 +48,10 @@ fn log_of(ticks: &[Tick], start: &LogStart<'_>) -> StrictLog {
     let table = ParameterTable::new(Configuration::<4>::default());
     let (mut log, mut ring) = (BlackBox::new(start, &table), Box::<LogRing<65_536>>::default());
     for (tick, number) in ticks.iter().zip(0..) {
-        let Tick { report, view, readings, taken, origin } = tick;
+        let Tick { report, details, origin } = tick;
         let report = Report { time_us: report.time_us + 1_000 * number, ..*report };
-        let tick = LoggedTick { report: &report, readings, taken: *taken, view, escs: None, origin: *origin };
-        log.tick(&tick, &table, &mut ring);
+        let beside = BesideTick { escs: None, origin: *origin };
+        log.tick(&TickRecord { report: &report, details }, &beside, &table, &mut ring);
     }
     let mut bytes = Vec::new();
     while !ring.is_empty() {
@@ -120,10 +120,10 @@ fn place() -> (Origin, Vector3<f32>) {
 fn an_estimate_is_told() {
     let (origin, origin_m) = place();
     let log = told(|tick| {
-        (tick.origin, tick.view.origin_m) = (Some(origin), Some(origin_m));
-        tick.view.estimate = Some(estimate(|it| it.validity = valid([true; 5])));
+        (tick.origin, tick.details.origin_m) = (Some(origin), Some(origin_m));
+        tick.details.estimate = Some(estimate(|it| it.validity = valid([true; 5])));
         for (number, aid) in (1_u8..).zip(Aid::ALL) {
-            let aids = &mut tick.view.aids;
+            let aids = &mut tick.details.aids;
             let record = match aid {
                 Aid::TrackerPosition => &mut aids.tracker_position,
                 Aid::TrackerAttitude => &mut aids.tracker_attitude,
@@ -202,8 +202,8 @@ proptest! {
         let [attitude, heading, velocity, position, height] = parts;
         let (origin, origin_m) = place();
         let log = told(|tick| {
-            tick.view.estimate = Some(estimate(|it| it.validity = valid(parts)));
-            (tick.origin, tick.view.origin_m) = (has_origin.then_some(origin), Some(origin_m));
+            tick.details.estimate = Some(estimate(|it| it.validity = valid(parts)));
+            (tick.origin, tick.details.origin_m) = (has_origin.then_some(origin), Some(origin_m));
             tick.report.health.observed = observed;
         });
         let is_global = position && has_origin;
@@ -231,8 +231,8 @@ proptest! {
 #[test]
 fn an_estimate_that_has_not_started_is_no_state() {
     let log = told(|tick| {
-        tick.view.state = Some(State::default());
-        tick.view.estimate = Some(estimate(|it| it.unready = Some(Default::default())));
+        tick.details.state = Some(State::default());
+        tick.details.estimate = Some(estimate(|it| it.unready = Some(Default::default())));
     });
     for topic in ["vehicle_attitude", "vehicle_local_position", "vehicle_angular_velocity", "estimator_states"] {
         assert!(log.times(topic).is_empty(), "{topic}");
@@ -253,16 +253,20 @@ fn measurements_are_told() {
         speed_sigma_m_s: 0.1,
         climb_sigma_m_s: 0.2,
     };
+    let mut local = fix;
+    if let Measurement::Gnss { position_m, .. } = &mut local {
+        *position_m -= origin_m;
+    }
     let q = UnitQuaternion::from_euler_angles(0.2, -0.4, 0.6).coords;
     let attitude = [q.w, q.x, q.y, q.z];
     let pose = Measurement::Pose { position_m, attitude, position_sigma_m: 0.3, attitude_sigma_rad: 0.02 };
     let runs = |tick: &mut Tick| {
-        (tick.origin, tick.view.origin_m) = (Some(origin), Some(origin_m));
-        tick.view.estimate = Some(estimate(|_| ()));
+        (tick.origin, tick.details.origin_m) = (Some(origin), Some(origin_m));
+        tick.details.estimate = Some(estimate(|_| ()));
     };
     let log = told(|tick| {
         runs(tick);
-        tick.reads([Some(fix), None], 30_000);
+        tick.reads([Some(fix), None], [Some(local), None], 30_000);
     });
     let [lat, lon, alt] = origin.global(&position_m);
     let receiver = [
@@ -285,7 +289,7 @@ fn measurements_are_told() {
     has(&log, "afbc_aid", &[("kind", 3.0), ("timestamp_sample", 4_970_000.0)]);
     let log = told(|tick| {
         runs(tick);
-        tick.reads([Some(pose), None], 7_000);
+        tick.reads([Some(pose), None], [Some(pose), None], 7_000);
     });
     has_all(&log, "vehicle_visual_odometry", "position", &[110.0, -220.0, -30.0]);
     has_all(&log, "vehicle_visual_odometry", "q", &[q.w, q.x, -q.y, -q.z].map(f64::from));
@@ -298,7 +302,8 @@ fn measurements_are_told() {
     let position = Measurement::Position { position_m, sigma_m: 0.7 };
     let log = told(|tick| {
         runs(tick);
-        tick.reads([Some(position), Some(Measurement::Heading { heading_rad: 0.5, sigma_rad: 0.1 })], 0);
+        let aids = [Some(position), Some(Measurement::Heading { heading_rad: 0.5, sigma_rad: 0.1 })];
+        tick.reads(aids, aids, 0);
     });
     has_all(&log, "vehicle_visual_odometry", "position", &[110.0, -220.0, -30.0]);
     has_all(&log, "vehicle_visual_odometry", "position_variance", &[0.49; 3]);
@@ -307,41 +312,10 @@ fn measurements_are_told() {
     has_all(&log, "afbc_aid", "numbers", &[0.5, 0.1, 0.0]);
     // As long as nobody knows where it is measured from, a fix is none.
     let log = told(|tick| {
-        tick.view.estimate = Some(estimate(|_| ()));
-        tick.reads([Some(fix), None], 0);
+        tick.details.estimate = Some(estimate(|_| ()));
+        tick.reads([Some(fix), None], [None; 2], 0);
     });
     assert!(log.times("vehicle_gps_position").is_empty() && log.times("afbc_aid").is_empty());
-}
-
-/// While it is at rest, a usable fix is where the vehicle stands; one that is not usable is what it says.
-#[test]
-fn a_fix_at_rest_is_where_the_vehicle_stands() {
-    let (origin, origin_m) = place();
-    let most_m = Configuration::<4>::default().estimation.position_sigma_max_m;
-    let sigmas = [(0.5, 0.5, true), (most_m, most_m, true), (most_m * 1.01, 0.5, false), (0.5, most_m * 1.01, false)];
-    for (horizontal_sigma_m, vertical_sigma_m, is_good) in sigmas {
-        for at_rest in [true, false] {
-            let fix = Measurement::Gnss {
-                position_m: Vector3::new(110.0, 220.0, 30.0),
-                velocity_m_s: Vector3::zeros(),
-                horizontal_sigma_m,
-                vertical_sigma_m,
-                speed_sigma_m_s: 0.1,
-                climb_sigma_m_s: 0.2,
-            };
-            let [before, now] = [(); 2].map(|()| {
-                let mut tick = Tick::new();
-                (tick.origin, tick.view.origin_m) = (Some(origin), Some(origin_m));
-                tick.view.estimate = Some(estimate(|it| it.at_rest = at_rest));
-                tick
-            });
-            let mut now = now;
-            now.reads([Some(fix), None], 0);
-            let log = log_of(&[before, now], &LogStart::default());
-            let wanted = if at_rest && is_good { [1.0, 2.0, 3.0] } else { [10.0, 20.0, 20.0] };
-            has_all(&log, "afbc_aid", "numbers", &wanted);
-        }
-    }
 }
 
 /// A tracker's pose that a message has brought is told once.
@@ -351,9 +325,9 @@ fn a_pose_that_was_brought_is_told_once() {
     let ticks: Vec<_> = [Some(4_990_000), Some(4_990_000), None, Some(5_001_000)]
         .into_iter()
         .map(|at_us: Option<u64>| {
-            let mut inputs = ControlInputs::EMPTY;
-            at_us.into_iter().for_each(|at_us| inputs.inbox.put_pose(Stamped { value: pose, at_us }));
-            Tick { taken: TakenInputs::of(&inputs), ..Tick::new() }
+            let mut tick = Tick::new();
+            tick.details.pose = at_us.map(|at_us| Stamped { value: pose, at_us });
+            tick
         })
         .collect();
     let log = log_of(&ticks, &LogStart::default());
@@ -434,8 +408,8 @@ fn the_laws_signals_are_told() {
             yaw_rate_rad_s: 0.7,
             ..Setpoint::default()
         });
-        tick.view.estimate = Some(estimate(|_| ()));
-        let trace = &mut tick.view.trace;
+        tick.details.estimate = Some(estimate(|_| ()));
+        let trace = &mut tick.details.trace;
         (trace.inputs.roll_n, trace.inputs.pitch_n) = (0.1, 0.2);
         (trace.inputs.yaw_n, trace.inputs.thrust_n) = (0.3, 4.0);
         (trace.virtual_m_s2, trace.desired_rad) = ([0.5, 0.6], [0.11, 0.12]);

@@ -2,21 +2,18 @@
 
 use crate::configuration::Configuration;
 use crate::control_inputs::ControlInputs;
-use crate::flight_view::FlightView;
 use crate::front_end::{Corrections, EstimatorFrontEnd};
 use crate::guided::{Core, Guide};
 use crate::imu_selector::ImuSelector;
 use crate::law::FlightLaw;
 use crate::readings::Readings;
 use crate::sensor_timeouts::SensorTimeouts;
+use crate::tick_record::{Report, TickDetails, TickInputs};
 use afbc::Guarded;
-use afbc::monitor::Norm;
 use afbc_control::Trace;
 use afbc_estimator::{Estimator, OutputFilter, VelocityNotch};
-use afbc_flight_core::{EndReason, FlightCore, FlightCoreMemory, Mode, Motor, Reasons, RequestAnswer, TickHealth};
-use afbc_guidance::Guided;
-use afbc_types::{Axis, Declared, OutOfRange, ROTORS_MAX, RotorSpeeds, State};
-use core::array;
+use afbc_flight_core::{FlightCore, FlightCoreMemory, Motor};
+use afbc_types::{Declared, OutOfRange, Pose, Stamped};
 
 /// A vehicle under a law: AFBC with its monitor, unless it is simulated or replayed under another.
 #[derive(Clone, Debug)]
@@ -98,64 +95,6 @@ pub trait Prepare<const N: usize> {
     /// # Errors
     /// The first parameter out of range.
     fn prepare(&self, configuration: &Configuration<N>) -> Result<Prepared<N, Self::Law>, OutOfRange>;
-}
-
-/// Result of a control tick.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Report<const N: usize = 4> {
-    /// Start of the tick, since power-up \[us\].
-    pub time_us: u64,
-    /// Flight mode.
-    pub mode: Mode,
-    /// Rotor speeds for the motors: zero if disarmed.
-    pub motors: RotorSpeeds<N>,
-    /// Throttles for the motors: 0 if disarmed, otherwise 48 to 2047.
-    pub throttles: [u16; N],
-    /// The vehicle's own estimate of its state, or that of the pose observer after the inertial sensor has failed
-    /// ([`TickHealth::observed`](afbc_flight_core::TickHealth::observed)); none without an inertial sensor.
-    pub estimate: Option<State>,
-    /// Health of the flight core.
-    pub health: TickHealth,
-    /// Ticks since power-up in which a rotor was commanded a force outside its limits.
-    pub saturated_ticks: u32,
-    /// Norms of the estimates of one subsystem, all reported in turn; none before the first flight.
-    pub norms: Option<(Axis, Norm)>,
-    /// True in the air while the accelerometer is [shaken](crate::vibration) more than is acceptable.
-    pub shaken: bool,
-    /// Answer to a request.
-    pub answer: Option<RequestAnswer>,
-    /// Why the flight ended, if it did in this tick.
-    pub ended: Option<EndReason>,
-    /// What spoke against arming in this tick, by which a request to arm was or would have been answered.
-    pub against: Reasons,
-    /// What the guidance decided.
-    pub guided: Guided,
-}
-
-impl<const N: usize> Report<N> {
-    /// Returns the report extended with zeros to the largest number of rotors.
-    #[must_use]
-    pub fn padded(&self) -> Report<ROTORS_MAX> {
-        let Report { time_us, mode, motors, throttles, estimate, health, saturated_ticks, norms, answer, .. } = *self;
-        let throttles = array::from_fn(|i| throttles.get(i).copied().unwrap_or_default());
-        let motors = motors.padded();
-        let (ended, against, guided, shaken) = (self.ended, self.against, self.guided, self.shaken);
-        Report {
-            time_us,
-            mode,
-            motors,
-            throttles,
-            estimate,
-            health,
-            saturated_ticks,
-            norms,
-            shaken,
-            answer,
-            ended,
-            against,
-            guided,
-        }
-    }
 }
 
 /// The firmware's own law.
@@ -244,16 +183,24 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
         self.memory.trace::<C, N>()
     }
 
-    /// Returns what is known after a tick at `now_us`, for logs: beside the tick, not in it.
-    pub fn view(&self, now_us: u64) -> FlightView {
+    /// Returns what logs have of the last tick beside its report: beside the tick, not in it, and before anything else
+    /// changes. The tick had these inputs; `pose` is what messages had brought of one, which the tick has handed over,
+    /// and `messages` is what it has left of the rest.
+    pub fn details(&self, inputs: &TickInputs, pose: Option<Stamped<Pose>>, messages: &ControlInputs) -> TickDetails {
         let front_end = &self.front_end;
-        FlightView {
+        TickDetails {
+            inputs: *inputs,
+            pose,
+            sticks: messages.orders.sticks,
+            sample: front_end.sample(inputs),
+            local: front_end.local(&inputs.readings),
+            offers: front_end.offers(),
+            on_ground: front_end.is_on_ground(),
             trace: self.trace(),
-            estimate: front_end.estimate(now_us),
+            estimate: front_end.estimate(inputs.time_us),
             aids: *front_end.memory().aids(),
             origin_m: front_end.origin_m(),
             state: self.memory.state().copied(),
-            idle_on_ground: self.idle_on_ground,
         }
     }
 

@@ -1,6 +1,6 @@
 //! What a vehicle's LED and buzzer say.
 
-use crate::flight::Report;
+use crate::tick_record::Report;
 use afbc_flight_core::{Mode, Refusal};
 
 /// Length of a step of a pattern \[us\], and number of steps.

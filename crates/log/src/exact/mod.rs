@@ -17,6 +17,6 @@ mod replayer;
 
 pub use frame::{FRAME_MAX, FrameError, Frames, decode, write};
 pub use queue::RecordQueue;
-pub use record::{Given, Record, StartRecord, TickRecord, VERSION, WORD_MAX};
+pub use record::{Given, Record, StartRecord, VERSION, WORD_MAX};
 pub use recorder::Recorder;
 pub use replayer::{ReplayDifference, ReplayStep, Replayer};

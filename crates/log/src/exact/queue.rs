@@ -1,9 +1,8 @@
 //! Frames on their way to a link that takes some of them now and some later.
 
-use crate::exact::record::TickRecord;
 use crate::exact::recorder::Recorder;
-use afbc_onboard::ControlInputs;
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
+use afbc_onboard::{ControlInputs, TickRecord};
 use heapless::Vec;
 
 /// Bytes that wait for the link, at most.
@@ -53,10 +52,10 @@ impl RecordQueue {
     }
 
     /// Records a tick.
-    pub fn tick(&mut self, record: &TickRecord) {
+    pub fn tick<const N: usize>(&mut self, tick: &TickRecord<'_, N>) {
         let RecordQueue { recorder, waiting, .. } = self;
         if !core::mem::take(&mut waiting.lacks) {
-            recorder.tick(record, &mut |frame| waiting.append(frame));
+            recorder.tick(&tick.details.inputs, tick.report, &mut |frame| waiting.append(frame));
             // One that does not fit is itself the gap.
             waiting.lacks = false;
         }

@@ -1,8 +1,7 @@
 //! What is recorded.
 
-use afbc_guidance::BatteryReading;
 use afbc_onboard::parameters::ParameterTable;
-use afbc_onboard::{ControlInputs, Readings, Report};
+use afbc_onboard::{ControlInputs, Report, TickInputs};
 use afbc_store::RecordName;
 use afbc_types::ROTORS_MAX;
 use crc::{CRC_32_ISO_HDLC, Crc};
@@ -42,8 +41,8 @@ pub enum Record {
         /// What they have brought.
         inputs: ControlInputs,
     },
-    /// A tick.
-    Tick(TickRecord),
+    /// A tick: what it took, and what it gave.
+    Tick(TickInputs, Given),
 }
 
 /// Longest name of a vehicle, or of a law, that is written; of a longer one the beginning is \[bytes\].
@@ -92,27 +91,6 @@ fn word(text: &str) -> String<WORD_MAX> {
     let mut word = String::new();
     let _ = text.chars().try_for_each(|letter| word.push(letter));
     word
-}
-
-/// A tick: what it took, and what it gave.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct TickRecord {
-    /// Number of the tick since power-up.
-    pub number: u32,
-    /// When it began, since power-up \[us\].
-    pub time_us: u64,
-    /// True if the clock was not trusted.
-    pub clock_failed: bool,
-    /// What the sensors had read.
-    pub readings: Readings,
-    /// The battery, if it was measured.
-    pub battery: Option<BatteryReading>,
-    /// Number of the configuration that is flown from this tick on, if it is another.
-    pub adopted: Option<u16>,
-    /// Rotor speed at which the notch stands from this tick on, if it has moved \[rad/s\].
-    pub notch_rad_s: Option<f32>,
-    /// What it gave.
-    pub given: Given,
 }
 
 /// What a tick gave.

@@ -1,9 +1,9 @@
 //! The writing side.
 
 use crate::exact::frame::{FRAME_MAX, write};
-use crate::exact::record::{Record, StartRecord, TickRecord};
-use afbc_onboard::ControlInputs;
+use crate::exact::record::{Given, Record, StartRecord};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
+use afbc_onboard::{ControlInputs, Report, TickInputs};
 
 /// Makes the frames of a log, in the order in which it is called: beside the control tick, not in it.
 #[derive(Clone, Debug)]
@@ -68,9 +68,9 @@ impl Recorder {
         }
     }
 
-    /// Records a tick.
-    pub fn tick(&mut self, record: &TickRecord, send: &mut dyn FnMut(&[u8])) {
-        self.frame(&Record::Tick(*record), send);
+    /// Records a tick that took this and gave this.
+    pub fn tick<const N: usize>(&mut self, took: &TickInputs, gave: &Report<N>, send: &mut dyn FnMut(&[u8])) {
+        self.frame(&Record::Tick(*took, Given::of(gave)), send);
     }
 
     fn frame(&mut self, record: &Record, send: &mut dyn FnMut(&[u8])) {

@@ -1,10 +1,10 @@
 //! The reading side: the flight again.
 
-use crate::exact::record::{Given, Record, StartRecord, TickRecord};
+use crate::exact::record::{Given, Record, StartRecord};
 use afbc_control::Trace;
 use afbc_estimator::VelocityNotch;
 use afbc_onboard::parameters::{ParameterTable, Reason};
-use afbc_onboard::{Configuration, ControlInputs, Flight, Prepare, Report};
+use afbc_onboard::{Configuration, ControlInputs, Flight, Prepare, Report, TickInputs};
 use afbc_store::RecordName;
 use afbc_types::OutOfRange;
 use heapless::{Deque, Vec};
@@ -161,7 +161,7 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
                 let _ = self.coming.push_back((*tick, inputs.clone()));
                 ReplayStep::Nothing
             }
-            Record::Tick(tick) => self.tick(tick),
+            Record::Tick(tick, given) => self.tick(tick, *given),
         }
     }
 
@@ -185,7 +185,7 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
         if known { ReplayStep::Nothing } else { ReplayStep::Differs(ReplayDifference::Parameter, None) }
     }
 
-    fn tick(&mut self, tick: &TickRecord) -> ReplayStep<N> {
+    fn tick(&mut self, tick: &TickInputs, then: Given) -> ReplayStep<N> {
         if !self.began {
             return ReplayStep::Nothing;
         }
@@ -229,7 +229,7 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
             return ReplayStep::Differs(ReplayDifference::Configuration(tick.number), None);
         }
         let report = self.flight.tick(tick.time_us, &mut self.taken, &tick.readings);
-        let (number, then, now) = (tick.number, tick.given, Given::of(&report));
+        let (number, now) = (tick.number, Given::of(&report));
         if then == now {
             ReplayStep::Same(report)
         } else {

@@ -2,9 +2,9 @@
 
 use crate::storage::block::{BLOCK_BYTES, BlockSink};
 use crate::storage::keeper::StorageState;
-use crate::ulog::{BlackBox, LogRing, LogStart, LoggedTick};
-use afbc_onboard::LogMode;
+use crate::ulog::{BesideTick, BlackBox, LogRing, LogStart};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
+use afbc_onboard::{LogMode, TickRecord};
 
 /// Bytes that wait for a block, at most: more than a tick in which every topic is due writes, beside what does not
 /// fill one.
@@ -72,7 +72,7 @@ impl LogWriter {
     /// before it, more than `period_us` apart, count as a dropout.
     pub fn tick<const M: usize, const N: usize>(
         &mut self,
-        tick: &LoggedTick<'_, M>,
+        (tick, beside): (&TickRecord<'_, M>, &BesideTick<'_>),
         table: &ParameterTable<N>,
         start: &LogStart<'_>,
         storage: StorageState,
@@ -94,7 +94,7 @@ impl LogWriter {
             log.miss(due_us);
         }
         self.ticked_us = Some(now_us);
-        log.tick(tick, table, &mut self.ring);
+        log.tick(tick, beside, table, &mut self.ring);
     }
 
     /// Writes a change of the parameters, to be called after it.

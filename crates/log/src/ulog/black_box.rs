@@ -3,7 +3,7 @@
 use crate::ulog::definitions::{Definitions, LogStart, parameter};
 use crate::ulog::dropouts::Dropouts;
 use crate::ulog::known::Known;
-use crate::ulog::moment::{LoggedTick, Moment};
+use crate::ulog::moment::{BesideTick, Moment};
 use crate::ulog::ring::{LogRing, RingView};
 use crate::ulog::topics::{
     ActuatorArmed, ActuatorMotors, ActuatorOutputs, AidOffered, Aiding, BatteryVoltage, EscStatusReport,
@@ -12,12 +12,11 @@ use crate::ulog::topics::{
     VehicleAttitudeSetpoint, VehicleGlobalPosition, VehicleLocalPosition, VehicleLocalPositionSetpoint,
     VehicleRatesSetpoint, VehicleState,
 };
-use afbc_estimator::{ImuSample, Measurement};
+use afbc_estimator::Measurement;
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
-use afbc_onboard::{Aged, tracker_aid};
+use afbc_onboard::{Aged, TickRecord, tracker_aid};
 use afbc_store::RecordName;
-use afbc_types::{PerAxis, ROTORS_MAX, SensorCalibration, Stamped};
-use nalgebra::Vector3;
+use afbc_types::{PerAxis, ROTORS_MAX, Stamped};
 
 /// Bytes by which a damaged log is found again, and the time between two of them \[us\].
 const SYNC: [u8; 8] = [0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
@@ -59,14 +58,6 @@ struct Last {
     airborne: bool,
     /// When it was armed, and when it has taken off \[us\].
     since_us: [u64; 2],
-    idle_on_ground: bool,
-    /// True if the inertial sensor did not work.
-    is_blind: bool,
-    /// Estimated position of a vehicle at rest \[m\].
-    stands_m: Option<Vector3<f32>>,
-    /// True once the estimator runs.
-    runs: bool,
-    sample: Option<ImuSample>,
     /// Samples that are in no message yet.
     mean: Option<MeanSample>,
     /// When a measurement of each kind is due in a small log \[us\].
@@ -159,12 +150,12 @@ impl BlackBox {
     /// written.
     pub fn tick<const M: usize, const N: usize, const R: usize>(
         &mut self,
-        tick: &LoggedTick<'_, M>,
+        tick: &TickRecord<'_, M>,
+        beside: &BesideTick<'_>,
         table: &ParameterTable<N>,
         ring: &mut LogRing<R>,
     ) {
-        let LoggedTick { report, readings, ref taken, view, escs, origin } = *tick;
-        let now_us = report.time_us;
+        let now_us = tick.report.time_us;
         let mut ring = ring.view();
         self.definitions.write(now_us, table, self.pace, &mut ring);
         let writes = self.definitions.is_done();
@@ -175,22 +166,27 @@ impl BlackBox {
                 self.synced_us = now_us;
             }
         }
-        let report = report.padded();
-        let tick = LoggedTick { report: &report, readings, taken: *taken, view, escs, origin };
-        self.topics(&tick, writes, &mut ring);
+        let report = tick.report.padded();
+        self.topics(&TickRecord { report: &report, details: tick.details }, beside, writes, &mut ring);
     }
 
     /// Writes the topics of a tick, or only remembers it. Once, for vehicles with any number of rotors.
     #[inline(never)]
-    fn topics(&mut self, tick: &LoggedTick<'_, ROTORS_MAX>, writes: bool, ring: &mut RingView<'_>) {
-        let LoggedTick { report, readings, ref taken, view, escs, origin } = *tick;
-        let moment = Moment { report, readings, taken, view, escs, origin, known: &self.known };
+    fn topics(
+        &mut self,
+        tick: &TickRecord<'_, ROTORS_MAX>,
+        beside: &BesideTick<'_>,
+        writes: bool,
+        ring: &mut RingView<'_>,
+    ) {
+        let TickRecord { report, details } = *tick;
+        let moment = Moment { report, details, beside: *beside, known: &self.known };
         let now_us = report.time_us;
         let (due_us, dropouts) = (&mut self.due_us, &mut self.dropouts);
         let mut topics = Topics { now_us, writes, small: self.small, due_us, dropouts, ring };
         self.last.sensors(&moment, &mut topics);
         self.last.states(&moment, &mut topics);
-        self.last.advance(&moment);
+        (self.last.armed, self.last.airborne) = (report.mode.armed(), report.guided.airborne);
     }
 
     /// Writes what has changed of the parameters, as far as there is room, and at its pace.
@@ -279,12 +275,10 @@ impl Topics<'_, '_> {
 impl Last {
     /// Writes what the sensors have read, and what the estimator was offered of it.
     fn sensors(&mut self, moment: &Moment<'_>, topics: &mut Topics<'_, '_>) {
-        let (now_us, known) = (moment.now_us(), moment.known);
-        if let Some(Aged { value: [rates_rad_s, specific_force_m_s2], age_us }) = moment.readings.imu {
-            let read = ImuSample { at_us: now_us.saturating_sub(age_us.into()), rates_rad_s, specific_force_m_s2 };
-            let sample = known.imu.apply(&mut self.sample, read);
-            let clips = moment.view.estimate.is_some_and(|estimate| estimate.imu.clipped);
-            let mean = MeanSample::with(self.mean.take(), &sample, clips);
+        let (now_us, details) = (moment.now_us(), moment.details);
+        if let Some(sample) = &details.sample {
+            let clips = details.estimate.is_some_and(|estimate| estimate.imu.clipped);
+            let mean = MeanSample::with(self.mean.take(), sample, clips);
             let (message, at_us) = SensorCombined::of(&mean, self.sampled.as_ref(), topics.small);
             if topics.each(message) {
                 self.sampled = Some((message, at_us));
@@ -292,27 +286,29 @@ impl Last {
                 self.mean = Some(mean);
             }
         }
-        let pose = moment.taken.pose.filter(|pose| self.pose_us != Some(pose.at_us));
+        let pose = details.pose.filter(|pose| self.pose_us != Some(pose.at_us));
         self.pose_us = pose.map(|pose| pose.at_us).or(self.pose_us);
         let brought = pose.map(|Stamped { value, at_us }| Aged {
             value: tracker_aid(&value),
             age_us: u32::try_from(now_us.saturating_sub(at_us)).unwrap_or(u32::MAX),
         });
-        for read in moment.readings.aids.iter().flatten().chain(&brought) {
+        let read =
+            details.inputs.readings.aids.iter().zip(details.local).filter_map(|(read, local)| Some(((*read)?, local)));
+        for (read, local) in read.chain(brought.map(|pose| (pose, Some(pose.value)))) {
             if topics.small && !self.is_due(&read.value, now_us) {
                 continue;
             }
-            let aid = Aged { value: corrected(&read.value, &known.calibration), ..*read };
-            let _ = match Aiding::of(moment, &aid) {
+            // A fix is told as the receiver has it, in its own frame.
+            let told = local.filter(|_| !matches!(read.value, Measurement::Gnss { .. })).unwrap_or(read.value);
+            let _ = match Aiding::of(moment, &Aged { value: told, ..read }) {
                 Some(Aiding::Air(message)) => topics.at_once(&message),
                 Some(Aiding::Field(message)) => topics.at_once(&message),
                 Some(Aiding::Gnss(message)) => topics.at_once(&message),
                 Some(Aiding::Pose(message)) => topics.at_once(&message),
                 None => true,
             };
-            let offered = self.local(moment, aid.value).filter(|_| moment.view.estimate.is_some() && !self.is_blind);
-            if let Some(offered) = offered {
-                let at_us = now_us.saturating_sub(aid.age_us.into());
+            if let Some(offered) = local.filter(|_| details.offers) {
+                let at_us = now_us.saturating_sub(read.age_us.into());
                 let _ = topics.at_once(&AidOffered::of(now_us, at_us, &offered));
             }
         }
@@ -329,29 +325,12 @@ impl Last {
         true
     }
 
-    /// Returns a measurement in the local frame, as the estimator's front end makes it; none for a fix before a usable
-    /// one. While the vehicle is at rest, a usable fix tells where the frame's origin is.
-    fn local(&self, moment: &Moment<'_>, mut value: Measurement) -> Option<Measurement> {
-        let plausible = value.is_plausible();
-        if let Measurement::Gnss { position_m, horizontal_sigma_m, vertical_sigma_m, .. } = &mut value {
-            let origin_m = moment.view.origin_m?;
-            let most_m = moment.known.position_sigma_max_m;
-            let is_good = *horizontal_sigma_m <= most_m && *vertical_sigma_m <= most_m;
-            *position_m = match self.stands_m {
-                Some(stands_m) if is_good && self.runs && plausible => stands_m,
-                _ => *position_m - origin_m,
-            };
-        }
-        Some(value)
-    }
-
     /// Writes states, setpoints, commands and figures.
     fn states(&mut self, moment: &Moment<'_>, topics: &mut Topics<'_, '_>) {
         let (report, now_us) = (moment.report, moment.now_us());
         if let Some((axis, norm)) = report.norms {
             self.norms[axis] = [norm.theta_squared, norm.delta];
         }
-        let on_ground = !self.armed || self.idle_on_ground && !report.guided.airborne;
         let (is_armed, is_airborne) = (report.mode.armed(), report.guided.airborne);
         let [armed_us, airborne_us] = &mut self.since_us;
         for (since_us, was, is) in [(armed_us, self.armed, is_armed), (airborne_us, self.airborne, is_airborne)] {
@@ -378,7 +357,7 @@ impl Last {
         let _ = topics.at_rate(|| EstimatorFlags::of(moment));
         let _ = topics.at_rate(|| BatteryVoltage::of(moment));
         let _ = topics.at_rate(|| EscStatusReport::of(moment));
-        if let Some(figures) = EstimatorFigures::of(moment, on_ground) {
+        if let Some(figures) = EstimatorFigures::of(moment) {
             topics.on_change(&mut self.figures, figures, EstimatorFigures::is_like);
         }
         let state = VehicleState::of(moment, self.since_us);
@@ -391,28 +370,5 @@ impl Last {
         let timed =
             |last: &LandDetected, now: &LandDetected| LandDetected { timestamp: now.timestamp, ..*last } == *now;
         topics.on_change(&mut self.landing, LandDetected::of(moment), timed);
-    }
-
-    /// Remembers what the next tick needs.
-    fn advance(&mut self, moment: &Moment<'_>) {
-        let (report, estimate) = (moment.report, moment.view.estimate.as_ref());
-        (self.armed, self.airborne) = (report.mode.armed(), report.guided.airborne);
-        self.idle_on_ground = moment.view.idle_on_ground;
-        self.is_blind = estimate.is_some_and(|estimate| !estimate.imu.is_usable());
-        self.stands_m = estimate.filter(|estimate| estimate.at_rest).map(|estimate| estimate.state.position_m);
-        self.runs = estimate.is_some_and(|estimate| estimate.unready.is_none());
-    }
-}
-
-/// Returns a reading without the magnetometer's errors.
-fn corrected(read: &Measurement, calibration: &SensorCalibration) -> Measurement {
-    let of_field = |of: &SensorCalibration| [of.mag_offset_ut, of.mag_scale, of.mag_off_diagonal];
-    match *read {
-        Measurement::MagneticField { field, sigma }
-            if of_field(calibration) != of_field(&SensorCalibration::DEFAULT) =>
-        {
-            Measurement::MagneticField { field: calibration.field(&field), sigma }
-        }
-        other => other,
     }
 }

@@ -1,9 +1,7 @@
 //! What the log takes from the vehicle's configuration.
 
-use afbc_estimator::ImuCalibration;
 use afbc_flight_core::numbering::{ARDUPILOT, rotors_of_outputs};
 use afbc_onboard::Configuration;
-use afbc_types::SensorCalibration;
 
 /// Motors in a message.
 pub(crate) const MOTORS: usize = 12;
@@ -19,26 +17,19 @@ pub(crate) struct Known {
     pub(crate) share_per_speed_squared: f32,
     /// Largest force of all rotors \[N\].
     pub(crate) thrust_max_n: f32,
-    pub(crate) imu: ImuCalibration,
-    pub(crate) calibration: SensorCalibration,
-    /// Largest standard deviation of a position that counts \[m\].
-    pub(crate) position_sigma_max_m: f32,
     /// Its MAVLink system id.
     pub(crate) system: u8,
 }
 
 impl Known {
     pub(crate) fn of<const N: usize>(configuration: &Configuration<N>) -> Self {
-        let Configuration { airframe, settings, imu, calibration, estimation, link, .. } = configuration;
+        let Configuration { airframe, settings, link, .. } = configuration;
         let force_max_n = settings.common.rotor_force_max_n;
         Known {
             rotor_of_motor: rotors_of_outputs(ARDUPILOT, &airframe.rotors),
             rotors: N,
             share_per_speed_squared: airframe.parameters.thrust_factor_n_s2 / force_max_n,
             thrust_max_n: force_max_n * N as f32,
-            imu: ImuCalibration::calibrated(imu, calibration),
-            calibration: *calibration,
-            position_sigma_max_m: estimation.position_sigma_max_m,
             system: u8::try_from(link.system).unwrap_or(1),
         }
     }

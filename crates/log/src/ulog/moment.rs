@@ -2,37 +2,13 @@
 
 use crate::ulog::known::Known;
 use afbc_estimator::Origin;
-use afbc_guidance::{BatteryReading, Sticks};
-use afbc_onboard::{ControlInputs, EscTelemetry, FlightView, Readings, Report};
-use afbc_types::{Pose, ROTORS_MAX, Stamped, State};
+use afbc_onboard::{EscTelemetry, Report, TickDetails};
+use afbc_types::{ROTORS_MAX, State};
 use nalgebra::Vector3;
 
-/// Inputs of a tick that are logged, to be taken before it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct TakenInputs {
-    pub(crate) pose: Option<Stamped<Pose>>,
-    pub(crate) sticks: Option<Stamped<Sticks>>,
-    pub(crate) battery: Option<BatteryReading>,
-}
-
-impl TakenInputs {
-    /// Returns those of a tick's inputs.
-    pub fn of(inputs: &ControlInputs) -> Self {
-        TakenInputs { pose: inputs.inbox.pose().copied(), sticks: inputs.orders.sticks, battery: inputs.battery }
-    }
-}
-
-/// A tick: what it took, and what it gave.
-#[derive(Clone, Copy, Debug)]
-pub struct LoggedTick<'a, const N: usize = 4> {
-    /// Its report.
-    pub report: &'a Report<N>,
-    /// What the sensors had read.
-    pub readings: &'a Readings,
-    /// What messages had brought.
-    pub taken: TakenInputs,
-    /// What the flight knows after it.
-    pub view: &'a FlightView,
+/// What is logged beside a tick: the control task does not know it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BesideTick<'a> {
     /// What the motor controllers have told, if there is a line for it.
     pub escs: Option<&'a EscTelemetry>,
     /// Place on the earth from which fixes of a GNSS receiver are measured, once it is known.
@@ -43,11 +19,8 @@ pub struct LoggedTick<'a, const N: usize = 4> {
 #[derive(Clone, Copy)]
 pub(crate) struct Moment<'a> {
     pub(crate) report: &'a Report<ROTORS_MAX>,
-    pub(crate) readings: &'a Readings,
-    pub(crate) taken: &'a TakenInputs,
-    pub(crate) view: &'a FlightView,
-    pub(crate) escs: Option<&'a EscTelemetry>,
-    pub(crate) origin: Option<Origin>,
+    pub(crate) details: &'a TickDetails,
+    pub(crate) beside: BesideTick<'a>,
     pub(crate) known: &'a Known,
 }
 
@@ -58,7 +31,7 @@ impl Moment<'_> {
 
     /// Returns the state: the vehicle's own estimate of it once there is one, or what the flight core flies on.
     pub(crate) fn state(&self) -> Option<State> {
-        let FlightView { estimate, state, .. } = self.view;
+        let TickDetails { estimate, state, .. } = self.details;
         match estimate {
             Some(estimate) => Some(estimate.state).filter(|_| estimate.unready.is_none()),
             None => *state,
@@ -67,7 +40,7 @@ impl Moment<'_> {
 
     /// Returns the time at which the state was true.
     pub(crate) fn state_us(&self) -> u64 {
-        self.view.estimate.as_ref().map_or(self.now_us(), |estimate| estimate.at_us)
+        self.details.estimate.as_ref().map_or(self.now_us(), |estimate| estimate.at_us)
     }
 
     /// Returns the attitude as a quaternion w, x, y, z, between PX4's frames.
@@ -77,13 +50,13 @@ impl Moment<'_> {
             let q = state.quaternion().coords;
             [q.w, q.x, q.y, q.z]
         };
-        Some(flip_turn(self.view.estimate.as_ref().map_or_else(quaternion, |estimate| estimate.attitude)))
+        Some(flip_turn(self.details.estimate.as_ref().map_or_else(quaternion, |estimate| estimate.attitude)))
     }
 
     /// Returns where on the earth the local frame's origin is.
     pub(crate) fn reference(&self) -> Option<[f64; 3]> {
-        let origin = self.origin?;
-        Some(origin.global(&self.view.origin_m?))
+        let origin = self.beside.origin?;
+        Some(origin.global(&self.details.origin_m?))
     }
 }
 

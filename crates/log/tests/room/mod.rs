@@ -11,9 +11,9 @@ use afbc_log::storage::{
     BlockSink, CardError, CardKeeper, KeptLogs, LogBlock, LogCard, LogKeeper, LogMode, LogPage, LogPages, LogQuery,
     LogWriter, StorageState,
 };
-use afbc_log::ulog::{LogStart, LoggedTick, TakenInputs};
+use afbc_log::ulog::{BesideTick, LogStart};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
-use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Readings};
+use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Readings, TickInputs, TickRecord};
 use afbc_store::RecordName;
 use nalgebra::Vector3;
 use std::cell::RefCell;
@@ -318,17 +318,17 @@ impl<S: Storage> Room<S> {
         let imu = Some(Aged { value: [Vector3::new(0.0, noise, 0.0), Vector3::new(noise, 0.0, 9.81)], age_us: 0 });
         let aid = Aged { value: Measurement::Height { height_m: 1.5, sigma_m: 0.5 }, age_us: 300 };
         let readings = Readings { imu, aids: [now_us.is_multiple_of(20_000).then_some(aid), None] };
-        let mut inputs = ControlInputs::EMPTY;
-        let taken = TakenInputs::of(&inputs);
-        let report = self.flight.tick(now_us, &mut inputs, &readings);
-        let view = self.flight.view(now_us);
-        let tick = LoggedTick { report: &report, readings: &readings, taken, view: &view, escs: None, origin: None };
+        let (mut messages, inputs) =
+            (ControlInputs::EMPTY, TickInputs { time_us: now_us, readings, ..TickInputs::default() });
+        let report = self.flight.tick(inputs.time_us, &mut messages, &readings);
+        let details = self.flight.details(&inputs, None, &messages);
+        let tick = TickRecord { report: &report, details: &details };
         let start = LogStart { vehicle: "paper", law: "afbc", hardware: "test", ..LogStart::default() };
         let Room { writer, table, state, queue, .. } = self;
         if writer.wants(now_us, self.armed, self.mode) {
             self.wanted += 1;
             if !misses {
-                writer.tick(&tick, table, &start, *state, TICK_US);
+                writer.tick((&tick, &BesideTick::default()), table, &start, *state, TICK_US);
             }
         }
         if let Some((text, is_warning)) = writer.news(*state) {

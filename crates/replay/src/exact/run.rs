@@ -4,8 +4,8 @@ use super::compare::ChangeComparison;
 use super::frames;
 use super::outcome::{ExactReplay, FirstDifference, GivenSignal, LoggedParameter, ReplayFinding};
 use super::player::Players;
-use afbc_log::exact::{FrameError, Given, Record, ReplayDifference, ReplayStep, StartRecord, TickRecord, decode};
-use afbc_onboard::Report;
+use afbc_log::exact::{FrameError, Given, Record, ReplayDifference, ReplayStep, StartRecord, decode};
+use afbc_onboard::{Report, TickInputs};
 use afbc_types::ROTORS_MAX;
 
 /// Number of bytes between two calls of `progress`.
@@ -92,7 +92,7 @@ pub(super) fn run(
 impl Run {
     fn take(&mut self, byte: usize, record: &Record) -> Result<(), String> {
         // Ticks are missing after the last one.
-        let before_us = matches!(record, Record::Tick(tick) if tick.number != self.next).then_some(self.last_us);
+        let before_us = matches!(record, Record::Tick(tick, _) if tick.number != self.next).then_some(self.last_us);
         self.count(record);
         if self.out.first_difference.is_some() || self.out.starts == 0 {
             return Ok(());
@@ -124,7 +124,7 @@ impl Run {
             ReplayStep::Same(report) | ReplayStep::Differs(_, Some(report)) => Some(report),
             ReplayStep::Nothing | ReplayStep::Differs(_, None) => None,
         };
-        if let (Some(flown), Some(other), Record::Tick(tick)) = (flown, other, record) {
+        if let (Some(flown), Some(other), Record::Tick(tick, _)) = (flown, other, record) {
             self.compare(tick, &flown, &other);
         }
         Ok(())
@@ -152,8 +152,8 @@ impl Run {
                 self.out.parameters.push(LoggedParameter { at_s, name: None, value: 0.0 });
             }
             Record::Inputs { .. } => self.out.messages += 1,
-            Record::Tick(tick) => {
-                let armed = tick.given.throttles.iter().any(|throttle| *throttle > 0);
+            Record::Tick(tick, given) => {
+                let armed = given.throttles.iter().any(|throttle| *throttle > 0);
                 self.first_us.get_or_insert(tick.time_us);
                 self.out.ticks += 1;
                 self.out.armed_ticks += u64::from(armed);
@@ -176,7 +176,7 @@ impl Run {
         self.began_us.saturating_add(time_us.saturating_sub(first_us).try_into().unwrap_or(i64::MAX))
     }
 
-    fn compare(&mut self, tick: &TickRecord, flown: &Report<ROTORS_MAX>, other: &Report<ROTORS_MAX>) {
+    fn compare(&mut self, tick: &TickInputs, flown: &Report<ROTORS_MAX>, other: &Report<ROTORS_MAX>) {
         let time_s = self.now_us(tick.time_us) as f64 * 1e-6;
         let Players { flown: player, changed: Some(changed), .. } = &self.players else { return };
         let (trace, other_trace) = (player.trace(), changed.trace());

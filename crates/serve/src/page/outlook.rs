@@ -33,7 +33,7 @@ pub(crate) fn reference(vehicle: &ServedVehicle, frame: &LocalFrame) -> Option<R
 
 /// Returns what the vehicle estimates.
 pub(crate) fn estimate(vehicle: &ServedVehicle, frame: &LocalFrame) -> Option<EstimateView> {
-    let estimate = vehicle.host().view().estimate?;
+    let estimate = vehicle.host().details().estimate?;
     let (state, sigmas, validity) = (&estimate.state, &estimate.sigmas, &estimate.validity);
     Some(EstimateView {
         position_m: frame.earth(&state.position_m).into(),
@@ -84,12 +84,12 @@ pub(crate) fn payload_kg(vehicle: &ServedVehicle) -> f32 {
 
 /// Returns errors and estimates of the law.
 pub(crate) fn adaptation(vehicle: &ServedVehicle) -> Adaptation {
-    let (view, estimates) = (vehicle.host().view(), vehicle.host().estimates());
+    let (details, estimates) = (vehicle.host().details(), vehicle.host().estimates());
     let model = ModelConstants::new(&vehicle.scenario().vehicle.to_f32());
     let state = vehicle.world().plant().motion().measure();
     let in_cascade = vehicle.law().in_cascade();
     let axis = |axis: Axis| {
-        let (errors, estimate) = (&view.trace.errors[axis], estimates.as_ref().map(|all| &all[axis]));
+        let (errors, estimate) = (&details.trace.errors[axis], estimates.as_ref().map(|all| &all[axis]));
         AxisAdaptation {
             name: axis.name(),
             e1: errors.e1,

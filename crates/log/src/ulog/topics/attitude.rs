@@ -17,7 +17,7 @@ message! {
 
 impl VehicleAttitude {
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
-        let resets = moment.view.estimate.map_or(0, |estimate| estimate.resets.heading);
+        let resets = moment.details.estimate.map_or(0, |estimate| estimate.resets.heading);
         Some(VehicleAttitude {
             timestamp: moment.now_us(),
             timestamp_sample: moment.state_us(),
@@ -44,7 +44,7 @@ impl VehicleAttitudeSetpoint {
     /// None while disarmed, or without a setpoint.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
         let setpoint = moment.report.guided.setpoint.filter(|_| moment.report.mode.armed())?;
-        let Trace { inputs, filtered: [roll, pitch], .. } = moment.view.trace;
+        let Trace { inputs, filtered: [roll, pitch], .. } = moment.details.trace;
         let attitude_rad = Vector3::new(roll.angle, pitch.angle, setpoint.yaw_rad);
         let q = State { attitude_rad, ..State::default() }.quaternion().coords;
         Some(VehicleAttitudeSetpoint {

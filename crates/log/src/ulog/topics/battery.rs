@@ -16,7 +16,7 @@ message! {
 impl BatteryVoltage {
     /// None if it is not measured.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
-        let reading = moment.taken.battery?;
+        let reading = moment.details.inputs.battery?;
         Some(BatteryVoltage {
             timestamp: moment.now_us(),
             voltage_v: reading.voltage_v,

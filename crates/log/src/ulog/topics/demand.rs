@@ -18,7 +18,7 @@ impl ThrustDemand {
         moment.report.mode.armed().then(|| ThrustDemand {
             timestamp: moment.now_us(),
             timestamp_sample: moment.state_us(),
-            xyz: [0.0, 0.0, -moment.view.trace.inputs.thrust_n / moment.known.thrust_max_n],
+            xyz: [0.0, 0.0, -moment.details.trace.inputs.thrust_n / moment.known.thrust_max_n],
         })
     }
 }
@@ -34,7 +34,7 @@ message! {
 impl TorqueDemand {
     /// None while disarmed.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
-        let inputs = &moment.view.trace.inputs;
+        let inputs = &moment.details.trace.inputs;
         let forces_n = Vector3::new(inputs.roll_n, inputs.pitch_n, inputs.yaw_n);
         moment.report.mode.armed().then(|| TorqueDemand {
             timestamp: moment.now_us(),

@@ -76,7 +76,7 @@ impl EscStatusReport {
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
         // 60 s / 2 pi: revolutions per minute.
         const RPM: f32 = 60.0 / core::f32::consts::TAU;
-        let (escs, known, now_us) = (moment.escs.filter(|escs| escs.is_known())?, moment.known, moment.now_us());
+        let (escs, known, now_us) = (moment.beside.escs.filter(|escs| escs.is_known())?, moment.known, moment.now_us());
         let (mut esc, mut online) = ([EscReport::default(); ESCS], 0_u8);
         let answers = escs.online(now_us);
         for ((to, rotor), motor) in esc.iter_mut().zip(known.rotor_of_motor).zip(0_u8..) {

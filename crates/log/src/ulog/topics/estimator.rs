@@ -25,7 +25,7 @@ message! {
 impl EstimatorVector {
     /// None before the start.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
-        let estimate = moment.view.estimate.filter(|estimate| estimate.unready.is_none())?;
+        let estimate = moment.details.estimate.filter(|estimate| estimate.unready.is_none())?;
         let Estimate { state, sigmas, .. } = &estimate;
         let vectors = [state.velocity_m_s, state.position_m, estimate.gyro_bias_rad_s, estimate.accel_bias_m_s2];
         let all = flip_turn(estimate.attitude).into_iter().chain(vectors.into_iter().flat_map(flip));
@@ -69,7 +69,7 @@ message! {
 impl EstimatorFlags {
     /// None without an inertial sensor.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
-        let estimate = moment.view.estimate?;
+        let estimate = moment.details.estimate?;
         let (validity, resets, sigmas) = (estimate.validity, estimate.resets, estimate.sigmas);
         let is_global = validity.position && moment.reference().is_some();
         // Attitude; horizontal and vertical velocity; relative and absolute horizontal position; absolute height.
@@ -114,8 +114,8 @@ message! {
 
 impl EstimatorFigures {
     /// None without an inertial sensor.
-    pub(crate) fn of(moment: &Moment<'_>, on_ground: bool) -> Option<Self> {
-        let (estimate, aids) = (moment.view.estimate?, &moment.view.aids);
+    pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
+        let (estimate, aids) = (moment.details.estimate?, &moment.details.aids);
         let records = Aid::ALL.map(|aid| *aids.of(aid));
         Some(EstimatorFigures {
             timestamp: moment.now_us(),
@@ -126,7 +126,7 @@ impl EstimatorFigures {
             height_offset_m: estimate.height_offset_m,
             vibration_m_s2: estimate.imu.vibration_m_s2,
             scalars: records.map(|record| record.scalars),
-            on_ground,
+            on_ground: moment.details.on_ground,
             at_rest: estimate.at_rest,
         })
     }

@@ -19,9 +19,9 @@ message! {
 impl VehicleGlobalPosition {
     /// None unless position and origin are known.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
-        let estimate = moment.view.estimate.filter(|estimate| estimate.validity.position)?;
-        let place_m = estimate.state.position_m + moment.view.origin_m?;
-        let [lat, lon, alt] = moment.origin?.global(&place_m);
+        let estimate = moment.details.estimate.filter(|estimate| estimate.validity.position)?;
+        let place_m = estimate.state.position_m + moment.details.origin_m?;
+        let [lat, lon, alt] = moment.beside.origin?.global(&place_m);
         let sigmas = estimate.sigmas.position_m;
         Some(VehicleGlobalPosition {
             timestamp: moment.now_us(),

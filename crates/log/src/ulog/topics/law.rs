@@ -30,7 +30,7 @@ message! {
 impl LawSignals {
     /// `norms` are those that have been reported last: |Theta_hat|^2 and delta_hat.
     pub(crate) fn of(moment: &Moment<'_>, norms: &PerAxis<[f32; 2]>) -> Self {
-        let (trace, report) = (&moment.view.trace, moment.report);
+        let (trace, report) = (&moment.details.trace, moment.report);
         let of = |part: fn(&Errors) -> f32| Axis::ALL.map(|axis| part(&trace.errors[axis]));
         let inputs = &trace.inputs;
         let norm = |part: fn(&[f32; 2]) -> f32| Axis::ALL.map(|axis| part(&norms[axis]));

@@ -42,9 +42,9 @@ message! {
 impl VehicleLocalPosition {
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
         let state = moment.state()?;
-        let estimate = moment.view.estimate.unwrap_or_default();
+        let estimate = moment.details.estimate.unwrap_or_default();
         let (resets, sigmas) = (estimate.resets, estimate.sigmas);
-        let validity = match &moment.view.estimate {
+        let validity = match &moment.details.estimate {
             Some(estimate) => estimate.validity,
             // Of a state that the link has brought nothing else is known.
             None => {

@@ -37,7 +37,7 @@ impl VehicleRatesSetpoint {
     /// None while disarmed, or without a state.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
         let state = moment.state().filter(|_| moment.report.mode.armed())?;
-        let trace = &moment.view.trace;
+        let trace = &moment.details.trace;
         // e2 is 0 for a law without a virtual control.
         let error = |Errors { e1_dot, e2, .. }: Errors| if e2 == 0.0 { e1_dot } else { e2 };
         let errors = &trace.errors;

@@ -177,7 +177,7 @@ impl Aiding {
                 speed_sigma_m_s,
                 ..
             } => {
-                let [latitude_deg, longitude_deg, altitude_msl_m] = moment.origin?.global(&position_m);
+                let [latitude_deg, longitude_deg, altitude_msl_m] = moment.beside.origin?.global(&position_m);
                 let [vel_n_m_s, vel_e_m_s, vel_d_m_s] = flip(velocity_m_s);
                 Aiding::Gnss(VehicleGpsPosition {
                     timestamp,

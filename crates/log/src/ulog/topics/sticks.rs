@@ -22,7 +22,7 @@ message! {
 impl ManualControl {
     /// None as long as nobody has moved any.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
-        let sticks = moment.taken.sticks?;
+        let sticks = moment.details.sticks?;
         Some(ManualControl {
             timestamp: moment.now_us(),
             timestamp_sample: sticks.at_us,
