@@ -93,8 +93,20 @@ pub(crate) trait Message {
 }
 
 /// Declares a topic: its name, the type of its messages, and their fields with types and units. Every one begins with
-/// the time since power-up.
+/// the time since power-up. With `of`, the name of what a message is made of, each field has its value in its line,
+/// too: a signal more is one line more.
 macro_rules! message {
+    ($(#[$doc:meta])* $name:literal $type:ident of $moment:ident $(, $given:ident: $what:ty)* {
+        $($field:ident: $kind:ty = $unit:literal => $value:expr),* $(,)?
+    }) => {
+        $crate::ulog::layout::message! { $(#[$doc])* $name $type { $($field: $kind = $unit),* } }
+
+        impl $type {
+            pub(crate) fn of($moment: &$crate::ulog::moment::Moment<'_> $(, $given: $what)*) -> Self {
+                $type { timestamp: $moment.now_us(), $($field: $value,)* }
+            }
+        }
+    };
     ($(#[$doc:meta])* $name:literal $type:ident { $($field:ident: $kind:ty = $unit:literal),* $(,)? }) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,3 +132,56 @@ macro_rules! message {
 }
 
 pub(crate) use message;
+
+#[cfg(test)]
+mod tests {
+    use super::Message;
+    use crate::ulog::known::Known;
+    use crate::ulog::moment::{BesideTick, Moment};
+    use crate::ulog::record::Content;
+    use afbc_onboard::{Configuration, ControlInputs, Flight, Readings, TickDetails};
+    use std::vec::Vec;
+
+    extern crate std;
+
+    message! {
+        /// Two signals.
+        "two" Two of moment {
+            airborne: bool = "" => moment.report.guided.airborne,
+            saturated_ticks: u32 = "" => moment.report.saturated_ticks,
+        }
+    }
+
+    // The same, and the line that logs another signal.
+    message! {
+        /// Three signals.
+        "three" Three of moment {
+            airborne: bool = "" => moment.report.guided.airborne,
+            saturated_ticks: u32 = "" => moment.report.saturated_ticks,
+            wanted: u16 = "item" => moment.report.guided.wanted,
+        }
+    }
+
+    fn bytes(message: &impl Message) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        message.write(&mut Content::new(&mut |byte| bytes.push(byte)));
+        bytes
+    }
+
+    /// One line more in a topic is one signal more in its format and in its messages.
+    #[test]
+    fn a_signal_more_is_one_line_more() {
+        let configuration = Configuration::<4>::default();
+        let Ok(mut flight) = Flight::new(&configuration) else { unreachable!("of an image") };
+        let mut report = flight.tick(7, &mut ControlInputs::EMPTY.clone(), &Readings::NONE).padded();
+        (report.saturated_ticks, report.guided.wanted) = (5, 0x0203);
+        let (known, details) = (&Known::of(&configuration), &TickDetails::default());
+        let moment = Moment { report: &report, details, beside: BesideTick::default(), known };
+        let (two, three) = (Two::of(&moment), Three::of(&moment));
+        assert_eq!(bytes(&two), [7, 0, 0, 0, 0, 0, 0, 0, 0, 5, 0, 0, 0]);
+        assert_eq!(bytes(&three), [bytes(&two), [3, 2].into()].concat());
+        let names: Vec<_> = Three::FIELDS.iter().map(|field| (field.name, field.kind)).collect();
+        let those = Two::FIELDS.iter().map(|field| (field.name, field.kind));
+        assert_eq!(names, those.chain([("wanted", "uint16_t")]).collect::<Vec<_>>());
+    }
+}

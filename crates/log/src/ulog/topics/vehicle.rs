@@ -71,34 +71,16 @@ fn nav_state(core: Mode, mode: FlightMode) -> u8 {
 
 message! {
     /// Whether the motors may turn.
-    "actuator_armed" ActuatorArmed {
-        armed: bool = "",
-        ready_to_arm: bool = "",
-    }
-}
-
-impl ActuatorArmed {
-    pub(crate) fn of(moment: &Moment<'_>) -> Self {
-        let report = moment.report;
-        ActuatorArmed {
-            timestamp: moment.now_us(),
-            armed: report.mode.armed(),
-            ready_to_arm: report.against == afbc_flight_core::Reasons::default(),
-        }
+    "actuator_armed" ActuatorArmed of moment {
+        armed: bool = "" => moment.report.mode.armed(),
+        ready_to_arm: bool = "" => moment.report.against.is_empty(),
     }
 }
 
 message! {
     /// Whether it is on the ground.
-    "vehicle_land_detected" LandDetected {
-        maybe_landed: bool = "",
-        landed: bool = "",
-    }
-}
-
-impl LandDetected {
-    pub(crate) fn of(moment: &Moment<'_>) -> Self {
-        let landed = !moment.report.guided.airborne;
-        LandDetected { timestamp: moment.now_us(), maybe_landed: landed, landed }
+    "vehicle_land_detected" LandDetected of moment {
+        maybe_landed: bool = "" => !moment.report.guided.airborne,
+        landed: bool = "" => !moment.report.guided.airborne,
     }
 }
