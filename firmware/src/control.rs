@@ -8,8 +8,7 @@ use crate::samples::{self, Sampler as _};
 use crate::ticks::{self, Tick};
 use crate::time::{self, Stopwatch};
 use crate::vehicle::{Configuration, Flight, Prepared, Report};
-use afbc_onboard::{ControlInputs, TickDetails, TickInputs};
-use afbc_types::{Pose, Stamped};
+use afbc_onboard::{ControlInputs, TickBefore, TickDetails, TickInputs};
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
@@ -83,14 +82,14 @@ pub fn make(configuration: &Configuration) -> &'static mut Flight {
 
 /// Runs the ticks.
 pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
-    let (mut messages, mut inputs, mut pose) = (ControlInputs::EMPTY, TickInputs::default(), None);
+    let (mut messages, mut inputs, mut before) = (ControlInputs::EMPTY, TickInputs::default(), TickBefore::default());
     let mut details = if recording::is_possible::<B>() { ticks::details_in() } else { None };
     loop {
         // Not a ticker, whose periods begin when it is created: just after the start of a control period, when alarms
         // are due, it would tick twice in every second period.
         Timer::at(time::next_period()).await;
         let stopwatch = Stopwatch::start();
-        let report = tick(flight, &mut messages, &mut inputs, &mut pose, board);
+        let report = tick(flight, &mut messages, &mut inputs, &mut before, board);
         let mut is_detailed = false;
         if recording::is_possible::<B>()
             && (recording::records() || B::HAS_LOG && logging::is_wanted())
@@ -98,7 +97,7 @@ pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
         {
             (inputs.time_us, inputs.battery, is_detailed) = (report.time_us, messages.battery, true);
             if B::HAS_LOG {
-                write_details(slot, flight, &inputs, pose, &messages);
+                write_details(slot, flight, &inputs, &before, &messages);
             } else {
                 // The exact log has no more of them: what tells the rest is not in the image.
                 slot.inputs = inputs;
@@ -138,10 +137,10 @@ fn write_details(
     slot: &mut TickDetails,
     flight: &Flight,
     inputs: &TickInputs,
-    pose: Option<Stamped<Pose>>,
+    before: &TickBefore,
     messages: &ControlInputs,
 ) {
-    *slot = flight.details(inputs, pose, messages);
+    *slot = flight.details(inputs, before, messages);
 }
 
 /// Moves the notch, if it is to be moved; returns where to \[rad/s\]. Out of line, as below.
@@ -173,7 +172,7 @@ fn tick<B: Board>(
     flight: &mut Flight,
     messages: &mut ControlInputs,
     inputs: &mut TickInputs,
-    pose: &mut Option<Stamped<Pose>>,
+    before: &mut TickBefore,
     board: &mut B,
 ) -> Report {
     let now_us = Instant::now().as_micros();
@@ -190,8 +189,7 @@ fn tick<B: Board>(
     });
 
     if B::HAS_LOG && logging::is_wanted() {
-        // The tick hands it over.
-        *pose = messages.inbox.pose().copied();
+        *before = flight.before(messages);
     }
     let clock_failed = board.clock_has_failed();
     if recording::is_possible::<B>() {

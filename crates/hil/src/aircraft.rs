@@ -8,13 +8,13 @@ use afbc_log::exact::Recorder;
 use afbc_log::ulog::{BlackBox, LogStart};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{
-    Configuration, ControlInputs, EscTelemetry, Flight, ImuSelector, Link, Prepare, Readings, Report, TickDetails,
-    TickInputs, TickRecord,
+    Configuration, ControlInputs, EscTelemetry, Flight, ImuSelector, Link, Prepare, Readings, Report, TickBefore,
+    TickDetails, TickInputs, TickRecord,
 };
 use afbc_scenario::{AnyController, FlownLaw};
 use afbc_station::{Calibrator, Comms, EscAction, EscReports, EscsHeard, RadioControl};
 use afbc_store::RecordName;
-use afbc_types::{OutOfRange, PerAxis, Pose, ROTORS_MAX, Stamped};
+use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX};
 
 /// Makes the exact log, and what takes its bytes.
 pub(crate) struct ExactLog {
@@ -56,8 +56,10 @@ pub(crate) trait Core {
     fn metadata(&self, vehicle: &str) -> MetadataFiles;
     /// Returns name and value of every parameter.
     fn parameter_values(&self) -> Vec<(RecordName, f32)>;
+    /// Returns what logs have of the time before a tick ([`Flight::before`]).
+    fn before(&self, messages: &ControlInputs) -> TickBefore;
     /// Returns what logs have of the last tick ([`Flight::details`]).
-    fn details(&self, inputs: &TickInputs, pose: Option<Stamped<Pose>>, messages: &ControlInputs) -> TickDetails;
+    fn details(&self, inputs: &TickInputs, before: &TickBefore, messages: &ControlInputs) -> TickDetails;
     /// Returns AFBC's estimates, if it flies.
     fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>>;
     /// Flies on under this law, or the image's.
@@ -150,8 +152,12 @@ impl<const N: usize> Core for Aircraft<N> {
         self.table.iter().map(|parameter| (parameter.name, parameter.value)).collect()
     }
 
-    fn details(&self, inputs: &TickInputs, pose: Option<Stamped<Pose>>, messages: &ControlInputs) -> TickDetails {
-        self.flight.details(inputs, pose, messages)
+    fn details(&self, inputs: &TickInputs, before: &TickBefore, messages: &ControlInputs) -> TickDetails {
+        self.flight.details(inputs, before, messages)
+    }
+
+    fn before(&self, messages: &ControlInputs) -> TickBefore {
+        self.flight.before(messages)
     }
 
     fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>> {

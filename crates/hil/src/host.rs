@@ -16,8 +16,8 @@ use afbc_log::exact::Recorder;
 use afbc_log::ulog::LogStart;
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
 use afbc_onboard::{
-    Configuration, ControlInputs, Flight, ImuSelector, Link, Prepare, RawReadings, Readings, Report, TickDetails,
-    TickInputs, TickRecord,
+    Configuration, ControlInputs, Flight, ImuSelector, Link, Prepare, RawReadings, Readings, Report, TickBefore,
+    TickDetails, TickInputs, TickRecord,
 };
 use afbc_plant::Plant;
 use afbc_scenario::FlownLaw;
@@ -25,7 +25,7 @@ use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_station::services::signing::{Signing, SigningRecord};
 use afbc_station::{Calibrator, Comms, EscReports, EscsHeard, RadioControl, Setup, Transfers};
 use afbc_store::{RecordName, Store};
-use afbc_types::{OutOfRange, PerAxis, Pose, ROTORS_MAX, Stamped, with_rotors};
+use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX, with_rotors};
 use afbc_vehicles::Vehicle;
 
 /// The firmware without its hardware, ticked in lockstep.
@@ -34,9 +34,9 @@ pub struct Host {
     setup: Setup,
     comms: Comms,
     inputs: ControlInputs,
-    /// What the last tick took of it, and the tracker's pose in it, which the tick has handed over.
+    /// What the last tick took of it, and what was before that tick.
     taken: ControlInputs,
-    pose: Option<Stamped<Pose>>,
+    before: TickBefore,
     /// What the last tick took beside.
     took: TickInputs,
     readings: Readings,
@@ -168,7 +168,7 @@ impl Host {
             comms: Comms::with(setup),
             inputs: ControlInputs::EMPTY,
             taken: ControlInputs::EMPTY,
-            pose: None,
+            before: TickBefore::default(),
             took: TickInputs::default(),
             readings: Readings::NONE,
             radio: Box::default(),
@@ -213,7 +213,7 @@ impl Host {
 
     /// Returns what logs have of the last tick.
     pub fn details(&self) -> TickDetails {
-        self.flight.details(&self.took, self.pose, &self.taken)
+        self.flight.details(&self.took, &self.before, &self.taken)
     }
 
     /// Returns AFBC's estimates in this or the last flight, if it flies.
@@ -334,7 +334,7 @@ impl Host {
         self.inputs.take_into(&mut self.taken);
         let (readings, battery) = (core::mem::take(&mut self.readings), self.taken.battery);
         self.took = TickInputs { time_us, readings, battery, ..self.next };
-        self.pose = self.taken.inbox.pose().copied();
+        self.before = self.flight.before(&self.taken);
         let mut bytes = Vec::new();
         let mut send = |frame: &[u8]| bytes.extend_from_slice(frame);
         let escs = core::mem::take(&mut self.escs);

@@ -10,7 +10,9 @@ use afbc_guidance::FlightMode;
 use afbc_guidance::notice::Cause;
 use afbc_log::ulog::{BesideTick, BlackBox, LogRing, LogStart};
 use afbc_onboard::parameters::ParameterTable;
-use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Report, TickDetails, TickInputs, TickRecord};
+use afbc_onboard::{
+    Aged, Configuration, ControlInputs, Flight, Report, TickBefore, TickDetails, TickInputs, TickRecord,
+};
 use afbc_types::{Axis, Pose, PoseSigmas, Setpoint, State};
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -33,7 +35,7 @@ impl Tick {
         let (mut messages, inputs) = (ControlInputs::EMPTY, TickInputs { time_us: 1_000, ..TickInputs::default() });
         let mut report = flight.tick(inputs.time_us, &mut messages, &inputs.readings);
         report.time_us = NOW_US;
-        Tick { report, details: flight.details(&inputs, None, &messages), origin: None }
+        Tick { report, details: flight.details(&inputs, &TickBefore::default(), &messages), origin: None }
     }
 
     /// Reads aids, of which the estimator is offered `local`.

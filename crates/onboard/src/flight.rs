@@ -8,12 +8,12 @@ use crate::imu_selector::ImuSelector;
 use crate::law::FlightLaw;
 use crate::readings::Readings;
 use crate::sensor_timeouts::SensorTimeouts;
-use crate::tick_record::{Report, TickDetails, TickInputs};
+use crate::tick_record::{Report, TickBefore, TickDetails, TickInputs};
 use afbc::Guarded;
 use afbc_control::Trace;
 use afbc_estimator::{Estimator, OutputFilter, VelocityNotch};
 use afbc_flight_core::{FlightCore, FlightCoreMemory, Motor};
-use afbc_types::{Declared, OutOfRange, Pose, Stamped};
+use afbc_types::{Declared, OutOfRange};
 
 /// A vehicle under a law: AFBC with its monitor, unless it is simulated or replayed under another.
 #[derive(Clone, Debug)]
@@ -183,18 +183,23 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
         self.memory.trace::<C, N>()
     }
 
+    /// Returns what logs have of the time before the tick that takes these messages.
+    pub fn before(&self, messages: &ControlInputs) -> TickBefore {
+        let (stands_m, works) = self.front_end.before();
+        TickBefore { pose: messages.inbox.pose().copied(), stands_m, works }
+    }
+
     /// Returns what logs have of the last tick beside its report: beside the tick, not in it, and before anything else
-    /// changes. The tick had these inputs; `pose` is what messages had brought of one, which the tick has handed over,
-    /// and `messages` is what it has left of the rest.
-    pub fn details(&self, inputs: &TickInputs, pose: Option<Stamped<Pose>>, messages: &ControlInputs) -> TickDetails {
+    /// changes. The tick had these inputs; `messages` is what it has left of those.
+    pub fn details(&self, inputs: &TickInputs, before: &TickBefore, messages: &ControlInputs) -> TickDetails {
         let front_end = &self.front_end;
         TickDetails {
             inputs: *inputs,
-            pose,
+            pose: before.pose,
             sticks: messages.orders.sticks,
             sample: front_end.sample(inputs),
-            local: front_end.local(&inputs.readings),
-            offers: front_end.offers(),
+            local: front_end.local(&inputs.readings, before),
+            offers: before.works && front_end.senses(),
             on_ground: front_end.is_on_ground(),
             trace: self.trace(),
             estimate: front_end.estimate(inputs.time_us),

@@ -3,7 +3,7 @@
 
 use crate::imu_lanes::OtherSensors;
 use crate::readings::{AIDS_MAX, Aged, Readings};
-use crate::tick_record::TickInputs;
+use crate::tick_record::{TickBefore, TickInputs};
 use crate::vibration::Vibration;
 use afbc_control::math::{max, min};
 use afbc_estimator::{
@@ -118,17 +118,6 @@ pub struct EstimatorFrontEnd {
     told: [Vector3<f32>; 2],
     /// Estimated position of a vehicle at rest \[m\].
     stands_m: Option<Vector3<f32>>,
-    taken: Taken,
-}
-
-/// What the last tick has made of its measurements, for logs.
-// One field of the front end, and not two: so those that every tick looks at stay within reach of short instructions.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Taken {
-    /// Where the fixes among the readings were taken to be, by their places there \[m\].
-    fixes_m: [Option<Vector3<f32>>; AIDS_MAX],
-    /// True if the estimator was offered the measurements.
-    offers: bool,
 }
 
 impl EstimatorFrontEnd {
@@ -157,7 +146,6 @@ impl EstimatorFrontEnd {
             elsewhere: 0,
             told: [Vector3::zeros(); 2],
             stands_m: None,
-            taken: Taken::default(),
         }
     }
 
@@ -192,12 +180,13 @@ impl EstimatorFrontEnd {
 
     /// Returns the measurements of the last tick, which had these readings, as it took them: corrected and in the local
     /// frame; none of a fix before a usable one.
-    pub(crate) fn local(&self, readings: &Readings) -> [Option<Measurement>; AIDS_MAX] {
+    pub(crate) fn local(&self, readings: &Readings, before: &TickBefore) -> [Option<Measurement>; AIDS_MAX] {
         let mut local = readings.aids.map(|aid| aid.map(|aid| aid.value));
-        for (aid, fix_m) in local.iter_mut().zip(&self.taken.fixes_m) {
+        for aid in &mut local {
+            let stands_m = aid.as_ref().and_then(|aid| self.usable(aid)).and(before.stands_m);
             match (aid.as_mut(), &self.corrections.field) {
-                (Some(Measurement::Gnss { position_m, .. }), _) if !self.origin_is_known => match fix_m {
-                    Some(fix_m) => *position_m = *fix_m,
+                (Some(Measurement::Gnss { position_m, .. }), _) if !self.origin_is_known => match self.origin_m {
+                    Some(origin_m) => *position_m = stands_m.unwrap_or(*position_m - origin_m),
                     None => *aid = None,
                 },
                 (Some(Measurement::MagneticField { field, .. }), Some(errors)) => *field = corrected(field, errors),
@@ -207,9 +196,15 @@ impl EstimatorFrontEnd {
         local
     }
 
-    /// True if the estimator was offered the measurements of the last tick.
-    pub(crate) fn offers(&self) -> bool {
-        self.taken.offers
+    /// Returns where a vehicle at rest stands, by which the next tick takes fixes, and whether the estimator is offered
+    /// what that tick reads once there is a sample.
+    pub(crate) fn before(&self) -> (Option<Vector3<f32>>, bool) {
+        (self.stands_m, self.works)
+    }
+
+    /// True once there was a sample.
+    pub(crate) fn senses(&self) -> bool {
+        self.senses
     }
 
     /// True if the motors could not carry the vehicle in the last tick.
@@ -301,10 +296,8 @@ impl EstimatorFrontEnd {
         if !self.senses {
             return None;
         }
-        self.taken.offers = self.works;
-        for (place, aid) in readings.aids.iter().enumerate() {
-            let Some(aid) = aid else { continue };
-            let Some(aid) = self.localized(place, *aid) else { continue };
+        for aid in readings.aids.iter().flatten() {
+            let Some(aid) = self.localized(*aid) else { continue };
             let timed = aid.timed(now_us);
             if self.works {
                 self.memory.offer(&timed);
@@ -331,12 +324,11 @@ impl EstimatorFrontEnd {
         Some(estimate)
     }
 
-    /// Returns the measurement at this place of the readings, corrected and in the local frame; none for a fix before a
-    /// usable one.
+    /// Returns a measurement corrected and in the local frame; none for a fix before a usable one.
     #[inline(always)]
-    fn localized(&mut self, place: usize, aid: Aged<Measurement>) -> Option<Aged<Measurement>> {
+    fn localized(&mut self, aid: Aged<Measurement>) -> Option<Aged<Measurement>> {
         match (aid.value, &self.corrections.field) {
-            (Measurement::Gnss { .. }, _) if !self.origin_is_known => self.located(place, aid),
+            (Measurement::Gnss { .. }, _) if !self.origin_is_known => self.located(aid),
             (Measurement::MagneticField { field, sigma }, Some(errors)) => {
                 Some(Aged { value: Measurement::MagneticField { field: corrected(&field, errors), sigma }, ..aid })
             }
@@ -345,7 +337,7 @@ impl EstimatorFrontEnd {
     }
 
     #[inline(never)]
-    fn located(&mut self, place: usize, mut aid: Aged<Measurement>) -> Option<Aged<Measurement>> {
+    fn located(&mut self, mut aid: Aged<Measurement>) -> Option<Aged<Measurement>> {
         let sigmas_m = self.usable(&aid.value);
         let Measurement::Gnss { position_m, .. } = &mut aid.value else { return Some(aid) };
         if self.origin_m.is_none() {
@@ -354,11 +346,7 @@ impl EstimatorFrontEnd {
             let there_m = here_m - velocity_m_s * (aid.age_us as f32 * 1e-6);
             self.origin_m = sigmas_m.map(|_| *position_m - there_m);
         }
-        let taken_m = self.taken.fixes_m.get_mut(place)?;
-        let Some(origin_m) = &mut self.origin_m else {
-            *taken_m = None;
-            return None;
-        };
+        let origin_m = self.origin_m.as_mut()?;
         *position_m -= *origin_m;
         if let (Some(sigmas_m), Some(stands_m)) = (sigmas_m, self.stands_m) {
             let off_m = *position_m - stands_m;
@@ -375,7 +363,6 @@ impl EstimatorFrontEnd {
             }
             *position_m = stands_m;
         }
-        *taken_m = Some(*position_m);
         Some(aid)
     }
 

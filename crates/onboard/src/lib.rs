@@ -56,4 +56,4 @@ pub use notch_follower::NotchFollower;
 pub use raw_readings::RawReadings;
 pub use readings::{AIDS_MAX, Aged, Readings};
 pub use rotor_monitor::{RotorFailure, RotorMonitor, RotorNews};
-pub use tick_record::{Report, TickDetails, TickInputs, TickRecord};
+pub use tick_record::{Report, TickBefore, TickDetails, TickInputs, TickRecord};

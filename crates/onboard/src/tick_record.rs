@@ -89,6 +89,17 @@ pub struct TickInputs {
     pub notch_rad_s: Option<f32>,
 }
 
+/// What logs have of the time before a tick, which changes it ([`Flight::before`](crate::Flight::before)).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TickBefore {
+    /// A tracker's pose that messages had brought: the tick hands it over.
+    pub(crate) pose: Option<Stamped<Pose>>,
+    /// Where a vehicle at rest stood, which is where usable fixes are taken to be \[m\].
+    pub(crate) stands_m: Option<Vector3<f32>>,
+    /// True if the inertial sensor worked.
+    pub(crate) works: bool,
+}
+
 /// What logs have of a tick beside its report ([`Flight::details`](crate::Flight::details)), made only if one is
 /// written.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -22,9 +22,10 @@ impl Standing {
         let readings = Readings { imu, aids: [aid.map(|value| Aged { value, age_us: 0 }), None] };
         let (inputs, mut messages) =
             (TickInputs { time_us: self.time_us, readings, ..TickInputs::default() }, ControlInputs::EMPTY);
+        let before = self.flight.before(&messages);
         let report = self.flight.tick(self.time_us, &mut messages, &readings);
         assert!(!report.mode.armed());
-        self.flight.details(&inputs, None, &messages)
+        self.flight.details(&inputs, &before, &messages)
     }
 }
 

@@ -19,9 +19,9 @@
 //! let mut ring = LogRing::<32_768>::new();
 //! let mut log = BlackBox::new(&LogStart::default(), &table);
 //! let (mut messages, inputs) = (ControlInputs::EMPTY, TickInputs { time_us: 1_000, ..TickInputs::default() });
-//! let pose = messages.inbox.pose().copied();
+//! let before = flight.before(&messages);
 //! let report = flight.tick(inputs.time_us, &mut messages, &inputs.readings);
-//! let details = flight.details(&inputs, pose, &messages);
+//! let details = flight.details(&inputs, &before, &messages);
 //! log.tick(&TickRecord { report: &report, details: &details }, &BesideTick::default(), &table, &mut ring);
 //! assert!(ring.front().starts_with(b"ULog"));
 //! # Ok::<(), afbc_types::OutOfRange>(())
