@@ -97,7 +97,10 @@ fn next_degree(
         function.slope = (ahead * (sin * last.slope - cos * last.value) - behind * before.slope) / scale;
     }
     let diagonal = if n == 1 { 1.0 } else { (1.0 - 0.5 / degree).sqrt() };
-    let last = last[n - 1];
-    next[n] = Legendre { value: diagonal * cos * last.value, slope: diagonal * (cos * last.slope + sin * last.value) };
+    let corner = last.get(n - 1).copied().unwrap_or_default();
+    if let Some(function) = next.get_mut(n) {
+        function.value = diagonal * cos * corner.value;
+        function.slope = diagonal * (cos * corner.slope + sin * corner.value);
+    }
     next
 }
