@@ -40,8 +40,8 @@ pub(crate) type DetailsIn = Sender<'static, CriticalSectionRawMutex, TickDetails
 pub(crate) type DetailsOut = Receiver<'static, CriticalSectionRawMutex, TickDetails>;
 
 /// Both, until the tasks take them. Each is written in place, with interrupts on: it is too long to be copied.
-static ENDS: Mutex<CriticalSectionRawMutex, RefCell<(Option<DetailsIn>, Option<DetailsOut>)>> =
-    Mutex::new(RefCell::new((None, None)));
+static ENDS: Mutex<CriticalSectionRawMutex, RefCell<Ends>> = Mutex::new(RefCell::new((None, None)));
+type Ends = (Option<DetailsIn>, Option<DetailsOut>);
 
 /// Makes room for details, to be called once, before the first tick, by a board that may write logs: the others do not
 /// have its memory.
