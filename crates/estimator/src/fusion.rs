@@ -35,6 +35,8 @@ const PRESENT_US: u64 = 1_000_000;
 const STILL_US: u64 = 200_000;
 /// Standard deviation of the zero-velocity fusion on the ground \[m/s\].
 const STILL_M_S: f32 = 0.05;
+/// Standard deviation of the zero-velocity fusion with the motors off, while a hand moves the vehicle \[m/s\].
+const CARRIED_M_S: f32 = 3.0;
 /// Standard deviation of the zero-velocity fusion in the air without any aid \[m/s\]. A vehicle flies at some 5 m/s and
 /// keeps its velocity for some 2.5 s. Noise with the correlation time tau, sampled every T, acts like white noise of
 /// sqrt(2 tau/T) = 5 times its standard deviation.
@@ -203,7 +205,11 @@ impl Estimator {
         if !held && memory.aids.holds_velocity(at_us, self.coast_us) {
             return false;
         }
-        let sigma = if held { STILL_M_S } else { UNAIDED_M_S };
+        let sigma = match (held, memory.on_ground == Some(true)) {
+            (true, _) => STILL_M_S,
+            (false, true) => CARRIED_M_S,
+            (false, false) => UNAIDED_M_S,
+        };
         memory.still_us = at_us;
         if held {
             memory.held_us = Some(at_us);
