@@ -10,8 +10,8 @@ use afbc_guidance::{BatteryReading, FlightMode, Sticks};
 use afbc_log::ulog::{BesideTick, BlackBox, LogRing, LogStart, TOPICS};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{
-    Aged, Configuration, ControlInputs, EscTelemetry, Flight, Readings, Report, RotorFailure, TickBefore, TickDetails,
-    TickInputs, TickRecord,
+    Aged, Configuration, ControlInputs, EscTelemetry, Flight, Readings, Report, RotorFailure, TickDetails, TickInputs,
+    TickRecord,
 };
 use afbc_store::RecordName;
 use afbc_types::{RotorSpeeds, Setpoint, State};
@@ -55,8 +55,9 @@ impl<const R: usize> Logged<R> {
         let readings = Readings { imu, aids: [height.then_some(aid), None] };
         let (mut messages, inputs) =
             (ControlInputs::EMPTY, TickInputs { time_us: self.now_us, readings, ..TickInputs::default() });
+        let before = self.flight.before(&messages);
         let report = self.flight.tick(inputs.time_us, &mut messages, &readings);
-        let details = self.flight.details(&inputs, &TickBefore::default(), &messages);
+        let details = self.flight.details(&inputs, &before, &messages);
         let tick = TickRecord { report: &report, details: &details };
         self.log.tick(&tick, &BesideTick::default(), &self.table, &mut self.ring);
         (report, details)

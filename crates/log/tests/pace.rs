@@ -6,7 +6,7 @@ mod strict;
 
 use afbc_log::ulog::{BesideTick, BlackBox, LogRing, LogStart};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
-use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Readings, TickBefore, TickInputs, TickRecord};
+use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Readings, TickInputs, TickRecord};
 use afbc_store::RecordName;
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -38,8 +38,9 @@ fn logged(pace: Option<u16>, ticks: u64, [restored, changed]: [u64; 2]) -> (Vec<
         let readings = Readings { imu, ..Readings::NONE };
         let (mut messages, inputs) =
             (ControlInputs::EMPTY, TickInputs { time_us: 1000 * number, readings, ..TickInputs::default() });
+        let before = flight.before(&messages);
         let report = flight.tick(inputs.time_us, &mut messages, &readings);
-        let details = flight.details(&inputs, &TickBefore::default(), &messages);
+        let details = flight.details(&inputs, &before, &messages);
         let tick = TickRecord { report: &report, details: &details };
         log.tick(&tick, &BesideTick::default(), &table, &mut ring);
         if number == changed {

@@ -10,9 +10,7 @@ use afbc_guidance::FlightMode;
 use afbc_guidance::notice::Cause;
 use afbc_log::ulog::{BesideTick, BlackBox, LogRing, LogStart};
 use afbc_onboard::parameters::ParameterTable;
-use afbc_onboard::{
-    Aged, Configuration, ControlInputs, Flight, Report, TickBefore, TickDetails, TickInputs, TickRecord,
-};
+use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Report, TickDetails, TickInputs, TickRecord};
 use afbc_types::{Axis, Pose, PoseSigmas, Setpoint, State};
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -33,9 +31,10 @@ impl Tick {
     fn new() -> Self {
         let mut flight = Flight::<4>::new(&Configuration::default()).unwrap();
         let (mut messages, inputs) = (ControlInputs::EMPTY, TickInputs { time_us: 1_000, ..TickInputs::default() });
+        let before = flight.before(&messages);
         let mut report = flight.tick(inputs.time_us, &mut messages, &inputs.readings);
         report.time_us = NOW_US;
-        Tick { report, details: flight.details(&inputs, &TickBefore::default(), &messages), origin: None }
+        Tick { report, details: flight.details(&inputs, &before, &messages), origin: None }
     }
 
     /// Reads aids, of which the estimator is offered `local`.

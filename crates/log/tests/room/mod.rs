@@ -13,7 +13,7 @@ use afbc_log::storage::{
 };
 use afbc_log::ulog::{BesideTick, LogStart};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
-use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Readings, TickBefore, TickInputs, TickRecord};
+use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Readings, TickInputs, TickRecord};
 use afbc_store::RecordName;
 use nalgebra::Vector3;
 use std::cell::RefCell;
@@ -320,8 +320,9 @@ impl<S: Storage> Room<S> {
         let readings = Readings { imu, aids: [now_us.is_multiple_of(20_000).then_some(aid), None] };
         let (mut messages, inputs) =
             (ControlInputs::EMPTY, TickInputs { time_us: now_us, readings, ..TickInputs::default() });
+        let before = self.flight.before(&messages);
         let report = self.flight.tick(inputs.time_us, &mut messages, &readings);
-        let details = self.flight.details(&inputs, &TickBefore::default(), &messages);
+        let details = self.flight.details(&inputs, &before, &messages);
         let tick = TickRecord { report: &report, details: &details };
         let start = LogStart { vehicle: "paper", law: "afbc", hardware: "test", ..LogStart::default() };
         let Room { writer, table, state, queue, .. } = self;
