@@ -1,4 +1,4 @@
-//! Communication: receives and sends messages.
+//! The vehicle's MAVLink endpoint: receives and sends messages.
 
 use crate::dispatcher::Dispatcher;
 use crate::failsafes::Failsafes;
@@ -35,22 +35,22 @@ use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{Configuration, ControlInputs, EscTelemetry, Report};
 use afbc_types::{PerAxis, Pose};
 
-/// Component of the vehicle: autopilot.
+/// MAVLink component number of the vehicle: the autopilot.
 const AUTOPILOT: u8 = 1;
-/// Largest size of all messages after one tick \[bytes\].
+/// Largest size of all messages sent after one tick \[bytes\].
 pub const REPORT_MAX: usize = 768;
-/// Bytes of a signature, and of a frame beside its payload.
+/// Size of a frame's signature \[bytes\], and of a signed frame without its payload.
 const SIGNATURE: usize = 13;
 const FRAME: usize = 12 + SIGNATURE;
-/// Longest frame of a text, and of a reply: a value of an extended parameter \[bytes\].
+/// Longest frames \[bytes\]: of a STATUSTEXT, and of a reply (the longest is a PARAM_EXT_VALUE).
 const TEXT_MAX: usize = FRAME + 54;
 const REPLY_MAX: usize = FRAME + 149;
-/// Length of the frame of a sample \[bytes\].
+/// Length of a HIGHRES_IMU frame \[bytes\].
 const SAMPLE_MAX: usize = FRAME + 62;
 /// Replies sent per tick.
 const REPLIES_PER_TICK: usize = 2;
 
-/// Text to stations whose signing key is not taken.
+/// Warning to a station whose SETUP_SIGNING is refused.
 const KEY_OVER_WIRE: &str = "signing key refused: over a wire or signed only";
 
 /// Text to the pilot when the clock has failed.
@@ -58,12 +58,12 @@ pub const CLOCK_FAILED: &str = "clock failed, using the internal one: land";
 /// Text to the pilot when the control tick's rate or timing is wrong.
 pub const TICK_OFF: &str = "control tick rate is wrong: land";
 
-/// Ticks between heartbeats, and the first.
+/// Period of the heartbeat \[ticks\], and the tick of the first one.
 const HEARTBEAT: (u64, u64) = (1000, 3);
-/// Longest time between rotor commands, where they are sent \[ticks\]: else they follow each new state.
+/// Longest time between rotor commands \[ticks\]. If they are sent, one follows each new state.
 const ROTORS: u64 = 10;
 
-/// Receives and sends messages.
+/// Receives and sends the vehicle's MAVLink messages.
 pub struct Comms {
     decoder: Decoder<Uplink>,
     sender: Sender,
@@ -79,9 +79,9 @@ pub struct Comms {
     norms: PerAxis<Norm>,
     fallback: Option<&'static str>,
     rate: rate::RateReport,
-    /// Bytes that may still be sent after this tick.
+    /// Number of bytes that may still be sent after this tick.
     left: usize,
-    /// True if HIGHRES_IMU is due: it is sent with the sensors' next sample.
+    /// True if HIGHRES_IMU is due. The message is sent with the sensors' next sample.
     sample_is_due: bool,
     share: LinkShare,
 }
@@ -93,12 +93,12 @@ impl Default for Comms {
 }
 
 impl Comms {
-    /// Creates it with nothing received, in the default setup.
+    /// Creates an endpoint in the default setup that has received nothing.
     pub fn new() -> Self {
         Self::with(Setup::default())
     }
 
-    /// Creates it with nothing received.
+    /// Creates an endpoint that has received nothing.
     pub fn with(setup: Setup) -> Self {
         let me = Address { system: setup.system, component: AUTOPILOT };
         Comms {
@@ -121,62 +121,62 @@ impl Comms {
         }
     }
 
-    /// Tells what the control tick does not know: origin, satellite receiver, battery, time of day.
+    /// Sets the data that the control tick does not have: origin, satellite receiver, battery, time of day.
     pub fn set_aux_sensors(&mut self, aux: AuxSensors) {
         self.dispatcher.status.aux = aux;
     }
 
-    /// Returns what the motor controllers have told.
+    /// Returns the latest telemetry of the motor controllers (ESCs).
     pub fn esc_telemetry(&self) -> &EscTelemetry {
         &self.dispatcher.status.escs
     }
 
-    /// Tells everyone what a shell has to say.
+    /// Sends a text of the shell to all stations, as information.
     pub fn inform(&mut self, text: &str) {
         self.dispatcher.texts.put(MavSeverity::MAV_SEVERITY_INFO, text);
     }
 
-    /// The same as a warning.
+    /// Sends a text of the shell to all stations, as a warning.
     pub fn warn(&mut self, text: &str) {
         self.dispatcher.texts.put(MavSeverity::MAV_SEVERITY_WARNING, text);
     }
 
-    /// Returns what a station has asked the disarmed vehicle to reboot into: what has been sent should leave first.
+    /// Returns the reboot that a station has asked the disarmed vehicle for. The shell sends pending bytes first.
     pub fn wants_reboot(&self) -> Option<Reboot> {
         self.dispatcher.reboot
     }
 
-    /// True once if a station has asked the disarmed vehicle for its sensors' own tests.
+    /// Returns true once after a station has asked the disarmed vehicle for the sensors' self-tests.
     pub fn wants_self_tests(&mut self) -> bool {
         core::mem::take(&mut self.dispatcher.tests)
     }
 
-    /// Returns the items of the mission and of the geofence, as stations have uploaded them.
+    /// Returns the uploaded items of the mission and of the geofence.
     pub fn plan(&self) -> [&[MissionItem]; 2] {
         let missions = &self.dispatcher.missions;
         [missions.items(), missions.fence()]
     }
 
-    /// True if [`receive`](Self::receive) has something for the next tick even without bytes.
+    /// Returns true if [`receive`](Self::receive) has new inputs for the next tick even if no bytes have arrived.
     pub fn has_mail(&self) -> bool {
         self.dispatcher.wanted_leg().is_some() || self.dispatcher.has_fence_news()
     }
 
-    /// Processes the next bytes of the stream; returns new inputs for the control tick, to be
+    /// Processes the next bytes of the stream. Returns new inputs for the control tick, to be
     /// [merged](ControlInputs::merge).
     ///
-    /// A vehicle without an estimate of its own ignores poses, since a law needs velocities and rates.
+    /// A vehicle that has no estimator ignores poses, because the control law needs velocities and rates too.
     pub fn receive(&mut self, bytes: &[u8]) -> ControlInputs {
         self.receive_beside(bytes, &mut ())
     }
 
-    /// The same for a vehicle that has logs and no other files.
+    /// Does the same as [`receive`](Self::receive) for a vehicle that stores logs but no other files.
     #[inline(never)]
     pub fn receive_with_logs(&mut self, bytes: &[u8], server: &mut LogServer) -> ControlInputs {
         self.receive_beside(bytes, server)
     }
 
-    /// The same beside `requests`, which take what stations want of files and logs.
+    /// Does the same as [`receive`](Self::receive); `requests` takes the stations' requests for files and logs.
     pub fn receive_beside(&mut self, bytes: &[u8], requests: &mut impl TransferRequests) -> ControlInputs {
         let mut update = ControlInputs::EMPTY;
         let Comms { decoder, dispatcher, tracker, state_is_news, signing, .. } = self;
@@ -189,7 +189,7 @@ impl Comms {
                 let age_max_us = if estimates { POSE_AGE_MAX_US } else { COAST_US.into() };
                 let sighting = Sighting::State(value);
                 if let Some(at_us) = tracker.sight(number(from), sent_us, dispatcher.now_us, sighting, age_max_us) {
-                    // A law cannot fly on an older one. An estimator can: it fuses a pose at the pose's own time.
+                    // A control law needs a fresh state. An estimator fuses an old pose at the time of the pose.
                     if dispatcher.now_us - at_us <= COAST_US.into() {
                         update.inbox.put_state(Stamped { value, at_us });
                     }
@@ -206,7 +206,7 @@ impl Comms {
                     update.inbox.put_pose(Stamped { value, at_us });
                 }
             }
-            // Once all bytes are read: the key that was there judges the frames beside it.
+            // The new key is set after all bytes: the frames beside SETUP_SIGNING are checked with the old key.
             Uplink::Signing(wanted) => setup = Some(wanted),
             other if requests.wants(&other) => dispatcher.hand_to(requests, (from, &other, payload), &mut update),
             other => dispatcher.hear(from, other, &mut update),
@@ -223,7 +223,7 @@ impl Comms {
         update
     }
 
-    /// Sets or removes the key of signatures.
+    /// Sets or removes the signing key.
     fn set_key(&mut self, setup: &SetupSigning) {
         let Dispatcher { now_us, status, texts, .. } = &mut self.dispatcher;
         match self.signing.set(*now_us, setup, status.mode.armed()) {
@@ -232,40 +232,41 @@ impl Comms {
         }
     }
 
-    /// Begins with the key and clock of signatures that were kept.
+    /// Sets the signing key and the clock that were restored from storage.
     pub fn set_signing(&mut self, signing: Signing) {
         self.signing = signing;
     }
 
-    /// Returns the state of the signatures.
+    /// Returns the state of message signing.
     pub fn signing(&self) -> &Signing {
         &self.signing
     }
 
-    /// Returns what of the signatures is to be kept, a record at a time, once.
+    /// Returns the next signing record to be stored. Each record is returned once.
     pub fn signing_record(&mut self) -> Option<SigningRecord> {
         let Dispatcher { now_us, status, .. } = &self.dispatcher;
         self.signing.record(*now_us, status.mode.armed())
     }
 
-    /// Returns what is known of the battery, for the control tick.
+    /// Returns the battery's measurements, for the control tick.
     pub fn battery(&self) -> Option<BatteryReading> {
         self.dispatcher.status.aux.battery.map(|battery| BatteryReading {
             voltage_v: f32::from(battery.voltage_mv) * 1e-3,
-            // Negative: not measured.
+            // Negative means not measured.
             current_a: f32::from(battery.current_ca.max(0)) * 1e-2,
             charge: (battery.remaining_percent >= 0).then(|| f32::from(battery.remaining_percent) * 1e-2),
         })
     }
 
-    /// Exchanges the decoder. Where there are several streams of bytes, each has one of its own, which is put in before
-    /// its bytes are received and taken out after them: a frame may end in later bytes of its own stream only.
+    /// Exchanges the decoder. If there are several byte streams, each has a decoder of its own. It is put in before the
+    /// bytes of its stream are received, and taken out after them, because a frame continues in later bytes of the same
+    /// stream only.
     pub fn exchange(&mut self, decoder: &mut Decoder<Uplink>) {
         core::mem::swap(&mut self.decoder, decoder);
     }
 
-    /// Returns the decoder of another stream, to be [exchanged](Self::exchange). None [comes over a
-    /// wire](Decoder::wired) unless the shell says so.
+    /// Returns a decoder for a further stream, to be [exchanged](Self::exchange). The stream does not count as
+    /// [wired](Decoder::wired) unless the shell says so.
     pub fn decoder(&self) -> Decoder<Uplink> {
         Decoder::new(self.dispatcher.me)
     }
@@ -276,8 +277,8 @@ impl Comms {
         [c.bad_checksum, c.unknown, c.malformed, c.implausible, c.unsupported].into_iter().fold(0, u32::saturating_add)
     }
 
-    /// Sends all messages due after a tick, frame by frame, through `send`: at most [`REPORT_MAX`] bytes. `tick_us` is
-    /// the duration of the tick.
+    /// Sends all messages that are due after a tick, at most [`REPORT_MAX`] bytes, by one call of `send` per frame.
+    /// `tick_us` is the duration of the tick.
     pub fn report<const N: usize>(&mut self, report: &Report<N>, tick_us: f32, mut send: impl FnMut(&[u8])) {
         self.tick += 1;
         self.tick_us_max = self.tick_us_max.max(tick_us);
@@ -300,13 +301,13 @@ impl Comms {
         let (now_us, armed) = (report.time_us, report.mode.armed());
         if self.dispatcher.streams.rotors() && (self.state_is_news || self.tick.is_multiple_of(ROTORS)) {
             self.state_is_news = false;
-            // Not from the budget: whoever asks for them leaves room.
+            // Rotor commands do not count against the link's rate, which is lower while they are sent.
             self.send(&Downlink::Rotors { time_us: now_us, armed, speeds: report.motors.padded() }, &mut send);
         }
         let commands = &mut self.dispatcher.commands;
         let settled = report.answer.and_then(|answer| commands.settle(answer));
         let ordered = report.guided.answer.and_then(|(ticket, result)| commands.settle_order(ticket, result));
-        // Whatever the budget says: a station gives up, or repeats, a command that is not answered.
+        // Answers are sent regardless of the budget: a station repeats an unanswered command, or gives up.
         for answer in settled.into_iter().chain(ordered) {
             self.say(&answer, &mut send);
         }
@@ -333,7 +334,7 @@ impl Comms {
                 self.say(&reply, &mut send);
             }
         }
-        // The longest of all: how long a message is turns out when it is made, and then it must leave.
+        // The size of a message is known only once it is composed, so there must be room for the longest frame.
         while self.left >= SIGNED_FRAME_MAX
             && let Some(requested) = self.dispatcher.streams.next(now_us)
         {
@@ -343,9 +344,9 @@ impl Comms {
         }
     }
 
-    /// Does what stations want of the parameters, to be called after each [`report`](Self::report): sends values, frame
-    /// by frame, through `send`, together with the report at most [`REPORT_MAX`] bytes. Returns what has changed in
-    /// `table`, which is to be flown ([`Flight::adopt`](afbc_onboard::Flight::adopt)) and kept
+    /// Handles the stations' parameter requests. To be called after each [`report`](Self::report). Sends values by one
+    /// call of `send` per frame; `report` and this function together send at most [`REPORT_MAX`] bytes. Returns the
+    /// change of `table`, which is to be flown ([`Flight::adopt`](afbc_onboard::Flight::adopt)) and stored
     /// ([`Kept::keep`](afbc_onboard::parameters::Kept::keep)). Nothing changes while the vehicle is armed.
     pub fn parameters<const N: usize>(
         &mut self,
@@ -353,7 +354,7 @@ impl Comms {
         mut send: impl FnMut(&[u8]),
     ) -> Option<RecordChange> {
         let change = self.dispatcher.grant(table);
-        // COM_DL_LOSS_T, which is in range.
+        // COM_DL_LOSS_T. Its range is checked, so the conversion is safe.
         let silent_us = (table.configuration().guidance.net.station_lost_s * 1e6) as u64;
         self.dispatcher.control.set_silence(silent_us);
         let afbc_guidance::Settings { limits, net, .. } = &table.configuration().guidance;
@@ -370,8 +371,8 @@ impl Comms {
         change
     }
 
-    /// Goes on with what stations want of files and logs, to be called after everything else that sends: it takes what
-    /// telemetry and parameters leave of the link, and a fifth of it at least. Together they send at most
+    /// Continues the transfers of files and logs. To be called after everything else that sends. Transfers take the
+    /// bandwidth that telemetry and parameters leave, and at least a fifth of the link. All together send at most
     /// [`REPORT_MAX`] bytes.
     pub fn transfer<S: FileStore + LogStore + LogSource>(
         &mut self,
@@ -383,7 +384,7 @@ impl Comms {
         self.go_on(&mut (transfers, store), send);
     }
 
-    /// The same for a vehicle that has logs and no other files.
+    /// Does the same as [`transfer`](Self::transfer) for a vehicle that stores logs but no other files.
     #[inline(never)]
     pub fn transfer_logs(&mut self, server: &mut LogServer, store: &mut dyn LogStore, send: &mut dyn FnMut(&[u8])) {
         self.go_on(&mut (server, store), send);
@@ -408,17 +409,17 @@ impl Comms {
         }
     }
 
-    /// True while the vehicle is calibrated, or a station wants to see its sensors' samples:
-    /// [`calibrate`](Self::calibrate) needs them.
+    /// Returns true if [`calibrate`](Self::calibrate) needs sensor samples: during a calibration, or while a station
+    /// wants HIGHRES_IMU.
     pub fn takes_samples(&self) -> bool {
         let Dispatcher { calibration, streams, .. } = &self.dispatcher;
         calibration.active.is_some() || self.sample_is_due || streams.interval_us(id::HIGHRES_IMU) > 0
     }
 
-    /// Goes on with a calibration that a station has asked for, and sends the sample if it is due, to be called after
-    /// each [`report`](Self::report) and before [`parameters`](Self::parameters), which sets what is found; only in a
-    /// shell that [has sensors](Setup::calibrates). `sample` is what [`RawReadings`](afbc_onboard::RawReadings) have
-    /// come to, if they have since the last call.
+    /// Advances the calibration that a station has asked for, and sends HIGHRES_IMU if it is due. To be called after
+    /// each [`report`](Self::report) and before [`parameters`](Self::parameters), which sets the parameters that were
+    /// found; only in a shell that [has sensors](Setup::calibrates). `sample` is the average of
+    /// [`RawReadings`](afbc_onboard::RawReadings), if one has been completed since the last call.
     pub fn calibrate<const N: usize>(
         &mut self,
         calibrator: &mut Calibrator,
@@ -436,14 +437,14 @@ impl Comms {
         }
     }
 
-    /// Sends a message, from the budget of the link; returns its length.
+    /// Sends a message and counts it against the link's rate. Returns the length of the frame.
     fn say(&mut self, message: &impl Message, send: &mut impl FnMut(&[u8])) -> usize {
         let bytes = self.send(message, send);
         self.dispatcher.streams.spend(bytes);
         bytes
     }
 
-    /// Sends a message; returns its length. Out of line: it is sent from many places.
+    /// Sends a message. Returns the length of the frame. Not inlined because it has many callers.
     #[inline(never)]
     fn send(&mut self, message: &impl Message, send: &mut impl FnMut(&[u8])) -> usize {
         let mut buffer = [0; SIGNED_FRAME_MAX];
@@ -453,7 +454,7 @@ impl Comms {
         frame.len()
     }
 
-    /// Queues what is to be announced of a tick.
+    /// Queues the texts that announce the events of a tick.
     fn watch<const N: usize>(&mut self, report: &Report<N>) {
         let Comms { dispatcher, failsafes, tick, .. } = self;
         let warning = MavSeverity::MAV_SEVERITY_WARNING;
@@ -463,7 +464,7 @@ impl Comms {
         if let Some((_, Err(declined))) = report.guided.answer {
             dispatcher.texts.put(warning, reason(declined));
         }
-        // The flight core's failsafes are announced below.
+        // `Failsafes` announces the flight core's own failsafes, below.
         let descends = |notice: &Notice| matches!(notice, Notice::Mode(_, ModeReason::Failsafe(Cause::Descent)));
         for notice in report.guided.notices.iter().filter(|notice| !descends(notice)) {
             let [first, second, third] = notice.parts();
@@ -483,13 +484,13 @@ impl Comms {
         } else if before.healthy() && !rate.healthy() {
             dispatcher.texts.put(MavSeverity::MAV_SEVERITY_CRITICAL, TICK_OFF);
         }
-        // While the vehicle flies blind there is no report of a law.
+        // While the vehicle coasts without a state, no law runs, and none reports a fallback.
         if report.mode != Mode::Coasting {
             self.fallback = fallback;
         }
     }
 
-    /// Returns a message of telemetry.
+    /// Composes a telemetry message.
     fn compose(&mut self, requested: Requested) -> Option<Downlink> {
         let status = &self.dispatcher.status;
         match requested.message {
@@ -500,7 +501,7 @@ impl Comms {
                 Some(Downlink::Followed(status.time_ms(), PositionTarget::from(setpoint)))
             }
             id::AVAILABLE_MODES => {
-                // 0 asks for all: one after the other.
+                // Index 0 asks for all modes. Each answer requests the next mode.
                 let (place, all) = modes::place(requested.index);
                 if all && place < modes::COUNT {
                     let next = Requested { index: modes::all_from(place + 1), ..requested };
@@ -526,10 +527,10 @@ impl Comms {
         }
     }
 
-    /// Returns which four motor controllers a message is of: its request's number, from 1, or all fours in turn.
+    /// Returns the group of four ESCs to report: the one requested, counted from 1, or else each group in turn.
     fn esc_page(&self, requested: Requested) -> u8 {
         let Dispatcher { status, streams, .. } = &self.dispatcher;
-        // Never 0, since it divides; of a stream that is off it is -1.
+        // The interval is a divisor, so it must not be 0. The interval of a disabled stream is -1.
         let interval_us = u64::try_from(streams.interval_us(requested.message)).unwrap_or(1).max(1);
         let pages = status.rotors.div_ceil(ESCS_PER_MESSAGE as u8).max(1);
         let page = u64::from(requested.index).checked_sub(1).unwrap_or(status.time_us / interval_us);
@@ -565,7 +566,7 @@ impl Comms {
     }
 }
 
-/// Returns what the sensors' readings mean for the vehicle: corrected by what calibration has found, in the body frame.
+/// Returns a sample of the IMU with its calibration applied, in the body frame.
 fn corrected<const N: usize>(sample: &RawSample, configuration: &Configuration<N>) -> InertialSample {
     let Configuration { imu, calibration, .. } = configuration;
     let r_body_sensor = imu.r_body_sensor();
@@ -577,7 +578,7 @@ fn corrected<const N: usize>(sample: &RawSample, configuration: &Configuration<N
     }
 }
 
-/// Returns a sender's number for the [`Tracker`].
+/// Returns the number by which the [`Tracker`] tells senders apart.
 fn number(from: Address) -> u16 {
     u16::from_be_bytes([from.system, from.component])
 }

@@ -1,4 +1,4 @@
-//! Hands each message to its service.
+//! Passes each received message to its service.
 
 mod calibration;
 mod commands;
@@ -33,14 +33,14 @@ use afbc_types::Setpoint;
 use heapless::Deque;
 use nalgebra::{Vector2, Vector3};
 
-/// Most replies that wait, besides answers to commands. Further ones are dropped: askers repeat.
+/// Most queued replies, besides answers to commands. Further replies are dropped, since stations repeat requests.
 const REPLIES_MAX: usize = 16;
-/// Most wishes about parameters that wait for the end of the tick. Further ones are dropped: askers repeat.
+/// Most parameter requests queued until the end of the tick. Further ones are dropped, since stations repeat them.
 const WISHES_MAX: usize = 32;
-/// Shortest time between reports of the station in control to the guidance \[us\].
+/// Shortest time between two reports to the guidance that the station in control was heard \[us\].
 const HEARD_EVERY_US: u64 = 50_000;
 
-/// A reply to a message that is no command.
+/// A reply to a message other than a command.
 #[derive(Clone, Copy, Debug)]
 enum Reply {
     Clock(Clock),
@@ -52,64 +52,64 @@ enum Reply {
     Refusal(QuestionRefusal, Address),
 }
 
-/// What a station wants of the parameters.
+/// A queued request about parameters.
 #[derive(Clone, Copy, Debug)]
 enum ParameterTask {
     Ask(ParameterRequest, Address),
     Restore,
 }
 
-/// All services, and what they know.
+/// All services, and the state that they share.
 pub(crate) struct Dispatcher {
     pub(crate) me: Address,
-    /// Start of the last tick \[us\], the time stamp of everything that arrives before the next one.
+    /// Start of the last tick \[us\]. Messages that arrive before the next tick get this time stamp.
     pub(crate) now_us: u64,
     pub(crate) status: VehicleStatus,
     pub(crate) commands: Commands,
     pub(crate) control: OperatorControl,
     pub(crate) missions: Missions,
-    /// What is seen of the geofence, with which limits, and what the guidance knows of it.
+    /// State of the geofence. `braking` has the limits with which stopping paths are computed.
     fence: FenceWatch,
     pub(crate) braking: Braking,
-    /// Radius and height of the cylinder around home; 0 for none \[m\].
+    /// Radius and height of the cylindrical geofence around home \[m\]; 0 for none.
     pub(crate) cylinder_m: [f32; 2],
-    /// Curves of a station's sticks, and whether these count.
+    /// Response curves of a station's joystick, and whether a joystick is accepted.
     pub(crate) curves: StickCurves,
     pub(crate) takes_joystick: bool,
-    /// Channels that a station sends in place of a receiver's; none once they are taken.
+    /// Channels of RC_CHANNELS_OVERRIDE, until radio control takes them.
     pub(crate) overrides: Option<ChannelsOverride>,
     fence_given: FenceView,
-    /// Where a return lands, where the guidance has it, and when that was last looked at \[m, us\].
+    /// Nearest safe place for a return \[m\], the one that the guidance knows, and the time of the last search \[us\].
     safe_m: Option<Vector2<f32>>,
     safe_given_m: Option<Vector2<f32>>,
     safe_us: u64,
-    /// The circle that was ordered last: its centre and radius \[m\].
+    /// Centre and radius of the orbit ordered last \[m\].
     orbit_m: Option<(Vector3<f32>, f32)>,
     pub(crate) streams: Streams,
     pub(crate) texts: Texts,
     unanswered: Unanswered,
     replies: Deque<Reply, REPLIES_MAX>,
-    /// What stations want of the parameters.
+    /// Queued parameter requests.
     wishes: Deque<ParameterTask, WISHES_MAX>,
     pub(crate) parameters: Service,
     pub(crate) calibration: CalibrationState,
-    /// True if the shell can calibrate.
+    /// True if the shell supports calibration.
     calibrates: bool,
-    /// True if a station has asked for the sensors' own tests.
+    /// True if a station has asked for the sensors' self-tests.
     pub(crate) tests: bool,
-    /// The item and upload that the guidance has been given last.
+    /// Item and upload number of the mission item last given to the guidance.
     given: Option<(u16, u16)>,
-    /// The item that was reached last.
+    /// Mission item reached last.
     reached: Option<u16>,
-    /// When the guidance last learned that the station in control is there \[us\].
+    /// Last time at which the guidance was told that the station in control was heard \[us\].
     heard_us: Option<u64>,
-    /// When a pilot's sticks last came by radio \[us\].
+    /// Time of the last stick input from the radio receiver \[us\].
     pub(crate) radio_us: Option<u64>,
-    /// Wish to know what speaks against arming, and whether one of the stations that have it may arm.
+    /// Set if a station has requested the arming checks. True if one of these stations may arm.
     checks: Option<bool>,
-    /// What the shell can reboot into.
+    /// Kinds of reboot that the shell supports.
     reboots: &'static [Reboot],
-    /// What a station has asked to reboot into.
+    /// Kind of reboot that a station has requested.
     pub(crate) reboot: Option<Reboot>,
 }
 
@@ -152,10 +152,10 @@ impl Dispatcher {
         }
     }
 
-    /// Handles a message, except states, poses and keys of signatures.
+    /// Handles a message, except states, poses and SETUP_SIGNING.
     pub(crate) fn hear(&mut self, from: Address, message: Uplink, inputs: &mut ControlInputs) {
         if from == self.me {
-            // Its own, sent back.
+            // The vehicle's own message was sent back.
             return;
         }
         if self.control.hear(from, self.now_us) {
@@ -164,7 +164,7 @@ impl Dispatcher {
         let replies =
             matches!(message, Uplink::Stream(_) | Uplink::Question(_) | Uplink::Clock(_) | Uplink::Control(_));
         if replies && self.replies.is_full() {
-            // As if it had not arrived: nothing is done that nobody is told of.
+            // The message is ignored as if lost: no request is carried out that cannot be answered.
             return;
         }
         match message {
@@ -191,7 +191,7 @@ impl Dispatcher {
         }
     }
 
-    /// Hands a message to `requests`, which wants it.
+    /// Passes a message to `requests`, which handles requests for files and logs.
     pub(crate) fn hand_to(
         &mut self,
         requests: &mut impl TransferRequests,
@@ -204,19 +204,20 @@ impl Dispatcher {
         if let Uplink::Command(command) = message {
             let answer = match command {
                 _ if !self.commands.has_room() => Answer::Refused(BUSY),
-                // There is one of each.
+                // There is only one instance of each of these messages.
                 Command::RequestMessage { index: 1.., .. } => Answer::Denied,
                 _ if requests.take(from, message, payload, true) => Answer::Accepted,
                 _ => Answer::Refused(BUSY),
             };
             return self.commands.answer(command.id(), answer, from);
         }
-        // `may` takes control where nobody has it: what only reads must not ask.
+        // Calling `may` would take control if nobody has it. Requests that only read must not do so.
         let may_change = !is_change(message) || self.may(from, inputs);
         requests.take(from, message, payload, may_change);
     }
 
-    /// Hands the guidance the item of the mission that it wants, if it does not have it.
+    /// Gives the guidance the mission item that it asks for, unless it has it already, and news of geofence and safe
+    /// place.
     pub(crate) fn hand_over(&mut self, inputs: &mut ControlInputs) {
         if let Some(leg) = self.wanted_leg() {
             self.given = Some((self.status.guided.wanted, leg.upload));
@@ -232,11 +233,12 @@ impl Dispatcher {
         }
     }
 
-    /// Returns the item of the mission that the guidance wants and does not have; the first of another mission that is
-    /// shorter, and none where it has to learn that there is no mission any more.
+    /// Returns the mission item that the guidance asks for, if it does not have it yet. If a new mission is too short
+    /// for the item, returns the first item. If the mission was cleared, returns an empty item, to tell the guidance
+    /// so.
     pub(crate) fn wanted_leg(&self) -> Option<Leg> {
         let (wanted, upload) = (self.status.guided.wanted, self.missions.number());
-        // With the upload's number: another upload has another item in this place.
+        // The upload's number is compared too: after another upload the same number means another item.
         if self.given == Some((wanted, upload)) {
             return None;
         }
@@ -250,7 +252,7 @@ impl Dispatcher {
         self.missions.leg(number, self.status.aux.origin.as_ref(), home_m).map(|leg| self.fenced(leg))
     }
 
-    /// Does what is due after a tick.
+    /// Does the work that is due after each tick.
     pub(crate) fn tick(&mut self) {
         self.streams.tick();
         self.report_checks();
@@ -269,7 +271,7 @@ impl Dispatcher {
         }
     }
 
-    /// Returns the next reply.
+    /// Returns the next queued reply.
     pub(crate) fn next_reply(&mut self) -> Option<Downlink> {
         let everyone = Address::default();
         Some(match self.replies.pop_front() {
@@ -287,7 +289,7 @@ impl Dispatcher {
         })
     }
 
-    /// Returns the setpoint that an armed vehicle follows.
+    /// Returns the setpoint that the vehicle follows, if it is armed.
     pub(crate) fn followed(&self) -> Option<&Setpoint> {
         self.status.guided.setpoint.as_ref().filter(|_| self.status.mode.armed())
     }
@@ -300,18 +302,18 @@ impl Dispatcher {
         Downlink::Mission { message: Mission::Current(current), to: Address::default() }
     }
 
-    /// Returns ORBIT_EXECUTION_STATUS, while a circle is flown that was ordered.
+    /// Returns ORBIT_EXECUTION_STATUS while the vehicle flies an ordered orbit.
     pub(crate) fn orbit_status(&self) -> Option<Downlink> {
         let ((centre_m, radius_m), origin) =
             (self.orbit_m.filter(|_| self.status.guided.orbits)?, self.status.aux.origin?);
         let centre = origin.global(&centre_m);
         let (time_us, place_e7, altitude_m) = (self.status.time_us, centre.e7(), centre.altitude_m as f32);
-        // To the left is positive in the local frame.
+        // MAVLink's positive radius is clockwise, the local frame's counterclockwise.
         let status = OrbitStatus { time_us, radius_m: -radius_m, place_e7, altitude_m };
         Some(Downlink::Telemetry(Telemetry::Orbit(status)))
     }
 
-    /// True if `from` is in control, from now on if nobody was. Another one is informed.
+    /// Returns true if `from` is in control. Takes control if nobody has it. Warns a station that is refused.
     fn may(&mut self, from: Address, inputs: &mut ControlInputs) -> bool {
         let claim = self.control.claim(from, self.now_us);
         self.warn_not_in_control(from, claim);
@@ -322,7 +324,7 @@ impl Dispatcher {
         granted
     }
 
-    /// Tells a station once that another is in control.
+    /// Warns a station once that another station is in control.
     fn warn_not_in_control(&mut self, from: Address, claim: ControlClaim) {
         if let ControlClaim::Refused { holder, first_time: true } = claim {
             let words = Words::default().station(from).and(" ignored: ").station(holder).and(" is in control");
@@ -330,7 +332,7 @@ impl Dispatcher {
         }
     }
 
-    /// Tells the guidance that the station in control is there.
+    /// Tells the guidance that the station in control was heard.
     fn report_heard(&mut self, inputs: &mut ControlInputs) {
         if self.heard_us.is_none_or(|heard_us| self.now_us.saturating_sub(heard_us) >= HEARD_EVERY_US) {
             self.heard_us = Some(self.now_us);
@@ -342,7 +344,7 @@ impl Dispatcher {
         self.replies.push_back(reply).ok();
     }
 
-    /// Answers a question about what the vehicle does not have.
+    /// Refuses a request that the vehicle does not support.
     fn question(&mut self, question: Question, from: Address) {
         let refusal = match question {
             Question::Log(request) => {
@@ -353,7 +355,7 @@ impl Dispatcher {
             Question::Extended(request) => QuestionRefusal::Extended(extended::answer(request)),
             Question::Event(request) => QuestionRefusal::Event(events::answer(request)),
             Question::Serial(asked) => QuestionRefusal::Serial(serial::answer(asked)),
-            // The same place, with nothing known of it.
+            // The answer repeats the place without terrain data.
             Question::Terrain(place) => QuestionRefusal::Terrain(place),
             Question::Unanswered(wish) => {
                 if let Some(text) = self.unanswered.text(wish, self.now_us) {
@@ -362,7 +364,7 @@ impl Dispatcher {
                 return;
             }
             Question::Origin => {
-                // It is where the shell has it, or nowhere.
+                // Stations cannot move the origin: the shell sets it, or there is none.
                 self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, "the origin is not set by stations");
                 self.streams.request(Requested { message: id::GPS_GLOBAL_ORIGIN, index: 0 });
                 return;
@@ -373,19 +375,19 @@ impl Dispatcher {
 
     fn mission(&mut self, message: Mission, from: Address, inputs: &mut ControlInputs) {
         let changes = matches!(message, Mission::Count(..) | Mission::Clear(_) | Mission::SetCurrent(_));
-        // Only what changes something claims control: an item counts for the station that has begun the upload alone.
+        // Only requests that change something claim control. Items count only from the station that began the upload.
         let in_control = changes && self.may(from, inputs);
         let (around, number) = (self.surroundings(), self.missions.number());
         let heard = self.missions.hear(message, from, in_control, self.now_us, &around);
         if self.missions.number() != number {
-            // Of the mission before.
+            // The item reached last belongs to the previous mission.
             self.reached = None;
         }
         if heard.fence {
             self.fence.renew();
         }
         if matches!(message, Mission::SetCurrent(_)) {
-            // After the tick in which the guidance takes it up.
+            // MISSION_CURRENT is sent after the tick in which the guidance takes the new item.
             self.streams.request(Requested { message: id::MISSION_CURRENT, index: 0 });
         }
         if let Some(words) = heard.text {

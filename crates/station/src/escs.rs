@@ -1,4 +1,4 @@
-//! Motor controllers that answer, beside the stations: who is asked, and what follows from what they tell.
+//! Telemetry of motor controllers (ESCs): which one to ask next, and what follows from the answers.
 
 use crate::comms::Comms;
 use crate::services::texts::Words;
@@ -12,10 +12,10 @@ use afbc_onboard::{
 };
 use afbc_types::ROTORS_MAX;
 
-/// Ticket of the orders after a rotor's failure: nobody waits for an answer.
+/// Ticket of orders after a rotor failure. Nobody waits for the answer.
 const FAILURE: u8 = 253;
 
-/// The line of the motor controllers, and who watches what they tell.
+/// Receives and evaluates the telemetry of the motor controllers.
 #[derive(Clone, Debug)]
 pub struct EscReports {
     line: EscLine,
@@ -24,28 +24,28 @@ pub struct EscReports {
     settings: EscSettings,
 }
 
-/// What motor controllers have told since the last tick.
+/// Telemetry that the motor controllers have sent since the last tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct EscsHeard<'a> {
-    /// What has come over their line.
+    /// Bytes received on the ESCs' serial telemetry line.
     pub bytes: &'a [u8],
-    /// Electrical speed \[rev/min\] with which each has answered the last frame, by bidirectional DSHOT.
+    /// Electrical speed of each rotor \[rev/min\] from bidirectional DSHOT's answer to the last frame.
     pub speeds_rev_min: [Option<u32>; ROTORS_MAX],
 }
 
-/// What is to be done after a tick.
+/// Actions to be taken after a tick.
 #[derive(Clone, Debug, Default)]
 pub struct EscAction {
-    /// Rotor, from 0, whose motor controller is to be asked in the next frame.
+    /// Rotor, from 0, whose ESC is to be asked for telemetry in the next frame.
     pub ask: Option<u8>,
-    /// Where the notch stands from the next tick on, if it moves.
+    /// New notch filter for the next tick, if its frequency changes.
     pub notch: Option<VelocityNotch>,
-    /// What the vehicle is to do about a rotor's failure, to be [merged](ControlInputs::merge).
+    /// Reaction to a rotor's failure, to be [merged](ControlInputs::merge).
     pub inputs: Option<ControlInputs>,
 }
 
 impl EscReports {
-    /// Creates it for a vehicle with this configuration, whose parameters are in their ranges.
+    /// Creates the receiver of ESC telemetry for a vehicle with this configuration. All parameters must be in range.
     #[must_use]
     pub fn new<const N: usize>(configuration: &Configuration<N>) -> Self {
         let Configuration { airframe, response, curve, escs, .. } = configuration;
@@ -57,39 +57,39 @@ impl EscReports {
         }
     }
 
-    /// Goes on with another configuration, of a disarmed vehicle.
+    /// Adopts another configuration. The vehicle must be disarmed.
     pub fn adopt<const N: usize>(&mut self, configuration: &Configuration<N>) {
         let Configuration { airframe, response, curve, escs, .. } = configuration;
         (self.monitor, self.settings) = (RotorMonitor::new(response, curve), *escs);
         self.follower.adopt(OutputFilter::of(&airframe.parameters, N).notch().copied());
     }
 
-    /// Returns the line, with its counts.
+    /// Returns the serial telemetry line with its counters.
     #[must_use]
     pub fn line(&self) -> &EscLine {
         &self.line
     }
 }
 
-/// A speed that was measured.
+/// A measured rotor speed.
 struct Turning {
-    /// From 0.
+    /// Rotor number, from 0.
     rotor: u8,
     rad_s: Stamped<f32>,
 }
 
-/// What a tick has come to.
+/// Data of a tick with which ESC telemetry is compared.
 struct EscTick<'a> {
     now_us: u64,
     armed: bool,
     airborne: bool,
-    /// Commanded speeds \[rad/s\].
+    /// Commanded rotor speeds \[rad/s\].
     speeds: &'a [f32],
 }
 
 impl Comms {
-    /// Takes what motor controllers have told since the last tick, to be called after each [`report`](Self::report),
-    /// also if that is nothing.
+    /// Processes the ESC telemetry since the last tick. To be called after each [`report`](Self::report), even if there
+    /// is no telemetry.
     pub fn escs<const N: usize>(
         &mut self,
         reports: &mut EscReports,
@@ -101,7 +101,7 @@ impl Comms {
         self.listen(reports, heard, &tick)
     }
 
-    /// Not generic, so that it is compiled for size.
+    /// This function is not generic, so that it is compiled for size.
     #[inline(never)]
     fn listen(&mut self, reports: &mut EscReports, heard: &EscsHeard<'_>, tick: &EscTick<'_>) -> EscAction {
         let EscTick { now_us, armed, airborne, speeds } = *tick;
@@ -109,9 +109,9 @@ impl Comms {
         let hears = serial || answers;
         let mut action = EscAction::default();
         self.dispatcher.status.escs.poles = u16::try_from(poles).unwrap_or(u16::MAX);
-        // Without what they tell it is as while disarmed: there is nothing to compare.
+        // Without telemetry there is nothing to compare, so the monitor is told that the vehicle is disarmed.
         reports.monitor.commanded(now_us, armed && hears, speeds);
-        // Nobody is asked while they are not wanted, so that all bytes are dropped.
+        // If serial telemetry is off, no ESC has been asked, and the line drops all bytes.
         for byte in heard.bytes {
             if let Some((rotor, value)) = reports.line.take(now_us, *byte) {
                 let rad_s = Stamped { value: value.speed_rad_s(poles), at_us: now_us };
@@ -123,7 +123,7 @@ impl Comms {
             let Some(speed) = speed else { continue };
             let last = self.dispatcher.status.escs.readings.get(usize::from(rotor)).copied().flatten();
             let erpm_hundreds = u16::try_from(speed / 100).unwrap_or(u16::MAX);
-            // The rest comes over the line, if it does.
+            // The other values of the reading come over the serial line, if it is connected.
             let value = EscReading { erpm_hundreds, ..last.map_or_else(EscReading::default, |last| last.value) };
             let rad_s = Stamped { value: rotor_rad_s(speed, poles), at_us: now_us };
             self.take_reading(reports, Turning { rotor, rad_s }, value, airborne, &mut action);
@@ -135,7 +135,7 @@ impl Comms {
         action
     }
 
-    /// Takes what one has told.
+    /// Takes the reading of one ESC.
     fn take_reading(
         &mut self,
         EscReports { monitor, settings, .. }: &mut EscReports,
@@ -160,7 +160,7 @@ impl Comms {
     }
 }
 
-/// Returns the mode that `COM_ACT_FAIL_ACT` stands for; none for a warning alone.
+/// Returns the flight mode for a value of `COM_ACT_FAIL_ACT`. Returns none if the value means a warning only.
 fn mode_after(action: u32) -> Option<FlightMode> {
     match action {
         1 => Some(FlightMode::Hold),
@@ -170,7 +170,7 @@ fn mode_after(action: u32) -> Option<FlightMode> {
     }
 }
 
-/// Returns how a change of a rotor is announced, which people count from 1.
+/// Returns severity and text of a change of a rotor's state. The text counts rotors from 1.
 fn words(news: RotorNews) -> (MavSeverity, Words) {
     let (severity, what) = match news.failure {
         Some(RotorFailure::Stopped) => (MavSeverity::MAV_SEVERITY_CRITICAL, " has stopped"),

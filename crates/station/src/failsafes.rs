@@ -1,4 +1,4 @@
-//! Reports of failsafes: each once as text, and all in the heartbeat, however short they are.
+//! Reports of failsafes. Each one is announced once as a text, and shown in the heartbeat even if it was short.
 
 use afbc_flight_core::{EndReason, Mode};
 use afbc_link::MavSeverity;
@@ -14,18 +14,18 @@ const TUMBLED: Notice = (MavSeverity::MAV_SEVERITY_EMERGENCY, "tumbled: motors s
 const SHAKEN: Notice = (MavSeverity::MAV_SEVERITY_WARNING, "vibration above 4.9 m/s2: check rotors and mounts");
 const OBSERVED: Notice = (MavSeverity::MAV_SEVERITY_CRITICAL, "inertial sensor failed: flying on tracker's poses");
 
-/// Failsafes of the last tick.
+/// Failsafes that were active in the last tick.
 #[derive(Default)]
 pub(crate) struct Failsafes {
     mode: Mode,
     observed: bool,
     shaken: bool,
-    /// Number of the last tick with a failsafe.
+    /// Number of the last tick in which a failsafe was active.
     last: Option<u64>,
 }
 
 impl Failsafes {
-    /// Returns the failsafes that begin in the tick numbered `tick`.
+    /// Returns the notices of failsafes that begin in the tick numbered `tick`.
     pub(crate) fn watch<const N: usize>(
         &mut self,
         report: &Report<N>,
@@ -38,7 +38,7 @@ impl Failsafes {
             (entered == Some(Mode::Coasting)).then_some(COASTING),
             (entered == Some(Mode::Descending)).then_some(DESCENDING),
             (health.observed && !self.observed).then_some(OBSERVED),
-            // No failsafe: nothing is done about it but to say so.
+            // Vibration is no failsafe: it is only announced.
             (report.shaken && !self.shaken).then_some(SHAKEN),
             (*ended == Some(EndReason::StateLost)).then_some(STATE_LOST),
             (*ended == Some(EndReason::Tumbled)).then_some(TUMBLED),
@@ -51,7 +51,7 @@ impl Failsafes {
         notices.into_iter().flatten()
     }
 
-    /// True if there was a failsafe within the last `ticks` ticks.
+    /// Returns true if a failsafe was active within the last `ticks` ticks.
     pub(crate) fn within(&self, ticks: u64, tick: u64) -> bool {
         self.last.is_some_and(|last| tick.saturating_sub(last) < ticks)
     }

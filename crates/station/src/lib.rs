@@ -1,8 +1,8 @@
-//! Services of the vehicle for ground stations and companion computers: what stands between [`afbc_link`]'s messages
-//! and the control tick of [`afbc_onboard`].
+//! MAVLink services of the vehicle for ground stations and companion computers, between [`afbc_link`]'s messages and
+//! the control tick of [`afbc_onboard`].
 //!
-//! [`Comms`] receives and sends messages in the time that the control tick leaves. A host that runs both in turn with
-//! the same bytes and times gets the same bytes as the processor.
+//! [`Comms`] receives and sends messages in the time that the control tick leaves. Given the same bytes and times, a
+//! host that runs both in turn sends the same bytes as the processor on board.
 //!
 //! ```
 //! use afbc_onboard::{Configuration, ControlInputs, Flight, Readings};

@@ -1,4 +1,4 @@
-//! Logs of a vehicle on the link that telemetry and commands share: listed, downloaded and erased.
+//! Lists, downloads and erases logs over the link that telemetry and commands share.
 
 use crate::services::log_transfer::LogTransfer;
 use crate::services::storage::LogStore;
@@ -6,26 +6,26 @@ use crate::transferring::{Outcome, TransferRequests, Transferring};
 use afbc_link::{Address, LogMessage, LogRequest, Question, Uplink};
 use core::task::Poll;
 
-/// Text to stations that want logs erased while the vehicle is armed.
+/// Text to a station that wants to erase logs while the vehicle is armed.
 const WHILE_ARMED: &str = "logs are erased while disarmed only";
-/// Longest frame with a part of a log \[bytes\].
+/// Longest LOG_DATA frame \[bytes\].
 pub(crate) const LOG_FRAME: usize = 12 + 97;
 
-/// What of logs is asked for and sent.
+/// Pending log requests, and the download in progress.
 #[derive(Clone, Debug, Default)]
 pub struct LogServer {
     transfer: LogTransfer,
-    /// True while they are to be erased.
+    /// True if the logs are to be erased.
     erases: bool,
 }
 
 impl LogServer {
-    /// True while there is something to be done.
+    /// Returns true while a request or a download is pending.
     pub fn is_busy(&self) -> bool {
         self.erases || self.transfer.is_busy()
     }
 
-    /// Returns what is to be done next; none also while the logs have to be waited for.
+    /// Returns the next message or text to send. Returns none also while the storage is busy.
     pub(crate) fn next(&mut self, store: &mut (impl LogStore + ?Sized), armed: bool) -> Option<Outcome<LogMessage>> {
         if self.erases {
             if armed {
@@ -34,7 +34,7 @@ impl LogServer {
             }
             let Poll::Ready(erased) = store.erase_logs() else { return None };
             self.erases = false;
-            // Logs have other places now: a part that waits would be of another one.
+            // Erasing renumbers the logs, so a pending download would continue with another log.
             self.transfer.hear(LogRequest::Erase);
             return Some(Outcome::Say(if erased { "logs erased" } else { "logs cannot be erased" }, !erased));
         }
@@ -44,13 +44,13 @@ impl LogServer {
 
 impl TransferRequests for LogServer {
     fn wants(&self, message: &Uplink) -> bool {
-        // What a streamed log's station has received is no request.
+        // A log stream's acknowledgement is no request to this service.
         matches!(message, Uplink::Question(Question::Log(request)) if !matches!(request, LogRequest::Received(_)))
     }
 
     fn take(&mut self, _: Address, message: &Uplink, _: &[u8], may_change: bool) -> bool {
         match message {
-            // Whoever is not in control has been told.
+            // A station that is not in control has already been warned.
             Uplink::Question(Question::Log(LogRequest::Erase)) => self.erases |= may_change,
             Uplink::Question(Question::Log(request)) => self.transfer.hear(*request),
             _ => return false,

@@ -1,28 +1,28 @@
-//! MAVLink's parameter protocol on the [parameters](afbc_onboard::parameters) of a vehicle that runs;
-//! [`Comms::parameters`](crate::Comms::parameters) is its place.
+//! MAVLink's parameter protocol for the [parameters](afbc_onboard::parameters) of a running vehicle.
+//! [`Comms::parameters`](crate::Comms::parameters) uses it.
 
 use afbc_link::{ParameterError, ParameterName, ParameterRequest, ParameterValue};
 use afbc_onboard::parameters::{Parameter, ParameterTable, Reason, RecordChange, decode};
 use afbc_store::RecordName;
 use heapless::Deque;
 
-/// Largest size of a PARAM_VALUE on the link \[bytes\].
+/// Largest size of a PARAM_VALUE frame \[bytes\].
 pub const VALUE_BYTES: u32 = 37;
-/// Share of the link that lists and reads may take \[%\].
+/// Share of the link that answers to lists and reads may take \[%\].
 pub const LINK_SHARE: u32 = 40;
-/// Values that may be sent at once after a pause.
+/// Number of values that may be sent at once after a pause.
 const BURST: u64 = 4;
-/// Answers that can wait. A station asks again for what it misses.
+/// Most queued answers. A station asks again for values that it misses.
 const WAITING_MAX: usize = 32;
 
-/// What follows from a station's message.
+/// Results of a station's message.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Heard {
-    /// The table has changed: to be flown, and to be written.
+    /// Change of the table, to be flown and stored.
     pub change: Option<RecordChange>,
-    /// Line to the station: why nothing has changed.
+    /// Text to the stations that says why nothing has changed.
     pub refused: Option<Reason>,
-    /// Answer to a station that has named what there is not.
+    /// PARAM_ERROR to a station that has named a parameter that does not exist.
     pub error: Option<ParameterError>,
 }
 
@@ -31,31 +31,31 @@ impl Heard {
         Heard { refused: Some(reason), ..Heard::default() }
     }
 
-    /// There is no such parameter.
+    /// Answers that there is no such parameter.
     fn unknown(name: ParameterName, place: i16) -> Self {
         let error = ParameterError { name, place, error: ParameterError::DOES_NOT_EXIST };
         Heard { error: Some(error), ..Heard::default() }
     }
 }
 
-/// Answers to stations about the parameters of a [`ParameterTable`].
+/// Answers the stations' requests about the parameters of a [`ParameterTable`].
 #[derive(Clone, Debug, Default)]
 pub struct Service {
-    /// Answers to PARAM_SET: the values are those at the time of sending.
+    /// Parameters whose PARAM_SET is to be answered. Each answer has the value at the time of sending.
     set: Deque<RecordName, WAITING_MAX>,
-    /// Places asked for.
+    /// Places of the parameters to be read.
     read: Deque<u16, WAITING_MAX>,
-    /// Next place of the list, and how many are left of it.
+    /// Next place of the list, and the number of places left.
     next: u16,
     left: u16,
-    /// Time of the last call, and what may be sent \[bytes x 100,000,000\].
+    /// Time of the last call of `next_value`, and the bytes that may be sent \[1e-8 bytes\].
     at_us: u64,
     budget: u64,
     dropped: u32,
 }
 
 impl Service {
-    /// Takes a station's message. The table is changed only while `disarmed`.
+    /// Handles a station's message. The table is changed only while `disarmed`.
     pub fn hear<const N: usize>(
         &mut self,
         ask: ParameterRequest,
@@ -63,12 +63,12 @@ impl Service {
         disarmed: bool,
     ) -> Heard {
         match ask {
-            // A list under way continues to its end and then from its beginning: every station hears all of it.
+            // A list in progress continues to its end and then restarts, so that every station gets all of it.
             ParameterRequest::List => self.left = table.count(),
             ParameterRequest::ReadPlace(place) if table.at(place).is_some() => {
                 self.dropped += count(self.read.push_back(place))
             }
-            // Places are 15 bits long on the wire.
+            // A place has 15 bits on the wire.
             ParameterRequest::ReadPlace(place) => return Heard::unknown([0; 16], place as i16),
             ParameterRequest::ReadName(name) => match named(name).and_then(|name| table.get(name)) {
                 Some(parameter) => self.dropped += count(self.read.push_back(parameter.place)),
@@ -81,10 +81,10 @@ impl Service {
         Heard::default()
     }
 
-    /// Restores all values (MAV_CMD_PREFLIGHT_STORAGE with `param1` = 2) and lists them again.
+    /// Resets all parameters (MAV_CMD_PREFLIGHT_STORAGE with `param1` = 2) and lists them again.
     ///
     /// # Errors
-    /// The reason while armed.
+    /// Returns the reason if the vehicle is armed.
     pub fn restore<const N: usize>(
         &mut self,
         table: &mut ParameterTable<N>,
@@ -98,8 +98,8 @@ impl Service {
         Ok(RecordChange::Restored)
     }
 
-    /// Returns the next value to be sent at `now_us` over a link of `link_bytes_s` bytes per second; to be called until
-    /// there is none. Answers to PARAM_SET come at once, everything else at [`LINK_SHARE`] of the link.
+    /// Returns the next value to be sent at `now_us` over a link of `link_bytes_s` bytes per second. To be called until
+    /// it returns none. Answers to PARAM_SET are sent at once, all others use at most [`LINK_SHARE`] of the link.
     pub fn next_value<const N: usize>(
         &mut self,
         now_us: u64,
@@ -107,7 +107,7 @@ impl Service {
         table: &ParameterTable<N>,
     ) -> Option<ParameterValue> {
         const COST: u64 = VALUE_BYTES as u64 * 100_000_000;
-        // A second earns more than the budget holds, and keeps the product below within its bits.
+        // One second fills the budget, and the limit prevents an overflow of the product below.
         let elapsed_us = now_us.saturating_sub(self.at_us).min(1_000_000);
         self.at_us = now_us;
         let earned = elapsed_us * u64::from(link_bytes_s) * u64::from(LINK_SHARE);
@@ -127,7 +127,7 @@ impl Service {
         table.at(place).map(|parameter| value_message(&parameter, table.count()))
     }
 
-    /// Returns the number of messages that were not answered, since too many were waiting.
+    /// Returns the number of messages that were not answered because the queues were full.
     pub fn dropped(&self) -> u32 {
         self.dropped
     }
@@ -148,14 +148,14 @@ impl Service {
             return Heard { refused: Some(reason), ..Heard::unknown(asked, -1) };
         };
         let name = before.name;
-        // Whatever becomes of it: the answer is the value that counts when it is sent.
+        // The answer is queued in any case, with the value that counts when it is sent.
         self.dropped += count(self.set.push_back(name));
         let Some(value) = value else { return Heard::refused(Reason::on(name, "value or type not understood")) };
         if !disarmed {
             let is_news = before.value != value;
             return if is_news { Heard::refused(Reason::on(name, "not while armed")) } else { Heard::default() };
         }
-        // Also what it is already, which may not have been kept: a store writes it only then.
+        // An unchanged value is set too, in case it was never stored: a store writes a value only when it is set.
         match table.set(name, value) {
             Ok(Parameter { value, .. }) => {
                 let is_default = table.default_of(name).is_some_and(|image| image.value.to_bits() == value.to_bits());

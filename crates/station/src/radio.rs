@@ -1,8 +1,8 @@
-//! Radio control, beside the stations.
+//! Radio control, in addition to MAVLink stations.
 //!
-//! The pilot needs no leave of theirs: arming, kill and mode switches count whoever is in control. While no receiver
-//! hears one, the station in control may send channels in place of a receiver (RC_CHANNELS_OVERRIDE), which are read
-//! alike.
+//! The pilot may arm, kill and switch modes even if a station is in control. While no receiver hears a pilot, the
+//! station in control may send channels in place of a receiver (RC_CHANNELS_OVERRIDE). They are interpreted like a
+//! receiver's.
 
 use crate::comms::Comms;
 use crate::services::sensors;
@@ -20,28 +20,28 @@ use afbc_radio::{
 };
 use heapless::Vec;
 
-/// Ticket of the pilot's requests and orders: refusals are announced to everyone, nobody waits for an answer.
+/// Ticket of the pilot's requests and orders. Refusals are announced to all stations; nobody waits for an answer.
 const PILOT: u8 = 254;
 
-/// Time between two frames to the transmitter \[us\]: each of four kinds two and a half times a second.
+/// Time between two telemetry frames to the transmitter \[us\]. Each of the four kinds is sent 2.5 times per second.
 const TELEMETRY_US: u64 = 100_000;
-/// Bytes of the longest of them.
+/// Longest telemetry frame \[bytes\].
 pub const RADIO_FRAME_MAX: usize = 64;
 
-/// RSSI of a receiver that does not say how well it hears.
+/// RSSI of a receiver that does not report its signal strength.
 const RSSI_UNKNOWN: u8 = 255;
 
-/// Channels of a station in place of a receiver's.
+/// Channels that a station sends in place of a receiver.
 #[derive(Clone, Debug, Default)]
 struct Override {
     us: [u16; CHANNELS],
-    /// When each was sent last \[ms\].
+    /// Time at which each channel was sent last \[ms\].
     sent_ms: [u32; CHANNELS],
     link: RadioLink,
     pilot: RadioPilot,
 }
 
-/// A receiver, and the pilot behind it.
+/// State of the radio receiver and of the pilot's inputs.
 #[derive(Clone, Debug, Default)]
 pub struct RadioControl {
     overrides: Override,
@@ -51,14 +51,14 @@ pub struct RadioControl {
     link: RadioLink,
     pilot: RadioPilot,
     statistics: LinkStatistics,
-    /// When the transmitter is told next \[us\], and what.
+    /// Time of the next telemetry frame \[us\], and its kind.
     next_us: u64,
     turn: u8,
 }
 
 impl RadioControl {
-    /// Takes bytes of the receiver; `act` is called with what the pilot wants after each frame. Without bytes, it
-    /// notices that there are none.
+    /// Processes bytes of the receiver. After each frame, `act` is called with the pilot's inputs. To be called without
+    /// bytes too, so that silence is noticed.
     fn receive(
         &mut self,
         bytes: &[u8],
@@ -91,8 +91,8 @@ impl RadioControl {
         act(pilot.step(settings, link, inputs));
     }
 
-    /// Takes channels of the station in control, to be called after each [`receive`](Self::receive). They are lost like
-    /// a receiver's, and a pilot whom the receiver hears goes first.
+    /// Processes channels of the station in control. To be called after each [`receive`](Self::receive). They time out
+    /// like a receiver's, and a pilot heard by the receiver takes precedence.
     fn relay(
         &mut self,
         news: Option<ChannelsOverride>,
@@ -107,13 +107,13 @@ impl RadioControl {
             return;
         }
         if let Some(news) = news {
-            // The time in 32 bits wraps after 49 days: only differences count.
+            // The 32-bit time wraps after 49 days; only differences are used.
             let now_ms = (now_us / 1000) as u32;
             let mut refreshed = false;
             for (place, (us, sent_ms)) in us.iter_mut().zip(sent_ms).enumerate() {
                 match news.channel(place) {
                     Some(new) => (*us, *sent_ms, refreshed) = (new, now_ms, true),
-                    // One that the station leaves alone is lost as a stick is.
+                    // A channel that the station no longer sends times out like a stick.
                     None if now_ms.wrapping_sub(*sent_ms) > (SILENT_US / 1000) as u32 => *us = 0,
                     None => (),
                 }
@@ -125,12 +125,12 @@ impl RadioControl {
             }
         }
         let output = pilot.step(settings, link, inputs);
-        // Who sends them knows it.
+        // The sender of the channels need not be told that they arrive.
         let notice = output.notice.filter(|notice| *notice != PilotNotice::Heard);
         act(PilotOutput { notice, ..output });
     }
 
-    /// Returns the channels that count.
+    /// Returns the channels that are in use.
     fn status(&self, settings: &RadioSettings, now_us: u64) -> Option<RadioStatus> {
         if let Some(channels) = self.link.heard(now_us) {
             let rssi = match settings.receiver.protocol {
@@ -142,15 +142,15 @@ impl RadioControl {
         self.overrides.link.heard(now_us).map(|channels| RadioStatus { channels: *channels, rssi: RSSI_UNKNOWN })
     }
 
-    /// How well the receiver hears the pilot.
+    /// Returns the quality of the radio link.
     pub fn statistics(&self) -> &LinkStatistics {
         &self.statistics
     }
 }
 
 impl Comms {
-    /// Takes bytes of a radio receiver that have come since the last tick, to be called after each tick also without
-    /// any; returns new inputs for the control tick, if there are any, to be [merged](ControlInputs::merge).
+    /// Processes the radio receiver's bytes since the last tick. To be called after each tick, even without bytes.
+    /// Returns new inputs for the control tick, if any, to be [merged](ControlInputs::merge).
     pub fn pilot(&mut self, radio: &mut RadioControl, bytes: &[u8], settings: &RadioSettings) -> Option<ControlInputs> {
         let dispatcher = &mut self.dispatcher;
         let (now_us, status) = (dispatcher.now_us, &dispatcher.status);
@@ -203,7 +203,8 @@ impl Comms {
         update
     }
 
-    /// Returns a frame for the pilot's transmitter, if one is due: battery, attitude, mode and place in turn.
+    /// Returns the next telemetry frame for the pilot's transmitter, if one is due: battery, attitude, mode, position
+    /// in turn.
     pub fn radio_telemetry(&self, radio: &mut RadioControl) -> Option<Vec<u8, RADIO_FRAME_MAX>> {
         let status = &self.dispatcher.status;
         if status.time_us < radio.next_us {

@@ -1,14 +1,14 @@
-//! What takes requests for files and logs, and goes on with them.
+//! Interfaces of services that transfer files and logs.
 
 use afbc_link::{Address, Message, Uplink};
 
-/// Takes requests for files and logs out of what stations send. `()` takes none: they are refused.
+/// Takes requests for files and logs. `()` takes none, so that they are refused.
 pub trait TransferRequests {
-    /// True if the message is one.
+    /// Returns true if the message is a request for files or logs.
     fn wants(&self, message: &Uplink) -> bool;
 
-    /// Takes a message that it [wants](Self::wants); `may_change` is false if the station may not change anything.
-    /// False if too many wait.
+    /// Takes a message that is [wanted](Self::wants). `may_change` is false if the station may not change anything.
+    /// Returns false if the queue is full.
     fn take(&mut self, from: Address, message: &Uplink, payload: &[u8], may_change: bool) -> bool;
 }
 
@@ -22,22 +22,22 @@ impl TransferRequests for () {
     }
 }
 
-/// What transfers, over some storage.
+/// Transfers files and logs between a storage and the link.
 pub(crate) trait Transferring {
-    /// What it sends.
+    /// Type of the messages that are sent.
     type Sent: Message;
 
-    /// Returns the longest frame that may be next \[bytes\].
+    /// Returns the length of the longest frame that may be next \[bytes\].
     fn frame_max(&self) -> usize;
 
-    /// Returns what is to be done next, at this time since power-up; none if there is nothing now.
+    /// Returns the next message or text at `now_us` since power-up. Returns none if there is nothing to send now.
     fn next(&mut self, now_us: u64, armed: bool) -> Option<Outcome<Self::Sent>>;
 }
 
-/// What is to be sent or said.
+/// A message or a text to send.
 #[allow(clippy::large_enum_variant, reason = "one at a time, on the stack of whoever sends it")]
 pub(crate) enum Outcome<M> {
     Send(M),
-    /// To everyone, as a warning if it is one.
+    /// Text for all stations; true for a warning.
     Say(&'static str, bool),
 }

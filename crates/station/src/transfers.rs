@@ -1,4 +1,4 @@
-//! Files and logs of a vehicle with storage, on the link that telemetry and commands share.
+//! Transfers files and logs of a vehicle with storage, over the link that telemetry and commands share.
 
 use crate::log_server::{LOG_FRAME, LogServer};
 use crate::services::ftp::{FileTerms, Ftp, changes};
@@ -8,15 +8,15 @@ use crate::transferring::{Outcome, TransferRequests, Transferring};
 use afbc_link::{Address, Command, ComponentMetadata, FilePacket, LogRequest, Question, Transfer, Uplink};
 use heapless::Deque;
 
-/// Requests for files that wait, and others. Further ones are dropped: stations repeat them.
+/// Most queued requests for files, and of other kinds. Further ones are dropped, since stations repeat them.
 const FILES_MAX: usize = 4;
 const OTHERS_MAX: usize = 24;
-/// Longest frame with a part of a file or of a streamed log \[bytes\].
+/// Longest frame with a part of a file or of a log stream \[bytes\].
 const FILE_FRAME: usize = 12 + 255;
 /// COMPONENT_INFORMATION and COMPONENT_METADATA.
 const METADATA: [u32; 2] = [395, 397];
 
-/// What of files and logs is asked for and sent; `F` is an open file.
+/// Queued requests and transfers in progress. `F` is an open file.
 pub struct Transfers<F> {
     files: Deque<FileRequest, FILES_MAX>,
     others: Deque<OtherRequest, OTHERS_MAX>,
@@ -24,7 +24,7 @@ pub struct Transfers<F> {
     logs: LogServer,
     stream: LogStream,
     metadata: Option<ComponentMetadata>,
-    /// True if the next packet is one of a log.
+    /// True if the next packet may belong to a log download.
     logs_turn: bool,
 }
 
@@ -35,11 +35,11 @@ struct FileRequest {
 }
 
 enum OtherRequest {
-    /// A station has the part of the streamed log with this number.
+    /// Acknowledgement of a part of the log stream, by its sequence number.
     Received(Address, u16),
-    /// Begins to stream the log, or ends.
+    /// Begins (true) or ends (false) a log stream to a station.
     Stream(Address, bool),
-    /// The message numbered so.
+    /// Requests a metadata message by its number.
     Metadata(u32),
 }
 
@@ -56,7 +56,7 @@ impl<F: Copy, S: FileStore<File = F> + LogStore + LogSource> Transferring for (&
     }
 }
 
-/// True of requests that change what is stored.
+/// Returns true if a request changes stored files or logs.
 pub(crate) fn is_change(message: &Uplink) -> bool {
     match message {
         Uplink::Question(Question::Log(request)) => *request == LogRequest::Erase,
@@ -66,7 +66,7 @@ pub(crate) fn is_change(message: &Uplink) -> bool {
 }
 
 impl<F: Copy> Transfers<F> {
-    /// With the address of the vehicle's metadata, if there is some.
+    /// Creates the service. `metadata` tells where the vehicle's component metadata is, if there is any.
     pub fn new(metadata: Option<ComponentMetadata>) -> Self {
         Transfers {
             files: Deque::new(),
@@ -79,14 +79,14 @@ impl<F: Copy> Transfers<F> {
         }
     }
 
-    /// Returns the longest frame that may be next \[bytes\].
+    /// Returns the length of the longest frame that may be next \[bytes\].
     pub(crate) fn frame_max(&self) -> usize {
         let logs_alone =
             self.files.is_empty() && self.others.is_empty() && !self.ftp.is_busy() && !self.stream.is_active();
         if logs_alone { LOG_FRAME } else { FILE_FRAME }
     }
 
-    /// Returns what is to be done next.
+    /// Returns the next message or text to send.
     pub(crate) fn next<S: FileStore<File = F> + LogStore + LogSource>(
         &mut self,
         store: &mut S,
@@ -99,13 +99,13 @@ impl<F: Copy> Transfers<F> {
             }
         }
         while let Some(FileRequest { from, packet, may_change }) = self.files.pop_front() {
-            // Armed or not as it is now, which may be some time after the request.
+            // The present armed state counts. The request may be older.
             let terms = FileTerms { now_us, may_write: may_change && !armed };
             if let Some(packet) = self.ftp.answer(from, &packet, store, terms) {
                 return Some(Outcome::Send(Transfer::File { packet, to: from }));
             }
         }
-        // In turn, if both are under way.
+        // Log download and FTP take turns if both are in progress.
         self.logs_turn = !self.logs_turn;
         if (self.logs_turn || !self.ftp.is_busy())
             && let Some(outcome) = self.logs.next(store, armed)
@@ -126,7 +126,7 @@ impl<F: Copy> Transfers<F> {
 }
 
 impl<F: Copy> Transfers<F> {
-    /// Does what a request asks for that is not about files, or begins it.
+    /// Handles or begins a request that is not about files.
     fn begin<S: LogSource>(&mut self, request: OtherRequest, store: &mut S, now_us: u64) -> Option<Outcome<Transfer>> {
         match request {
             OtherRequest::Received(from, sequence) => {

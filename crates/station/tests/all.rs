@@ -1,4 +1,4 @@
-//! All tests in one program: one each takes longer to build than to run.
+//! All tests in one program: separate programs would take longer to build than to run.
 #![allow(
     clippy::expect_used,
     clippy::indexing_slicing,

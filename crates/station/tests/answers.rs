@@ -23,7 +23,7 @@ fn answers(said: &[Downlink]) -> Vec<Told> {
     said.iter().filter_map(answer).collect()
 }
 
-/// Returns all answers of the next `ticks` ticks, without input.
+/// Returns all answers of the next `ticks` ticks without input.
 fn listen(bench: &mut Bench, ticks: usize) -> Vec<Told> {
     (0..ticks).flat_map(|_| answers(&bench.step().1)).collect()
 }
@@ -36,8 +36,8 @@ fn texts(said: &[Downlink]) -> Vec<Text> {
     said.iter().filter_map(text).collect()
 }
 
-/// Returns the answer of a vehicle that has just been switched on to a station. The first that wants to arm or to
-/// engage is in control from then on.
+/// Returns the expected answer of a vehicle that has just been switched on. The first station that asks to arm or
+/// engage takes control.
 fn expected(command: Command, from: Address, holder: &mut Option<Address>) -> Answer {
     if matches!(command, Command::Arm | Command::Engage) && *holder.get_or_insert(from) != from {
         return Answer::Refused(NOT_IN_CONTROL);
@@ -71,7 +71,7 @@ fn sorted(mut reported: Vec<Told>) -> Vec<Told> {
 }
 
 proptest! {
-    /// Any commands of several stations, any number of them in one tick.
+    /// Several stations send any commands, any number of them in one tick.
     #[test]
     fn every_sender_is_answered(
         asked in prop::collection::vec(
@@ -82,7 +82,7 @@ proptest! {
         let mut bench = Bench::new();
         let (mut reported, mut due, mut holder) = (Vec::new(), Vec::new(), None);
         for tick in asked {
-            // The flight core answers one request per tick; of other answers three are sent per tick.
+            // The flight core answers one request per tick. Of all other answers three are sent per tick.
             prop_assert!(answers(&bench.step().1).is_empty());
             let (mut requests, mut all) = (0, 0);
             for (command, from) in tick {
@@ -98,8 +98,8 @@ proptest! {
         prop_assert_eq!(sorted(reported), sorted(due));
     }
 
-    /// More commands than there is room for: those that cannot be carried out are refused, those that cannot be
-    /// answered either are counted; each is one or the other, and no fewer are answered than there is room for.
+    /// Too many commands arrive. Commands that cannot be carried out are refused; those that cannot be answered either
+    /// are counted. No command is lost, and at least as many are answered as the queue has room for.
     #[test]
     fn every_command_is_answered_or_counted(
         asked in prop::collection::vec((commands(), prop::sample::select(STATIONS.as_slice())), 0..200),
@@ -123,7 +123,7 @@ proptest! {
         prop_assert!(reported >= asked.len().min(ANSWERS_MAX));
     }
 
-    /// In a burst of any commands an interval is set if, and only if, that is answered with "accepted".
+    /// An interval in a burst of commands is set if and only if the command is accepted.
     #[test]
     fn nothing_is_done_without_an_answer(
         burst in prop::collection::vec(
@@ -145,7 +145,7 @@ proptest! {
             Command::SetInterval { interval_us, .. } => Some(*interval_us),
             _ => None,
         });
-        // The first so many: what comes later finds no more room.
+        // The first commands are accepted. Later ones find the queue full.
         let last = set.take(accepted).last().unwrap_or(20_000);
         bench.hear(Uplink::Command(Command::GetInterval(afbc_station::services::streams::id::ATTITUDE)));
         let interval = (0..5).flat_map(|_| bench.step().1).find_map(|message| match message {
@@ -156,7 +156,7 @@ proptest! {
     }
 }
 
-/// Any burst of one command is answered as often as it came.
+/// A command that is repeated in a burst is answered once per repetition.
 #[test]
 fn a_burst_of_one_command_is_answered_each_time() {
     for count in [32, 33, 60, 500] {
@@ -188,7 +188,7 @@ fn two_commands_of_one_tick_are_answered_to_their_senders() {
     assert_eq!(listen(&mut bench, 1000), []);
 }
 
-/// Any command number, in either message, unless addressed to another system.
+/// Any command number is answered, unless the command is addressed to another system or component.
 #[test]
 fn every_command_number_is_answered_unless_addressed_to_others() {
     let mut bench = Bench::new();
@@ -217,7 +217,7 @@ fn crc(bytes: &[u8], extra: u8) -> u16 {
     })
 }
 
-/// In flight a plain request to disarm is refused with the reason, and a forced one stops the motors.
+/// In flight a plain disarm command is refused with the reason, and a forced one stops the motors.
 #[test]
 fn only_the_forced_one_disarms_in_flight() {
     let mut bench = Bench::flying();
@@ -257,7 +257,7 @@ fn every_refusal_is_reported_with_its_reason() {
     assert!(Refusal::ALL.iter().all(|refusal| *refusal as i32 != BUSY));
 }
 
-/// A request to stop the motors is accepted however many requests are queued.
+/// A command to stop the motors is accepted even if the request queue is full.
 #[test]
 fn a_kill_is_always_accepted() {
     let mut bench = Bench::new();
@@ -279,8 +279,8 @@ fn a_kill_is_always_accepted() {
     assert!(reported.contains(&(400, Answer::Accepted, second)) && reported.contains(&(400, Answer::Accepted, third)));
 }
 
-/// If the link falls behind, reports are dropped; requests of such ticks are answered with "failed", and their places
-/// are free again.
+/// If the link falls behind, reports are dropped. Requests answered in such reports fail, and their tickets become free
+/// again.
 #[test]
 fn requests_whose_tick_went_unreported_fail() {
     let mut bench = Bench::new();
@@ -304,7 +304,7 @@ fn requests_whose_tick_went_unreported_fail() {
 #[test]
 fn the_largest_output_of_a_tick_is_sent_completely() {
     let mut bench = Bench::new();
-    // On a narrower one, texts wait.
+    // On a slower link texts would have to wait.
     bench.comms = Comms::with(Setup { bytes_per_s: 1_000_000, ..Setup::default() });
     let (idle, _) = bench.tick(&State::default());
     let answer = afbc_flight_core::RequestAnswer { ticket: 1, request: Request::Arm, result: Err(Refusal::Unhealthy) };

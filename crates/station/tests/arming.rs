@@ -1,4 +1,4 @@
-//! Arming: what the guidance has against it, and what stations are told before.
+//! The guidance's and the sensors' reasons against arming, as answers and as reported in advance.
 
 use crate::common::{Bench, STATION};
 use afbc_estimator::Measurement;
@@ -15,7 +15,7 @@ use proptest::prelude::*;
 
 const ARM_DISARM: u16 = 400;
 
-/// One that watches its battery of three cells, and lies within its fence of 10 m.
+/// Returns a vehicle with a monitored three-cell battery, inside its geofence of 10 m.
 fn bench() -> Bench {
     let net = Net { cells: 3, fence_radius_m: 10.0, ..Net::DEFAULT };
     let guidance = Settings { net, ..Settings::DEFAULT };
@@ -39,7 +39,7 @@ fn stand(bench: &mut Bench, ticks: u32, state: &State, readings: &Readings) -> V
         .collect()
 }
 
-/// A shell with sensors of which some are not well.
+/// Sets the sensors' state as a shell reports it.
 fn report(bench: &mut Bench, present: u32, healthy: u32) {
     let sensors = SensorBits { present, healthy };
     let battery =
@@ -47,7 +47,7 @@ fn report(bench: &mut Bench, present: u32, healthy: u32) {
     bench.comms.set_aux_sensors(AuxSensors { battery: Some(battery), sensors, ..AuxSensors::default() });
 }
 
-/// Returns the answer to the wish to arm, and what SYS_STATUS said of it just before.
+/// Returns the answer to an arm command, and whether SYS_STATUS showed the vehicle as ready just before.
 fn arm(bench: &mut Bench, state: &State) -> (Answer, bool) {
     bench.hear(Uplink::Command(Command::RequestMessage { message: 1, index: 0 }));
     let said = stand(bench, 3, state, &Readings::NONE);
@@ -65,7 +65,7 @@ fn arm(bench: &mut Bench, state: &State) -> (Answer, bool) {
     (answer.expect("answered"), armable)
 }
 
-/// A sensor that has failed its own test, or is faulty in flight, is not started with, whatever flies instead of it.
+/// A vehicle with a faulty sensor, or one that failed its self-test, is not armed, even if another IMU is used instead.
 #[test]
 fn a_faulty_sensor_is_not_started_with() {
     let here = State::default();
@@ -81,7 +81,7 @@ fn a_faulty_sensor_is_not_started_with() {
     }
 }
 
-/// The sensors' own tests are asked for once, of a vehicle that has some, disarmed and not being calibrated.
+/// A self-test is requested once, if the vehicle has sensors, is disarmed and is not being calibrated.
 #[test]
 fn self_tests_are_for_a_disarmed_vehicle() {
     const SELF_TEST: u16 = 31_011;
@@ -140,7 +140,7 @@ fn the_guidance_refuses_with_its_reason_and_stations_know_before() {
     stand(&mut carried, 1500, &there, &Readings::NONE);
     assert_eq!(arm(&mut carried, &there), refused(Refusal::OutsideFence));
 
-    // A magnetometer that was heard once, and never again.
+    // This magnetometer is read once and never again.
     let mut silent = bench();
     let field = Measurement::MagneticField { field: Vector3::new(0.2, 0.0, -0.4), sigma: 0.01 };
     let readings = Readings { aids: [Some(Aged { value: field, age_us: 0 }), None], ..Readings::NONE };
@@ -151,7 +151,7 @@ fn the_guidance_refuses_with_its_reason_and_stations_know_before() {
     assert_eq!(arm(&mut silent, &here), (Answer::Accepted, true));
 }
 
-/// Whoever arms as soon as the vehicle says that it may be armed, is not refused; it is so within 1.1 s at rest.
+/// A vehicle that reports itself ready can be armed. It is ready after 1.1 s at rest.
 #[test]
 fn what_is_reported_agrees_with_the_answer() {
     let (here, moves) = (State::default(), State { velocity_m_s: Vector3::new(0.6, 0.0, 0.0), ..State::default() });
@@ -168,15 +168,15 @@ fn what_is_reported_agrees_with_the_answer() {
     assert!(armable.iter().skip_while(|reported| !**reported).all(|reported| *reported));
 }
 
-/// What a station is told that asks for everything at once: the answer to its wish to arm, the texts of the checks in
-/// their order, and whether SYS_STATUS says that the vehicle can be armed.
+/// Results of a check, a status request and an arm command at once: the answer, the texts in order, and whether
+/// SYS_STATUS shows the vehicle as ready.
 struct Told {
     answer: Answer,
     checks: Vec<Text>,
     armable: bool,
 }
 
-/// Asks in one tick for the checks, the system's status and the motors, and stops them again.
+/// Requests the arming checks and SYS_STATUS and arms in one tick, then stops the motors.
 fn ask(bench: &mut Bench, from: Address, stands: &Stands) -> Told {
     bench.hear_from(from, Uplink::Command(Command::CheckArming));
     bench.hear_from(from, Uplink::Command(Command::RequestMessage { message: 1, index: 0 }));
@@ -201,18 +201,18 @@ fn ask(bench: &mut Bench, from: Address, stands: &Stands) -> Told {
     Told { answer: answer.expect("answered"), checks: texts.collect(), armable: armable.expect("sent") }
 }
 
-/// How a vehicle stands, for a while.
+/// State of a standing vehicle for some time.
 #[derive(Clone, Debug)]
 struct Stands {
     ticks: u32,
     state: State,
-    /// False if its tracker is silent.
+    /// False if the tracker is silent.
     seen: bool,
-    /// True if its inertial sensor is read.
+    /// True if the IMU is read.
     sensed: bool,
     voltage_mv: u16,
     mode: Option<FlightMode>,
-    /// A limit that is set at the beginning.
+    /// An arming limit that is set at the beginning.
     limit: Option<(&'static str, f32)>,
 }
 
@@ -240,12 +240,12 @@ impl Stands {
     }
 }
 
-/// A size from the smallest limit to beyond the largest motion, none of them more likely.
+/// Generates sizes from the smallest limit to beyond the largest motion, uniform in their logarithm.
 fn size(most: f32) -> impl Strategy<Value = f32> {
     (0.005_f32.ln()..most.ln()).prop_map(f32::exp)
 }
 
-/// Limits near the motions that are drawn, within their ranges.
+/// Generates limits within their ranges, close to the generated motions.
 fn limit() -> impl Strategy<Value = (&'static str, f32)> {
     let name = prop::sample::select(vec!["ARM_SPEED_MAX", "ARM_RATE_MAX", "ARM_TILT_MAX", "ARM_DIST_MAX"]);
     (name, size(4.0))
@@ -254,7 +254,7 @@ fn limit() -> impl Strategy<Value = (&'static str, f32)> {
 
 fn vector(most: f32) -> impl Strategy<Value = Vector3<f32>> {
     let along = || prop_oneof![2 => Just(0.0), 1 => size(most), 1 => size(most).prop_map(|x| -x)];
-    // Mostly zero: else it is hardly ever ready.
+    // Most vectors are zero, since otherwise the vehicle would hardly ever be ready.
     prop_oneof![2 => Just(Vector3::zeros()), 1 => prop::array::uniform3(along()).prop_map(Vector3::from)]
 }
 
@@ -279,7 +279,7 @@ fn stands() -> impl Strategy<Value = Stands> {
     )
 }
 
-/// One of random limits, whose link is wide enough for every text.
+/// Returns a vehicle with these arming limits and a link fast enough for every text.
 fn limited(limits: &[f32; 4]) -> Bench {
     let net = Net { cells: 3, fence_radius_m: 10.0, ..Net::DEFAULT };
     let [speed_max_m_s, rate_max_rad_s, tilt_max_rad, setpoint_distance_max_m] = *limits;
@@ -301,9 +301,9 @@ fn limited(limits: &[f32; 4]) -> Bench {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(150))]
 
-    /// Under any limits, also such as are set while it runs, and however the vehicle stands: the checks say "ready to
-    /// arm", and SYS_STATUS that it can be armed, exactly when it is armed in that tick; else the checks begin with the
-    /// reason of the refusal.
+    /// Whatever the limits and the state, even if limits change meanwhile: the checks say "ready to arm" and SYS_STATUS
+    /// shows the vehicle as ready exactly if an arm command is accepted in that tick. Otherwise the checks begin with
+    /// the reason of the refusal.
     #[test]
     fn the_report_is_what_the_flight_core_decides(
         limits in prop::array::uniform4(size(4.0)),
@@ -332,7 +332,7 @@ proptest! {
     }
 }
 
-/// The report of old: by the default limits, while those of the parameters count.
+/// Regression: the checks used the default limits instead of the parameters.
 #[test]
 fn the_limits_of_the_parameters_count() {
     let creeps = |speed_m_s: f32| State { velocity_m_s: Vector3::new(speed_m_s, 0.0, 0.0), ..State::default() };
@@ -362,7 +362,7 @@ fn the_limits_of_the_parameters_count() {
     }
 }
 
-/// A station that is not in control is told so: it would be refused.
+/// A station that is not in control is told so, since its arm command would be refused.
 #[test]
 fn a_station_that_may_not_arm_does_not_read_that_it_may() {
     const OTHER: Address = Address { system: 245, component: 190 };
@@ -385,7 +385,7 @@ fn a_station_that_may_not_arm_does_not_read_that_it_may() {
     let reported = ask(&mut bench, OTHER, &spell);
     assert_eq!(reported.answer, Answer::Refused(afbc_station::NOT_IN_CONTROL));
     assert!(reported.checks.contains(&theirs) && !reported.checks.contains(&mine), "{:?}", reported.checks);
-    // Both at once: each is told.
+    // If both stations ask at once, each gets its text.
     bench.hear_from(OTHER, Uplink::Command(Command::CheckArming));
     let reported = ask(&mut bench, STATION, &spell);
     assert_eq!(reported.answer, Answer::Accepted);

@@ -1,4 +1,4 @@
-//! Calibration as a station asks for it and follows it: commands, texts, and the parameters that it sets.
+//! Calibration from a station's point of view: commands, texts, and the parameters that are set.
 
 use crate::common::Bench;
 use afbc_calibration::{RawSample, Side};
@@ -13,7 +13,7 @@ const GRAVITY: f32 = 9.81;
 const INFO: MavSeverity = MavSeverity::MAV_SEVERITY_INFO;
 const WARNING: MavSeverity = MavSeverity::MAV_SEVERITY_WARNING;
 
-/// A disarmed vehicle whose sensors are read.
+/// A disarmed vehicle with sensors.
 struct Vehicle {
     bench: Bench,
     calibrator: Calibrator,
@@ -23,7 +23,7 @@ struct Vehicle {
     texts: Vec<(MavSeverity, String)>,
 }
 
-/// At rest as it stands.
+/// Returns a sample of a level vehicle at rest.
 fn level() -> RawSample {
     let specific_force_m_s2 = Vector3::new(0.0, 0.0, GRAVITY);
     RawSample { at_us: 0, rates_rad_s: Vector3::zeros(), specific_force_m_s2, field_ut: None }
@@ -42,7 +42,7 @@ impl Vehicle {
         self.bench.hear(Uplink::Command(Command::Calibrate(what)));
     }
 
-    /// Runs a tick of 20 ms, with what the sensors have come to.
+    /// Runs a tick of 20 ms with a sample, if there is one.
     fn tick(&mut self, sample: Option<RawSample>) {
         self.bench.now_us += 20_000;
         let sample = sample.map(|sample| RawSample { at_us: self.bench.now_us, ..sample });
@@ -61,7 +61,7 @@ impl Vehicle {
         }
     }
 
-    /// Runs ticks of a time; returns the texts.
+    /// Runs ticks for a time. Returns the texts.
     fn pass(&mut self, seconds: f32, sample: Option<RawSample>) -> Vec<String> {
         let before = self.texts.len();
         (0..(50.0 * seconds) as u32).for_each(|_| self.tick(sample));
@@ -77,7 +77,7 @@ impl Vehicle {
         Vector3::from(["X", "Y", "Z"].map(|axis| self.value(&format!("{group}{axis}"))))
     }
 
-    /// Names of the parameters that were set.
+    /// Returns the changes of parameters.
     fn set(&self) -> Vec<String> {
         self.bench.changes.iter().map(|change| format!("{change:?}")).collect()
     }
@@ -96,17 +96,17 @@ fn the_gyroscopes_offset_is_found() {
     assert_eq!(texts, expected);
     assert!(vehicle.texts.iter().all(|(severity, _)| *severity == INFO));
     assert!((vehicle.values("CAL_GYRO0_OFF_") - offset).amax() < 1e-5);
-    // Each value once, and no other.
+    // Each value is set once, and no others.
     assert_eq!(vehicle.set().len(), 3, "{:?}", vehicle.set());
     assert_eq!((vehicle.answers.as_slice(), vehicle.bench.comms.takes_samples()), (&[Answer::Accepted][..], false));
-    // The next one begins anew, and finds its own.
+    // The next calibration starts afresh and finds its own offset.
     vehicle.ask(CalibrationRequest::Gyroscope);
     let texts = vehicle.pass(4.0, Some(RawSample { rates_rad_s: -offset, ..level() }));
     assert_eq!(texts.last().map(String::as_str), Some("[cal] calibration done: gyro"));
     assert!((vehicle.values("CAL_GYRO0_OFF_") + offset).amax() < 1e-5);
 }
 
-/// One that was ended on its way leaves nothing to the next.
+/// A cancelled calibration does not affect the next one.
 #[test]
 fn the_mounting_is_found() {
     let mut vehicle = Vehicle::new();
@@ -156,7 +156,7 @@ fn the_accelerometers_errors_are_found() {
     assert_eq!(vehicle.set().len(), 6, "{:?}", vehicle.set());
 }
 
-/// Between sides, and on one that is done, it says what is in its way.
+/// Texts tell the user about a movement, a side that is already done and an orientation between sides.
 #[test]
 fn what_a_hand_does_wrong_is_said() {
     let mut vehicle = Vehicle::new();
@@ -184,7 +184,7 @@ fn the_magnetometers_errors_are_found() {
         let up = Rotation3::rotation_between(&side.up(), &Vector3::z());
         let up = up.unwrap_or_else(|| Rotation3::from_euler_angles(std::f32::consts::PI, 0.0, 0.0));
         for tick in 0..450 {
-            // At rest for a second, then one turn in seven.
+            // The vehicle rests for one second, then makes one turn in seven seconds.
             let turned = (tick as f32 - 50.0).max(0.0) / 350.0 * std::f32::consts::TAU;
             let to_body = (Rotation3::from_axis_angle(&Vector3::z_axis(), turned) * up).inverse();
             let spin = if tick < 50 { 0.0 } else { std::f32::consts::TAU / 7.0 };
@@ -201,7 +201,7 @@ fn the_magnetometers_errors_are_found() {
     assert_eq!(said("[cal] rotate vehicle around the vertical"), 6, "{:?}", vehicle.texts);
     assert_eq!(said("[cal] calibration done: mag"), 1, "{:?}", vehicle.texts);
     assert!((vehicle.values("CAL_MAG0_OFF_") - offset).amax() < 0.1);
-    // To a factor: the field's strength is not known.
+    // The scale is known up to a factor, since the field's strength is not known.
     let [s, d] = ["CAL_MAG0_SCALE_", "CAL_MAG0_ODIAG_"].map(|group| vehicle.values(group));
     let found = Matrix3::new(s.x, d.x, d.y, d.x, s.y, d.z, d.y, d.z, s.z);
     let found = found * (matrix.trace() / found.trace());
@@ -209,8 +209,8 @@ fn the_magnetometers_errors_are_found() {
     assert_eq!(vehicle.set().len(), 9, "{:?}", vehicle.set());
 }
 
-/// Of a vehicle that does not rest, sensors that are silent or not believable, and one that is armed meanwhile, by
-/// whomever: the station is told why, and nothing is set.
+/// Calibration fails with a reason, and sets nothing, if the vehicle moves or is armed, or if the sensors are silent or
+/// implausible.
 #[test]
 fn a_failure_is_told_with_its_reason() {
     let rocks = |tick: u32| RawSample { rates_rad_s: Vector3::repeat((tick % 2) as f32), ..level() };
@@ -224,7 +224,7 @@ fn a_failure_is_told_with_its_reason() {
     let texts = vehicle.pass(4.0, Some(RawSample { rates_rad_s: Vector3::repeat(0.9), ..level() }));
     assert_eq!(texts.last().map(String::as_str), Some("[cal] calibration failed: sensor errors too large"));
 
-    // Half a second of silence is none; a second is, at the beginning as later.
+    // The sensors may be silent for up to a second, at the beginning and later.
     for before in [0.0, 1.0] {
         vehicle.ask(CalibrationRequest::Gyroscope);
         vehicle.pass(before, Some(level()));
@@ -246,7 +246,7 @@ fn a_failure_is_told_with_its_reason() {
     assert_eq!(vehicle.set(), Vec::<String>::new());
 }
 
-/// Values that the parameters do not have in the end are no result: a station restores all while they are being set.
+/// Calibration fails if the parameters differ from the result in the end, here because a station resets them meanwhile.
 #[test]
 fn a_result_is_what_the_parameters_have() {
     let mut vehicle = Vehicle::new();
@@ -262,7 +262,7 @@ fn a_result_is_what_the_parameters_have() {
     assert_eq!(vehicle.texts.last(), Some(&(WARNING, "[cal] calibration failed: values not accepted".to_owned())));
 }
 
-/// One at a time, until it is cancelled, which is said where there is something to cancel.
+/// Only one calibration runs at a time. Cancelling it sends a text only if one is running.
 #[test]
 fn one_is_calibrated_at_a_time() {
     let mut vehicle = Vehicle::new();
@@ -283,7 +283,7 @@ fn one_is_calibrated_at_a_time() {
     assert_eq!(vehicle.texts[2..], [(INFO, "[cal] calibration cancelled".to_owned())]);
     assert_eq!(vehicle.answers[2..], [Answer::Accepted; 2]);
     assert!(vehicle.pass(4.0, Some(level())).is_empty());
-    // A vehicle without sensors calibrates none, and cancels none.
+    // A vehicle without sensors supports neither calibration nor its cancellation.
     let mut without = Vehicle::new();
     without.bench.comms = Comms::new();
     for what in [CalibrationRequest::Gyroscope, CalibrationRequest::Cancel] {

@@ -1,25 +1,25 @@
-//! Every parameter of MAVLink's common dialect, of every command and every item of a plan that is accepted: it is used,
-//! or a value that asks for something is refused.
+//! Each parameter of each accepted command and mission item in MAVLink's common dialect is either used, or refused if
+//! it is set.
 
 use crate::common::Bench;
 use afbc_link::{Address, Answer, Command, Decoder, Downlink, MissionItem, Uplink};
 use afbc_station::services::mission::{check, to_guidance};
 use afbc_station::services::origin::EarthOrigin;
 
-/// What becomes of a parameter.
+/// Handling of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Use {
-    /// The dialect calls it empty or reserved, or the vehicle has nothing for it: 0 or none.
+    /// The parameter is reserved or not supported: it must be 0 or NaN.
     No,
-    /// It changes what is done.
+    /// The parameter has an effect.
     Yes,
-    /// It is checked, and some values other than 0 ask for nothing: these.
+    /// The parameter is checked. These values other than 0 have no effect.
     But(&'static [f32]),
 }
 
 use Use::{But, No, Yes};
 
-/// A value of an accepted command's parameters, and what becomes of each.
+/// Number of a command, valid values of its parameters, and the handling of each.
 struct Row(u16, [f32; 7], [Use; 7]);
 
 const NAN: f32 = f32::NAN;
@@ -27,27 +27,27 @@ const HERE: [f32; 3] = [47.397_74, 8.545_594, 490.0];
 const NONE: [f32; 7] = [0.0; 7];
 const UNUSED: [Use; 7] = [No; 7];
 
-/// Returns rows of parameters 1 to 4, with a place behind them.
+/// Returns parameters 1 to 4 followed by a place.
 const fn placed([a, b, c, d]: [f32; 4]) -> [f32; 7] {
     let [x, y, z] = HERE;
     [a, b, c, d, x, y, z]
 }
 
-/// The commands of the dialect (`MAV_CMD`, common.xml), as they are accepted.
+/// The accepted commands of the dialect (`MAV_CMD` in common.xml).
 const COMMANDS: &[Row] = &[
     Row(20, NONE, UNUSED),
-    // Abort altitude, precision landing, heading, place: it lands where it is.
+    // Abort altitude, precision landing, heading, place: the vehicle lands where it is.
     Row(21, NONE, UNUSED),
     // Pitch (-1: none), flags, heading, place; height.
     Row(22, NONE, [But(&[-1.0]), No, No, No, No, No, Yes]),
     Row(34, placed([10.0, 2.0, 0.0, 0.0]), [Yes, Yes, Yes, Yes, Yes, Yes, Yes]),
-    // Of the mode's flags only that of a custom mode is used: stations send those that the vehicle has.
+    // Of the mode flags only the custom mode flag is used: stations repeat the vehicle's other flags.
     Row(176, [1.0, 4.0, 3.0, 0.0, 0.0, 0.0, 0.0], [But(&[5.0, 7.0, 77.0, 12.5]), Yes, Yes, No, No, No, No]),
-    // Airspeed is the speed over the ground where nothing measures it; a throttle is left alone.
+    // Airspeed means ground speed, since no sensor measures airspeed. The throttle is not changed.
     Row(178, [1.0, 5.0, -1.0, 0.0, 0.0, 0.0, 0.0], [But(&[0.0]), Yes, But(&[-1.0, -2.0]), No, No, No, No]),
     Row(179, placed([0.0; 4]), [Yes, No, No, No, Yes, Yes, Yes]),
     Row(179, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [Yes, No, No, No, No, No, No]),
-    // All speeds below 0 are the usual one.
+    // Any speed below 0 means the default.
     Row(192, placed([-1.0, 1.0, 0.0, NAN]), [But(&[-3.0, -1.0, -2.0]), Yes, No, Yes, Yes, Yes, Yes]),
     Row(224, NONE, [Yes, Yes, No, No, No, No, No]),
     Row(241, NONE, [Yes; 7]),
@@ -59,7 +59,7 @@ const COMMANDS: &[Row] = &[
     Row(400, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [Yes, No, No, No, No, No, No]),
     Row(401, NONE, UNUSED),
     Row(510, [30.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [Yes, No, No, No, No, No, No]),
-    // Everything is sent to everyone, the one that asks included. All intervals below 0 are "never".
+    // All messages go to all stations, including the one that asks. All intervals below 0 mean "off".
     Row(511, [30.0, 5e4, 0.0, 0.0, 0.0, 0.0, 0.0], [Yes, Yes, No, No, No, No, But(&[1.0, 2.0])]),
     Row(512, [30.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [Yes, Yes, No, No, No, No, But(&[1.0, 2.0])]),
     Row(519, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [Yes, No, No, No, No, No, No]),
@@ -70,10 +70,10 @@ const COMMANDS: &[Row] = &[
     Row(31_011, NONE, UNUSED),
 ];
 
-/// Values that ask for something.
+/// Values that have a meaning.
 const ASKING: [f32; 10] = [1.0, -1.0, 2.0, -2.0, -3.0, 5.0, 7.0, 12.5, 77.0, f32::INFINITY];
 
-/// A frame of a station with the right checksum.
+/// Builds a station's frame with the right checksum.
 fn frame(message: u8, extra_crc: u8, payload: &[u8]) -> Vec<u8> {
     let head = [0xFD, payload.len() as u8, 0, 0, 0, 255, 190, message, 0, 0];
     let mut frame = [head.as_slice(), payload].concat();
@@ -82,7 +82,7 @@ fn frame(message: u8, extra_crc: u8, payload: &[u8]) -> Vec<u8> {
     frame
 }
 
-/// The same as COMMAND_LONG, and as COMMAND_INT where its whole numbers can say it.
+/// Builds a command as COMMAND_LONG, and as COMMAND_INT if its integers can hold the values.
 fn frames(id: u16, parameters: [f32; 7]) -> Vec<Vec<u8>> {
     let bytes = |numbers: &[f32]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<_>>();
     let long = [bytes(&parameters), id.to_le_bytes().to_vec(), vec![1, 1, 0]].concat();
@@ -90,7 +90,7 @@ fn frames(id: u16, parameters: [f32; 7]) -> Vec<Vec<u8>> {
     let [first, .., x, y, z] = parameters;
     let is_placed = [34, 179, 192].contains(&id) && !(id == 179 && first == 1.0);
     let exact = |value: f32| value.is_nan() || value.abs() < 180.0 && (is_placed || value.fract() == 0.0);
-    // The height of a take-off has another meaning there.
+    // The height of a take-off has another meaning in COMMAND_INT.
     if exact(x) && exact(y) && id != 22 {
         let units = if is_placed { 1e7 } else { 1.0 };
         let whole = |value: f32| if value.is_nan() { i32::MAX } else { (f64::from(value) * units) as i32 };
@@ -158,7 +158,7 @@ fn every_parameter_of_every_command_is_used_or_refused() {
     }
 }
 
-/// A vehicle whose motors are to be stopped does not ask what for.
+/// A command to stop the motors is accepted regardless of its other parameters.
 #[test]
 fn a_kill_is_one_whatever_else_it_says() {
     for place in 2..7 {
@@ -172,7 +172,7 @@ fn a_kill_is_one_whatever_else_it_says() {
     }
 }
 
-/// The items of a mission, as they are accepted. Heights of a landing, and of a region say where the ground is,
+/// The accepted mission items. The heights of a landing and of a region of interest give the height of the ground,
 /// which the vehicle finds itself.
 const ITEMS: &[Row] = &[
     Row(16, placed([0.0, 0.0, 0.0, NAN]), [Yes, Yes, No, Yes, Yes, Yes, Yes]),
@@ -181,7 +181,7 @@ const ITEMS: &[Row] = &[
     Row(19, placed([0.0, 0.0, 0.0, NAN]), [Yes, No, No, Yes, Yes, Yes, Yes]),
     Row(20, NONE, UNUSED),
     Row(21, placed([0.0; 4]), [No, No, No, No, Yes, Yes, Yes]),
-    // Pitch of a fixed wing: QGroundControl writes 15 degrees into plans.
+    // Pitch of fixed-wing aircraft: QGroundControl writes 15 degrees into plans.
     Row(
         22,
         placed([0.0; 4]),
@@ -219,7 +219,7 @@ fn every_parameter_of_every_item_is_used_or_refused() {
         for (place, use_of) in uses.iter().enumerate() {
             for value in ASKING.into_iter().chain([0.0, NAN]) {
                 if value.is_infinite() && [4, 5].contains(&place) {
-                    // No whole number.
+                    // An infinite coordinate cannot be converted to an integer.
                     continue;
                 }
                 let mut asked = *parameters;
@@ -233,7 +233,7 @@ fn every_parameter_of_every_item_is_used_or_refused() {
                         assert_eq!(usize::from(invalid.result.0), 6 + place, "{what}: {invalid:?}");
                     }
                     (_, Err(_)) => (),
-                    // How often a jump is made is the link's to count.
+                    // The mission service, not the guidance, counts the repetitions of a jump.
                     (Yes, Ok(())) if (*id, place) == (177, 1) => (),
                     (_, Ok(())) if flown(&asked) != flown(&usual) => (),
                     (But(values), Ok(())) if values.contains(&value) => (),

@@ -1,4 +1,4 @@
-//! What each command, target and mission leads to: orders of the guidance by their values, answers by their reasons.
+//! Orders and answers that follow from each command, target and mission.
 
 use crate::common::{Bench, STATION};
 use afbc_flight_core::Refusal;
@@ -30,7 +30,7 @@ pub(crate) fn origin() -> EarthOrigin {
     EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible")
 }
 
-/// One that knows where it is, on the earth too or not; its home is elsewhere.
+/// Returns a vehicle that knows its position and, if `located`, its origin on the earth. Its home is elsewhere.
 pub(crate) fn bench(located: bool) -> Bench {
     let mut bench = Bench::new();
     bench.comms = Comms::with(Setup { bytes_per_s: 1_000_000, ..Setup::default() });
@@ -43,15 +43,15 @@ pub(crate) fn bench(located: bool) -> Bench {
     bench
 }
 
-/// Runs a tick where it is; returns what was said.
+/// Runs a tick with the vehicle at `HERE`. Returns the messages.
 pub(crate) fn step(bench: &mut Bench) -> Vec<Downlink> {
     bench.measure(&at(HERE));
     bench.step().1
 }
 
-/// Returns the orders to which a command leads, and the answer, if it comes without the guidance.
+/// Returns the orders that follow from a command, and the answer if it does not come from the guidance.
 pub(crate) fn orders(bench: &mut Bench, command: Command) -> (Vec<Order>, Option<Answer>) {
-    // Whatever was before is done.
+    // Earlier commands are completed first.
     (0..5).for_each(|_| drop(step(bench)));
     bench.hear(Uplink::Command(command));
     let orders = bench.inputs.orders.given.iter().map(|given| given.value).collect::<Vec<_>>();
@@ -65,7 +65,8 @@ pub(crate) fn orders(bench: &mut Bench, command: Command) -> (Vec<Order>, Option
 
 pub(crate) fn leads_to(bench: &mut Bench, command: Command, expected: &[Order]) {
     let (found, _) = orders(bench, command);
-    // As text, since NaN differs from itself; places to a centimetre, which is what the wire has of degrees.
+    // Texts are compared since NaN is not equal to itself. Places are rounded to 2 cm, since degrees on the wire are
+    // inexact.
     let rounded = |orders: &[Order]| {
         let orders: Vec<_> = orders
             .iter()
@@ -125,7 +126,7 @@ fn each_command_is_its_order() {
     leads_to(&mut bench, Command::Home(None), &[Order::Home(None)]);
     let there = place([40.0, -30.0, 0.0], Datum::Sea, 495.0);
     leads_to(&mut bench, Command::Home(Some(there)), &[Order::Home(Some(Vector3::new(40.0, -30.0, 7.0)))]);
-    // Home is where it was ordered from here on: 7 m high.
+    // From here on home is the ordered place, 7 m high.
     for (above, metres, z) in [(Datum::Sea, 500.0, 12.0), (Datum::Home, 5.0, 12.0)] {
         let go = Command::Reposition {
             place: place([40.0, -30.0, 0.0], above, metres),
@@ -138,7 +139,7 @@ fn each_command_is_its_order() {
     }
 }
 
-/// Without a place on the earth only heights above what is known are known.
+/// Without an origin on the earth, only heights relative to home or the vehicle can be resolved.
 #[test]
 fn without_an_origin_there_are_heights_only() {
     let mut bench = bench(false);
@@ -165,7 +166,7 @@ pub(crate) fn item(number: u16, command: u16) -> MissionItem {
     MissionItem { number, command, frame: 6, is_current: false, goes_on: true, parameters, x, y, z: 5.0 }
 }
 
-/// Uploads these items; returns the last acknowledgement.
+/// Uploads these items. Returns the last acknowledgement.
 pub(crate) fn upload(bench: &mut Bench, items: &[MissionItem]) -> Option<MissionResult> {
     bench.hear(Uplink::Mission(Mission::Count(items.len() as u16, Plan::MISSION)));
     let mut result = None;
@@ -198,7 +199,7 @@ fn missions_begin_and_go_on_at_items_that_there_are() {
     leads_to(&mut bench, Command::StartMission(1, Some(1)), &[Order::Resume(1), select]);
     leads_to(&mut bench, Command::SetCurrent(Some(1), false), &[Order::Resume(1)]);
     leads_to(&mut bench, Command::SetCurrent(Some(0), true), &[Order::Resume(0)]);
-    // The present item, with or without a new beginning, is left alone.
+    // Commands about the present item do not change it, with or without a reset.
     refused(&mut bench, Command::SetCurrent(None, false), Answer::Accepted);
     refused(&mut bench, Command::SetCurrent(None, true), Answer::Accepted);
     refused(&mut bench, Command::StartMission(2, None), none);
@@ -206,7 +207,7 @@ fn missions_begin_and_go_on_at_items_that_there_are() {
     refused(&mut bench, Command::SetCurrent(Some(2), true), none);
 }
 
-/// The guidance is handed the item that it wants, once; then there are no inputs without bytes.
+/// The guidance gets the item that it asks for once. Then there are no inputs without bytes.
 #[test]
 fn the_wanted_item_is_handed_over_once() {
     let mut bench = bench(true);
@@ -217,7 +218,7 @@ fn the_wanted_item_is_handed_over_once() {
         bench.inputs.merge(&inputs);
         inputs.orders.leg
     };
-    // Handed over with the state that came after the upload.
+    // The item was handed over with the first state after the upload.
     assert_eq!((bench.comms.has_mail(), legs(&mut bench)), (false, None));
     bench.hear(Uplink::Command(Command::SetCurrent(Some(1), false)));
     bench.step();
@@ -234,7 +235,7 @@ pub(crate) trait Current {
 }
 
 impl Current for Bench {
-    /// MISSION_CURRENT, on request.
+    /// Requests MISSION_CURRENT.
     fn comms_current(&mut self) -> afbc_link::MissionCurrent {
         self.hear(Uplink::Command(Command::RequestMessage { message: id::MISSION_CURRENT, index: 0 }));
         let said = step(self);
@@ -246,7 +247,7 @@ impl Current for Bench {
     }
 }
 
-/// Only the station in control orders; anyone asks, and stops the motors.
+/// Only the station in control may give orders. Any station may send requests and stop the motors.
 #[test]
 fn orders_are_for_the_station_in_control() {
     let mut bench = bench(true);
@@ -288,7 +289,7 @@ fn orders_are_for_the_station_in_control() {
     );
 }
 
-/// What comes back of its own is not heard.
+/// The vehicle ignores its own messages if they come back.
 #[test]
 fn its_own_messages_are_not_heard() {
     let mut bench = bench(true);
@@ -315,7 +316,7 @@ fn messages_on_request_are_sent_or_refused_with_the_reason() {
         BatteryStatus { voltage_mv: 11_100, current_ca: -1, remaining_percent: -1, consumed_mah: -1, charge: 0 };
     bench.comms.set_aux_sensors(AuxSensors { battery: Some(battery), origin: Some(origin()), ..AuxSensors::default() });
     assert_eq!(ask(&mut bench, id::BATTERY_STATUS, 0), Answer::Accepted);
-    // Each mode, in its place, when all are asked for.
+    // A request for all modes is answered by each mode in order.
     (0..20).for_each(|_| drop(step(&mut bench)));
     bench.hear(Uplink::Command(Command::RequestMessage { message: id::AVAILABLE_MODES, index: 0 }));
     let places: Vec<_> = (0..20)
@@ -326,7 +327,7 @@ fn messages_on_request_are_sent_or_refused_with_the_reason() {
         })
         .collect();
     assert!(places.iter().copied().eq(1..=modes::COUNT), "{places:?}");
-    // Both commands of their own.
+    // Two messages have request commands of their own.
     for (command, is_it) in [
         (Command::RequestProtocol, (|it| *it == Telemetry::Protocol) as fn(&Telemetry) -> bool),
         (Command::RequestCapabilities, |it| matches!(it, Telemetry::Version(_))),
@@ -336,10 +337,10 @@ fn messages_on_request_are_sent_or_refused_with_the_reason() {
         let sent = said.iter().any(|message| matches!(message, Downlink::Telemetry(it) if is_it(it)));
         assert!(sent, "{command:?}: {said:?}");
     }
-    // One that has no index is not asked for by one.
+    // A message without an index cannot be requested with one.
     assert_eq!(ask(&mut bench, id::ATTITUDE, 1), Answer::Denied);
     (0..20).for_each(|_| drop(step(&mut bench)));
-    // More than there is room for.
+    // There are more requests than the queue has room for.
     for _ in 0..40 {
         bench.hear(Uplink::Command(Command::RequestProtocol));
     }
@@ -369,7 +370,7 @@ fn intervals_are_set_and_reported_on_the_wire() {
     }
 }
 
-/// Each program only where the shell can enter it, and neither while the motors may turn: PX4 refuses likewise.
+/// A reboot needs a shell that supports the kind of reboot, and a disarmed vehicle, as in PX4.
 #[test]
 fn it_reboots_where_it_can_and_disarmed_only() {
     let both: &[Reboot] = &[Reboot::Program, Reboot::BootLoader];
@@ -387,7 +388,7 @@ fn it_reboots_where_it_can_and_disarmed_only() {
         bench.comms = Comms::with(Setup { reboots, ..Setup::default() });
         bench.step();
         bench.hear(Uplink::Command(Command::Reboot(into)));
-        // The answer leaves before the shell acts.
+        // The answer is sent before the shell reboots.
         let said = bench.step().1;
         let answered = said.iter().any(|it| matches!(it, Downlink::Answer { answer, .. } if *answer == expected));
         let wanted = Some(into).filter(|_| expected == Answer::Accepted);
@@ -411,7 +412,7 @@ fn stored_parameters_are_restored_disarmed_only() {
     assert_eq!(armed.changes, []);
 }
 
-/// Targets in every frame, and sticks; from the station in control alone.
+/// Targets in every frame and joysticks are accepted, but only from the station in control.
 #[test]
 fn targets_and_sticks_reach_the_guidance() {
     let nan = Vector3::from_element(f32::NAN);
@@ -462,12 +463,12 @@ fn targets_and_sticks_reach_the_guidance() {
     for (found, sent) in [(found.roll, 0.1), (found.pitch, -0.2), (found.throttle, 0.3), (found.yaw, -0.4)] {
         assert!((found - sent).abs() < 1e-2, "{found} {sent}");
     }
-    // Another one's are not.
+    // Targets and sticks of another station are ignored.
     assert_eq!(reported(OTHER, Uplink::Target(ExternalTarget::Sticks(sticks))), (None, None));
     assert_eq!(reported(OTHER, Uplink::Setpoint(Setpoint::default())), (None, None));
 }
 
-/// An offset from where the vehicle is needs to know where it is.
+/// An offset from the vehicle's position is ignored while the position is unknown.
 #[test]
 fn an_offset_from_nowhere_is_no_target() {
     let mut bench = Bench::new();
@@ -487,7 +488,7 @@ fn an_offset_from_nowhere_is_no_target() {
     }
 }
 
-/// The guidance hears twenty times per second that the station in control is there, and of no other.
+/// The guidance is told 20 times per second that the station in control was heard, and is not told of other stations.
 #[test]
 fn the_guidance_hears_of_the_station_in_control() {
     let mut bench = bench(true);
@@ -507,7 +508,7 @@ fn the_guidance_hears_of_the_station_in_control() {
     assert_eq!(heard(OTHER), [0; 0]);
 }
 
-/// What a shell has to say is sent, and the battery that it measures reaches the guidance in volts and amperes.
+/// The shell's texts are sent. The battery that the shell measures reaches the guidance in volts and amperes.
 #[test]
 fn what_the_shell_says_is_reported() {
     let mut bench = bench(true);
@@ -524,7 +525,7 @@ fn what_the_shell_says_is_reported() {
     }
 }
 
-/// An item that is reached is announced to everyone, and MISSION_CURRENT tells how far the mission is.
+/// All stations are told of each item that is reached. MISSION_CURRENT shows the progress of the mission.
 #[test]
 fn a_mission_reports_how_far_it_is() {
     let mut bench = bench(true);
@@ -564,7 +565,7 @@ fn a_mission_reports_how_far_it_is() {
     assert_eq!(current(&mut bench, &report), (1, 5, 2), "on the ground it does not fly");
 }
 
-/// A place of the wire is nowhere else than where it is: as a check of the test itself.
+/// This checks the test's own conversion of places.
 #[test]
 fn places_of_the_test_are_where_they_say() {
     let Place { latitude_e7, longitude_e7, .. } = place([40.0, -30.0, 0.0], Datum::Sea, 0.0);

@@ -1,4 +1,4 @@
-//! Motor controllers that answer: whose answer is whose, what stations see of it, and what a rotor's failure leads to.
+//! ESC telemetry: which ESC is asked, the messages for stations, and the reaction to a rotor failure.
 
 use crate::common::{Bench, STATION};
 use afbc_drivers::esc_telemetry::EscReading;
@@ -13,14 +13,14 @@ use afbc_station::{EscAction, EscReports, EscsHeard};
 use afbc_types::{ROTORS_MAX, RotorSpeeds};
 use nalgebra::SVector;
 
-/// Speed with which all rotors are commanded [rad/s].
+/// Commanded speed of all rotors [rad/s].
 const SPEED: f32 = 500.0;
 const POLES: u32 = 14;
 
 const SERIAL: EscSettings = EscSettings { serial: true, ..EscSettings::DEFAULT };
 const ANSWERS: EscSettings = EscSettings { answers: true, ..EscSettings::DEFAULT };
 
-/// A vehicle of four rotors, and what its controllers measure.
+/// A vehicle with four rotors whose ESCs send telemetry.
 struct Vehicle {
     bench: Bench,
     reports: EscReports,
@@ -42,7 +42,7 @@ impl Vehicle {
         Vehicle { bench, reports, idle, mode: Mode::Flying, airborne: true, commanded: SPEED }
     }
 
-    /// Runs a tick; returns what is to be done, and what was said.
+    /// Runs a tick. Returns the resulting action and the messages.
     fn tick(&mut self, heard: &EscsHeard<'_>) -> (EscAction, Vec<Downlink>) {
         self.bench.now_us += 1000;
         let motors = RotorSpeeds(SVector::repeat(self.commanded));
@@ -52,7 +52,7 @@ impl Vehicle {
         (self.bench.comms.escs(&mut self.reports, heard, &report), said)
     }
 
-    /// Runs ticks in which the controllers answer these speeds in each frame [rad/s]; returns texts and orders.
+    /// Runs ticks in which the ESCs answer each frame with these speeds [rad/s]. Returns texts and orders.
     fn turn(&mut self, ticks: u32, speeds: [f32; 4]) -> (Vec<(MavSeverity, String)>, Vec<Order>) {
         let (mut texts, mut orders) = (Vec::new(), Vec::new());
         for _ in 0..ticks {
@@ -66,14 +66,14 @@ impl Vehicle {
         (texts, orders)
     }
 
-    /// Returns the readings, and their number.
+    /// Returns the readings and their count.
     fn readings(&self) -> (Vec<Option<EscReading>>, u16) {
         let known = self.bench.comms.esc_telemetry();
         (known.readings.iter().map(|reading| reading.map(|it| it.value)).collect(), known.counter)
     }
 }
 
-/// Electrical speeds of rotors that turn so fast.
+/// Converts rotor speeds [rad/s] to electrical speeds [rev/min].
 fn electrical(speeds: &[f32]) -> [Option<u32>; ROTORS_MAX] {
     let mut rev_min = [None; ROTORS_MAX];
     for (to, speed) in rev_min.iter_mut().zip(speeds) {
@@ -92,8 +92,8 @@ fn reading(rotor: u8) -> EscReading {
     }
 }
 
-/// Over their line, one after the other, whatever the ticks' order: the question goes with a frame, the answer is in
-/// the bytes of a later tick.
+/// Over the serial line the ESCs are asked one after the other. The request goes with a DSHOT frame, and the answer
+/// arrives in a later tick.
 #[test]
 fn each_is_asked_in_turn() {
     let mut vehicle = Vehicle::new(SERIAL);
@@ -112,7 +112,7 @@ fn each_is_asked_in_turn() {
     assert!(newest.is_some_and(|newest| vehicle.bench.now_us - newest.at_us <= 2000), "{newest:?}");
 }
 
-/// Nobody is asked, and nothing is taken, of controllers whose telemetry is not wanted.
+/// If telemetry is turned off, no ESC is asked and all data are ignored.
 #[test]
 fn what_is_not_wanted_is_not_taken() {
     for settings in [EscSettings::DEFAULT, ANSWERS] {
@@ -130,8 +130,8 @@ fn what_is_not_wanted_is_not_taken() {
     }
 }
 
-/// By bidirectional DSHOT: of each rotor that the vehicle has, rounded down to 100 rev/min. What else is known of a
-/// controller has come over the line, and stays.
+/// Speeds by bidirectional DSHOT are used for each rotor of the vehicle, rounded down to 100 rev/min. The other values
+/// of a reading come over the serial line and do not change.
 #[test]
 fn speeds_of_each_frame_are_taken() {
     let mut vehicle = Vehicle::new(EscSettings { serial: true, ..ANSWERS });
@@ -149,12 +149,12 @@ fn speeds_of_each_frame_are_taken() {
     let known = vehicle.bench.comms.esc_telemetry();
     assert_eq!(known.poles, 14);
     assert!(known.readings.iter().flatten().skip(1).all(|it| it.at_us == vehicle.bench.now_us));
-    // A controller that is silent keeps what it has told.
+    // A silent ESC keeps its last reading.
     vehicle.tick(&EscsHeard::default());
     assert_eq!(vehicle.readings().1, 4);
 }
 
-/// Stations see four at a time, one page or all pages in turn.
+/// Stations get four ESCs per message: a requested group, or all groups in turn.
 #[test]
 fn stations_see_what_controllers_tell() {
     let mut vehicle = Vehicle::new(ANSWERS);
@@ -191,10 +191,10 @@ fn stations_see_what_controllers_tell() {
         let Some(Telemetry::EscInfo(info)) = ask(id::ESC_INFO, index) else { panic!("page {index}") };
         let EscInfo { first: at, count, online, failures, temperatures_cc, counter, .. } = info;
         assert_eq!((at, count, online, failures, counter % 8), (first, 8, 0xFF, [0; 4], 0));
-        // By this way they tell no temperature: 0 degrees.
+        // Bidirectional DSHOT transmits no temperature, so it reads 0 degrees.
         assert_eq!(temperatures_cc, [0; 4]);
     }
-    // As a stream both pages come, one after the other, at its interval.
+    // A stream sends the two groups in turn, one per interval.
     vehicle.bench.hear(Uplink::Command(Command::SetInterval { message: id::ESC_STATUS, interval_us: 50_000 }));
     let pages: Vec<_> = (0..1000)
         .flat_map(|_| step(&mut vehicle))
@@ -210,7 +210,7 @@ fn stations_see_what_controllers_tell() {
     );
 }
 
-/// Voltage, current and temperature are each controller's own; one that has not told has none.
+/// Voltage, current and temperature belong to each ESC. An ESC that has not answered has none.
 #[test]
 fn what_has_come_over_the_line_is_shown() {
     let mut vehicle = Vehicle::new(SERIAL);
@@ -246,8 +246,8 @@ fn what_has_come_over_the_line_is_shown() {
     assert_eq!(info.temperatures_cc, [4000, 4100, 4200, i16::MAX]);
 }
 
-/// A rotor that stops, or does not turn as commanded, is told of once, by its number from 1, and shown to stations; so
-/// is that it turns again.
+/// A rotor that stops or does not turn as commanded is announced once, numbered from 1, and shown in ESC_INFO. Its
+/// recovery is announced too.
 #[test]
 fn a_failed_rotor_is_reported() {
     let critical = MavSeverity::MAV_SEVERITY_CRITICAL;
@@ -280,8 +280,8 @@ fn a_failed_rotor_is_reported() {
     }
 }
 
-/// In the air a failure leads to the mode of the parameter, once; that a rotor turns again leads to none. On the ground
-/// it is only reported, and without detection not even that.
+/// In the air a failure selects the parameter's mode once. Recovery does not. On the ground a failure is only
+/// announced. With detection off, it is not even announced.
 #[test]
 fn a_failed_rotor_leads_to_its_action_in_flight() {
     let stopped = [SPEED, 0.0, SPEED, SPEED];
@@ -303,7 +303,7 @@ fn a_failed_rotor_leads_to_its_action_in_flight() {
     }
 }
 
-/// Rotors that somebody or the wind turns are nothing to a disarmed vehicle, and it begins anew when it arms.
+/// Rotors of a disarmed vehicle that turn in the wind are ignored. Arming starts the detection afresh.
 #[test]
 fn rotors_of_a_disarmed_vehicle_are_not_judged() {
     let mut vehicle = Vehicle::new(ANSWERS);
@@ -317,8 +317,8 @@ fn rotors_of_a_disarmed_vehicle_are_not_judged() {
     assert_eq!(vehicle.bench.comms.esc_telemetry().failures, [None; ROTORS_MAX]);
 }
 
-/// The notch moves to the mean of the rotors' speeds while the vehicle is armed, and back; where it is not wanted, and
-/// where nobody tells a speed, it stands.
+/// While the vehicle is armed, the notch filter follows the mean rotor speed, and then returns. It does not move if
+/// following is off or speeds are missing.
 #[test]
 fn the_notch_follows_the_rotors_of_an_armed_vehicle() {
     let home = OutputFilter::of(&Configuration::default().airframe.parameters, 4);
@@ -332,19 +332,19 @@ fn the_notch_follows_the_rotors_of_an_armed_vehicle() {
     let mut vehicle = Vehicle::new(ANSWERS);
     let [moved] = moves(&mut vehicle, &speeds)[..] else { panic!("once") };
     assert!((moved - 1.2).abs() < 0.01, "{moved}");
-    // Until it is disarmed: then it stands where the vehicle's file has it.
+    // When the vehicle is disarmed, the notch returns to the frequency of the vehicle's file.
     vehicle.mode = Mode::Disarmed;
     assert_eq!(moves(&mut vehicle, &speeds), [1.0]);
     vehicle.mode = Mode::Flying;
     assert_eq!(moves(&mut vehicle, &speeds).len(), 1);
-    // One speed of four is missing.
+    // One of four speeds is missing.
     assert_eq!((0..10).flat_map(|_| moves(&mut vehicle, &speeds[..3])).collect::<Vec<_>>(), [1.0]);
     for settings in [EscSettings { follows: false, ..ANSWERS }, SERIAL, EscSettings::DEFAULT] {
         assert!(moves(&mut Vehicle::new(settings), &speeds).is_empty(), "{settings:?}");
     }
 }
 
-/// A station sets the parameters of a disarmed vehicle: it goes on with these.
+/// A new configuration of a disarmed vehicle takes effect.
 #[test]
 fn another_configuration_is_adopted() {
     let mut vehicle = Vehicle::new(EscSettings::DEFAULT);
@@ -354,7 +354,7 @@ fn another_configuration_is_adopted() {
     vehicle.reports.adopt(&changed);
     let (action, _) = vehicle.tick(&EscsHeard::default());
     assert_eq!((action.ask, vehicle.bench.comms.esc_telemetry().poles), (Some(0), 12));
-    // Half as heavy again, its rotors turn a fifth faster; so do those that its notch is for.
+    // 1.44 times the mass needs rotors that turn 1.2 times as fast, and the notch moves with them.
     let home = OutputFilter::of(&changed.airframe.parameters, 4);
     vehicle.mode = Mode::Disarmed;
     let moved = (0..50).find_map(|_| vehicle.tick(&EscsHeard::default()).0.notch);

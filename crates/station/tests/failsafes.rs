@@ -30,7 +30,7 @@ fn critical(said: &[Downlink]) -> Option<bool> {
     said.iter().find_map(heartbeat)
 }
 
-/// Runs ticks with or without states and setpoints; returns the texts, and what the heartbeats report.
+/// Runs ticks with or without states and setpoints. Returns the texts and the failsafe flags of the heartbeats.
 fn fly(bench: &mut Bench, ticks: u32, states: bool, setpoints: bool) -> (Vec<(MavSeverity, String)>, Vec<bool>) {
     let (mut received, mut heartbeats) = (Vec::new(), Vec::new());
     for _ in 0..ticks {
@@ -57,12 +57,12 @@ fn losing_the_state_is_reported_step_by_step() {
     for ((_, text), words) in received.iter().zip(words) {
         assert!(text.contains(words), "{text}");
     }
-    // Until 2.25 s, and for one more second.
+    // The failsafe lasts until 2.25 s, and heartbeats show it for one more second.
     assert_eq!(heartbeats.iter().filter(|critical| **critical).count(), 3, "{heartbeats:?}");
     assert_eq!(heartbeats.last(), Some(&false));
 }
 
-/// A gap of 30 ms at any time between two heartbeats.
+/// The state is missing for 30 ms at different times between two heartbeats.
 #[test]
 fn a_short_gap_shows_in_the_next_heartbeat() {
     for before in [1, 100, 500, 850, 899, 960, 990] {
@@ -85,7 +85,7 @@ fn losing_the_setpoint_is_reported_each_time() {
     for _ in 0..3 {
         let (received, _) = fly(&mut bench, 2000, true, false);
         assert!(matches!(received.as_slice(), [(WARNING, text)] if text.contains("no targets")), "{received:?}");
-        // It holds until it is told to follow again.
+        // The vehicle holds until Offboard mode is selected again.
         let (_, heartbeats) = fly(&mut bench, 1000, true, true);
         assert_eq!(heartbeats, [true]);
         bench.follow();
@@ -101,8 +101,8 @@ fn a_disarmed_vehicle_reports_no_failsafe() {
     assert_eq!(fly(&mut bench, 5000, false, false), (vec![], vec![false; 5]));
 }
 
-/// Flight on a tracker's poses is a failsafe and vibration is none; each is told once each time it begins. What the
-/// guidance does of its own is a failsafe too, which it tells itself.
+/// Flying on a tracker's poses is a failsafe; vibration is not. Each is announced once each time it begins. The
+/// guidance's own failsafes show in the heartbeat, and the guidance announces them itself.
 #[test]
 fn other_states_are_reported_once_each_time() {
     type Set = fn(&mut Report, bool);
@@ -120,7 +120,7 @@ fn other_states_are_reported_once_each_time() {
         let mut bench = Bench::new();
         let (mut report, _) = bench.step();
         report.mode = Mode::Flying;
-        // More than a second on, then off.
+        // The condition is on and off in turn, for more than a second each.
         for round in 0..4 {
             let on = round % 2 == 0;
             set(&mut report, on);
@@ -147,8 +147,8 @@ fn modes() -> impl Strategy<Value = (Mode, usize)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// For any sequence of modes, each failsafe is reported once each time it begins; a heartbeat is critical if there
-    /// was a failsafe since the previous one, and not if there was none for a second.
+    /// For any sequence of modes, each failsafe is reported once each time it begins. A heartbeat is critical if there
+    /// was a failsafe since the previous one, and not critical if there was none for a second.
     #[test]
     fn each_failsafe_is_reported_once_each_time(modes in prop::collection::vec(modes(), 1..12), tumbles: bool) {
         let mut bench = Bench::new();

@@ -1,5 +1,5 @@
-//! The geofence and rally points that stations upload: which orders they leave, which items of a mission, where a
-//! return lands, and what the guidance is told.
+//! Uploaded geofence and rally points: which orders and mission items they permit, where a return lands, and what the
+//! guidance is told.
 
 use crate::commands::{bench, origin};
 use crate::common::{Bench, STATION};
@@ -20,12 +20,12 @@ const INCLUSION: u16 = 5001;
 const NO_CIRCLE: u16 = 5004;
 const RALLY: u16 = 5100;
 
-/// A vehicle whose guidance does what the test says.
+/// A vehicle with a guidance that the test controls.
 pub(crate) struct Vehicle {
     bench: Bench,
     pub(crate) report: Report,
     state: State,
-    /// What has been handed to the guidance since it was last asked.
+    /// Inputs for the guidance since the test last cleared them.
     inputs: ControlInputs,
 }
 
@@ -38,7 +38,7 @@ fn item(command: u16, first: f32, place_m: [f32; 2]) -> MissionItem {
     MissionItem { command, frame: 5, goes_on: true, parameters: [first, 0.0, 0.0, 0.0], x, y, ..MissionItem::default() }
 }
 
-/// An item of a mission.
+/// Returns a mission item.
 pub(crate) fn way(command: u16, place_m: [f32; 2]) -> MissionItem {
     let parameters = if command == 18 { [1.0, 0.0, 3.0, f32::NAN] } else { [0.0, 0.0, 0.0, f32::NAN] };
     MissionItem { frame: 6, z: 5.0, parameters, ..item(command, 0.0, place_m) }
@@ -48,7 +48,7 @@ fn rally(place_m: [f32; 2]) -> MissionItem {
     MissionItem { frame: 3, z: 5.0, ..item(RALLY, 0.0, place_m) }
 }
 
-/// Of 100 m by 100 m, without a disc.
+/// Returns a fence: a square of 100 m by 100 m and an excluded disc.
 fn fence(disc_m: [f32; 2], radius_m: f32) -> Vec<MissionItem> {
     let corners = [[-50.0, -50.0], [50.0, -50.0], [50.0, 50.0], [-50.0, 50.0]];
     let mut items: Vec<_> = corners.map(|corner| item(INCLUSION, 4.0, corner)).into();
@@ -87,7 +87,7 @@ impl Vehicle {
         (0..ticks).flat_map(|_| self.tick()).collect()
     }
 
-    /// Uploads a plan; returns the outcome.
+    /// Uploads a plan. Returns the result.
     pub(crate) fn upload(&mut self, plan: Plan, items: &[MissionItem]) -> MissionResult {
         self.hear(&Uplink::Mission(Mission::Count(items.len() as u16, plan)));
         for _ in 0..10 * (items.len() + 1) {
@@ -105,7 +105,7 @@ impl Vehicle {
         panic!("not answered")
     }
 
-    /// True if the guidance is given the order of a command; otherwise the station is told why not.
+    /// Returns true if a command's order reaches the guidance. Otherwise checks that the station is told the reason.
     fn allows(&mut self, command: Command) -> bool {
         self.pass(5);
         self.inputs = ControlInputs::EMPTY;
@@ -129,15 +129,15 @@ impl Vehicle {
         given.is_some()
     }
 
-    /// Returns where a return lands, if the guidance is told anew.
+    /// Returns the place where a return lands, if the guidance is told a new one.
     fn safe(&mut self, ticks: u32) -> Option<[f32; 2]> {
         self.inputs = ControlInputs::EMPTY;
         self.pass(ticks);
-        // Degrees on the wire are centimetres.
+        // Coordinates on the wire are accurate to about a centimetre.
         self.inputs.orders.safe_m.map(|place| [place.x, place.y].map(|x| (x * 20.0).round() / 20.0))
     }
 
-    /// Returns the item that the guidance is handed when it wants this one.
+    /// Returns the mission item that the guidance gets when it asks for this one.
     pub(crate) fn leg(&mut self, wanted: u16) -> Leg {
         self.inputs = ControlInputs::EMPTY;
         self.report.guided.wanted = wanted;
@@ -145,7 +145,7 @@ impl Vehicle {
         self.inputs.orders.leg.expect("handed over")
     }
 
-    /// Returns what the guidance is told of the fence while the vehicle moves like this.
+    /// Returns the state of the fence that the guidance is told while the vehicle moves at this velocity.
     fn view(&mut self, position_m: [f32; 2], velocity_m_s: [f32; 2]) -> FenceView {
         self.put(position_m);
         (self.state.velocity_m_s.x, self.state.velocity_m_s.y) = velocity_m_s.into();
@@ -166,8 +166,8 @@ fn circle(centre_m: Option<[f32; 2]>, radius_m: f32) -> Command {
     Command::Orbit { place, radius_m, speed_m_s: f32::NAN, angle_deg: 0, heading: 0 }
 }
 
-/// A place that the vehicle would fly to must be inside with a margin, and so must the straight way there; a circle as
-/// a whole, in either direction.
+/// The destination of an order and the straight path to it must be inside with a margin. A circle must be inside as a
+/// whole, in either direction.
 #[test]
 fn orders_must_stay_inside() {
     let mut vehicle = Vehicle::new();
@@ -178,7 +178,7 @@ fn orders_must_stay_inside() {
         ([30.0, 22.0], true),
         ([30.0, 24.5], false),
         ([30.0, 30.0], false),
-        // Behind the disc.
+        // The place is behind the excluded disc.
         ([36.0, 40.5], false),
         ([10.0, 45.0], true),
     ];
@@ -204,7 +204,7 @@ fn orders_must_stay_inside() {
                 );
             }
         }
-        // Here, higher up; and what names no place.
+        // These orders stay at the present place at another height, or have no place.
         let height = Height { metres: 20.0, above: Datum::Home };
         let place = Place { latitude_e7: Place::AS_IT_IS, longitude_e7: Place::AS_IT_IS, height };
         let up = Command::Reposition { place, yaw_rad: f32::NAN, speed_m_s: None, changes_mode: true };
@@ -215,7 +215,7 @@ fn orders_must_stay_inside() {
     }
 }
 
-/// A return of a flying vehicle must have a clear way to where it lands; one that stands may select it.
+/// In flight a return needs a clear path to its landing place. On the ground it can always be selected.
 #[test]
 fn a_return_must_have_a_clear_way() {
     let mut vehicle = Vehicle::new();
@@ -230,7 +230,7 @@ fn a_return_must_have_a_clear_way() {
     vehicle.report.guided.airborne = false;
     assert!(vehicle.allows(back));
     vehicle.report.guided.airborne = true;
-    // Home is within a disc; then a rally point is nearer, with nothing between.
+    // Home is inside an excluded disc. Then a nearer rally point with a clear path is added.
     assert_eq!(vehicle.upload(Plan::FENCE, &fence(HOME, 2.0)), MissionResult::ACCEPTED);
     assert!(!vehicle.allows(back));
     assert_eq!(vehicle.upload(Plan::RALLY, &[rally([15.0, -10.0])]), MissionResult::ACCEPTED);
@@ -238,8 +238,8 @@ fn a_return_must_have_a_clear_way() {
     assert!(vehicle.allows(back));
 }
 
-/// Items of a mission outside of the fence have no place: the guidance refuses them. A landing, which without a place
-/// would be where the vehicle is, has none on earth.
+/// Mission items outside the fence are given to the guidance with NaN as their place, so that it refuses them. For a
+/// landing NaN would mean the present position, so its place is infinite.
 #[test]
 fn items_outside_are_handed_over_without_a_place() {
     let mut vehicle = Vehicle::new();
@@ -255,7 +255,7 @@ fn items_outside_are_handed_over_without_a_place() {
         Item::Turns { centre_m, .. } => centre_m,
         other => panic!("{other:?}"),
     };
-    // In this order: a fence that is there first refuses the upload.
+    // The mission is uploaded first: an existing fence would refuse it.
     assert_eq!(vehicle.upload(Plan::MISSION, &items), MissionResult::ACCEPTED);
     for has_fence in [false, true] {
         if has_fence {
@@ -276,8 +276,8 @@ fn items_outside_are_handed_over_without_a_place() {
     }
 }
 
-/// Where a return lands is the nearest of home and rally points, looked for twice a second, told when it changes; while
-/// the vehicle returns, it is left alone.
+/// A return lands at the nearest of home and the rally points. The nearest is searched twice per second, and the
+/// guidance is told if it changes. It does not change during a return.
 #[test]
 fn a_return_lands_at_the_nearest_place() {
     let mut vehicle = Vehicle::new();
@@ -290,7 +290,7 @@ fn a_return_lands_at_the_nearest_place() {
         vehicle.put(here_m);
         assert_eq!(vehicle.safe(510), Some(nearest));
     }
-    // Half a second after the last time, not before.
+    // The search runs half a second after the previous one, not earlier.
     vehicle.put(points[0]);
     assert!((0..510).any(|_| vehicle.safe(1) == Some(points[0])));
     vehicle.put(points[2]);
@@ -303,14 +303,14 @@ fn a_return_lands_at_the_nearest_place() {
     // Without rally points it is home again.
     vehicle.hear(&Uplink::Mission(Mission::Clear(Plan::RALLY)));
     assert_eq!((vehicle.safe(510), vehicle.safe(1200)), (Some(HOME), None));
-    // Of a vehicle that does not know where it is nothing is near.
+    // A vehicle without a position has no nearest place.
     assert_eq!(vehicle.upload(Plan::RALLY, &points.map(rally)), MissionResult::ACCEPTED);
     vehicle.report.health.state_age_us = u32::MAX;
     assert_eq!(vehicle.safe(1200), None);
 }
 
-/// The guidance is told when the vehicle, or the setpoint that it follows, would not stop inside, and when it is
-/// outside; each change once.
+/// The guidance is told when the vehicle, or the setpoint that it follows, could not stop inside the fence, and when
+/// the vehicle is outside. Each change is told once.
 #[test]
 fn the_guidance_learns_whether_the_vehicle_leaves() {
     let mut vehicle = Vehicle::new();
@@ -332,7 +332,7 @@ fn the_guidance_learns_whether_the_vehicle_leaves() {
     vehicle.pass(600);
     assert_eq!(vehicle.inputs.orders.fence, Some(well));
 
-    // A setpoint counts while the vehicle follows it: armed.
+    // The setpoint counts only while the vehicle is armed and follows it.
     let runs = Setpoint {
         position_m: Vector3::new(45.0, 0.0, 3.0),
         velocity_m_s: Vector3::new(8.0, 0.0, 0.0),
@@ -342,7 +342,7 @@ fn the_guidance_learns_whether_the_vehicle_leaves() {
     assert_eq!(vehicle.view([30.0, 0.0], [0.0, 0.0]), well);
     vehicle.report.mode = Mode::Flying;
     assert_eq!(vehicle.view([30.0, 0.0], [0.0, 0.0]), leaves);
-    // Its acceleration is the vehicle's, too: braked hard, the same speed leaves room.
+    // The setpoint's acceleration counts as the vehicle's: a vehicle that already brakes stops earlier.
     vehicle.report.guided.setpoint = None;
     vehicle.pass(600);
     assert_eq!(vehicle.inputs.orders.fence, Some(well));

@@ -1,7 +1,7 @@
-//! Very many random frames of several stations, nested and damaged, through all services: `FRAMES` of them, as many as
-//! `scripts/flood` says. No panic, every command answered exactly once to its sender, no order of a station that is not
-//! in control. The flight core and the guidance are played: they answer at random. The same with a key, which none of
-//! the senders has.
+//! Sends very many random frames of several stations, some nested or damaged, through all services. `FRAMES` sets their
+//! number, and `scripts/flood` runs more. Nothing panics, every command is answered exactly once to its sender, and no
+//! station that is not in control gives an order. The test stands in for flight core and guidance, which answer at
+//! random. A second test does the same with a signing key that no sender has.
 
 use afbc_flight_core::inbox::QUEUE_MAX;
 use afbc_flight_core::{Refusal, Request, Ticketed};
@@ -25,9 +25,9 @@ const STATIONS: [Address; 4] = [
     Address { system: 1, component: 191 },
 ];
 const VEHICLE: Address = Address { system: 1, component: 1 };
-/// What may contain other frames: TUNNEL and FILE_TRANSFER_PROTOCOL, with their checksums' seeds.
+/// Messages that may contain other frames, with their checksum seeds: TUNNEL and FILE_TRANSFER_PROTOCOL.
 const CARRIERS: [(u32, u8); 2] = [(385, 147), (110, 84)];
-/// Frames in a usual run.
+/// Number of frames in a usual run.
 const FRAMES: u64 = 200_000;
 
 /// SplitMix64.
@@ -78,7 +78,7 @@ fn frame(from: Address, sequence: u8, id: u32, payload: &[u8], seed: u8) -> Vec<
     frame
 }
 
-/// Who should be in control.
+/// The station that should be in control.
 #[derive(Default)]
 struct Model(Option<(Address, u64)>);
 
@@ -87,12 +87,12 @@ impl Model {
         self.0.filter(|(_, heard_us)| now_us - heard_us <= SILENT_US).map(|(holder, _)| holder)
     }
 
-    /// Follows a message; true if its sender may change something by it.
+    /// Follows a message. Returns true if its sender may change something with it.
     fn hear(&mut self, from: Address, message: &Uplink, now_us: u64) -> bool {
         if matches!(message, Uplink::State { .. } | Uplink::Pose { .. }) {
             return false;
         }
-        // One that was silent is in control again, unless another has taken over.
+        // A holder that was silent is in control again, unless another station has taken over.
         if self.0.is_some_and(|(holder, _)| holder == from) {
             self.0 = Some((from, now_us));
         }
@@ -130,7 +130,7 @@ fn every_command_is_answered_once_to_its_sender() {
     comms.set_aux_sensors(AuxSensors { origin: EarthOrigin::new(EarthOrigin::SIMULATED), ..AuxSensors::default() });
     let mut orders: VecDeque<Ticketed<Order>> = VecDeque::new();
     let mut model = Model::default();
-    // Answers that are due to a command of a station, less those that came.
+    // Number of expected answers less those received, per command and station.
     let mut due: BTreeMap<(u16, (u8, u8)), i64> = BTreeMap::new();
     let mut listener = Decoder::<Uplink>::new(VEHICLE);
     let mut station = Decoder::<Downlink>::new(STATIONS[0]);
@@ -138,10 +138,10 @@ fn every_command_is_answered_once_to_its_sender() {
 
     while sent < frames || due.values().any(|count| *count != 0) {
         assert!(sent < frames + 1_000_000, "unanswered: {:?}", due.iter().find(|(_, count)| **count != 0));
-        // What arrives before a tick has the time of the last one.
+        // Messages that arrive before a tick have the time of the previous tick.
         let before_us = if idle.time_us == 1_000 { 0 } else { idle.time_us };
         idle.time_us += 1000;
-        // Now and then for longer than a station may be silent.
+        // Sometimes all stations are silent for longer than allowed.
         let burst = if sent >= frames { 0 } else { random.below(3) };
         if random.below(5_000) == 0 {
             idle.time_us += 2 * SILENT_US;
@@ -176,7 +176,7 @@ fn every_command_is_answered_once_to_its_sender() {
             }
             sent += 1;
         }
-        // What the vehicle's decoder, which has tests of its own, finds in the stream.
+        // The vehicle's decoder, which has its own tests, finds the messages in the stream.
         let mut may = false;
         listener.feed(&stream, |from, message| {
             may |= model.hear(from, &message, before_us);
@@ -184,7 +184,7 @@ fn every_command_is_answered_once_to_its_sender() {
                 commands += 1;
                 *due.entry((command.id(), (from.system, from.component))).or_default() += 1;
             }
-            // Values that reached the guidance are numbers.
+            // Sticks that reach the guidance are within their range.
             if let Uplink::Target(ExternalTarget::Sticks(sticks)) = message {
                 assert!([sticks.roll, sticks.pitch, sticks.throttle, sticks.yaw].iter().all(|it| it.abs() <= 1.0));
             }
@@ -202,7 +202,7 @@ fn every_command_is_answered_once_to_its_sender() {
         orders.extend(core::iter::from_fn(|| taken.orders.given.pop_front()));
         assert!(orders.len() <= QUEUE_MAX);
 
-        // Flight core and guidance.
+        // Random answers of flight core and guidance.
         let answer = taken.inbox.asked().map(|asked| {
             let result = if random.below(2) == 0 { Ok(()) } else { Err(random.of(&Refusal::ALL)) };
             afbc_flight_core::RequestAnswer { ticket: asked.ticket, request: asked.value, result }
@@ -248,7 +248,7 @@ fn every_command_is_answered_once_to_its_sender() {
     assert!(given > 0 && commands > frames / 8);
 }
 
-/// Returns the frame with the flag of a signature, and these bytes behind it.
+/// Builds a frame with the signature flag, followed by these bytes.
 fn flagged(from: Address, id: u32, payload: &[u8], seed: u8, signature: &[u8]) -> Vec<u8> {
     let mut signed = frame(from, 0, id, payload, seed);
     signed[2] = 1;
@@ -259,8 +259,8 @@ fn flagged(from: Address, id: u32, payload: &[u8], seed: u8, signature: &[u8]) -
     signed
 }
 
-/// Frames without a signature, with a random one, with one of another key, and genuine ones that were captured: nothing
-/// reaches the control tick, no command is answered, and nothing is asked of the parameters.
+/// Frames are unsigned, signed at random, signed with another key, or replayed. None reaches the control tick, no
+/// command is answered, and no parameter is sent.
 #[test]
 fn nothing_commands_without_the_key() {
     let frames = std::env::var("FRAMES").map_or(FRAMES, |number| number.parse().expect("FRAMES: a number"));
@@ -268,7 +268,7 @@ fn nothing_commands_without_the_key() {
     let mut random = Random(seed);
     let ids: Vec<(u32, u8, usize)> = (0..500)
         .filter_map(|id| Uplink::format(id).map(|format| (id, format.extra_crc, format.length_max)))
-        // A key over a link that is no wire is refused with a text.
+        // SETUP_SIGNING over a radio link is refused with a text.
         .filter(|(id, ..)| *id != SetupSigning::ID)
         .collect();
     let (key, other, mut time_10us) = (Key([1; 32]), Key([2; 32]), 37_000_000_000_000);
@@ -283,7 +283,7 @@ fn nothing_commands_without_the_key() {
     let mut taken = ControlInputs::EMPTY;
     let mut report = flight.tick(1_000, &mut taken, &Readings::NONE);
     let mut listener = Decoder::<Downlink>::new(STATIONS[0]);
-    // Genuine frames, each heard once: heartbeats, which ask for nothing.
+    // These frames are genuine heartbeats, each received once.
     let mut captured = Vec::new();
     for from in STATIONS {
         for _ in 0..50 {

@@ -1,6 +1,6 @@
-//! Random frames of several stations, damaged and nested ones among them, through the whole of the link: no panic,
-//! every command answered exactly once to its sender, and nothing that its sender may not do. `scripts/soak` draws
-//! others.
+//! Sends random frames of several stations, some damaged or nested, through the whole link. Nothing panics, every
+//! command is answered exactly once to its sender, and no station does what it may not. `scripts/soak` uses other
+//! seeds.
 
 use crate::common::{Bench, STATION};
 use afbc_flight_core::Request;
@@ -13,12 +13,12 @@ use std::collections::BTreeMap;
 
 const STATIONS: [Address; 3] = [STATION, Address { system: 245, component: 190 }, Address { system: 42, component: 1 }];
 const VEHICLE: Address = Address { system: 1, component: 1 };
-/// Every message that the vehicle reads, and TUNNEL and FILE_TRANSFER_PROTOCOL, which may contain others.
+/// All messages that the vehicle reads, and TUNNEL and FILE_TRANSFER_PROTOCOL, which may contain others.
 const IDS: [u32; 31] = [
     0, 2, 4, 5, 11, 20, 21, 23, 40, 41, 43, 44, 45, 47, 51, 66, 69, 73, 75, 76, 82, 84, 86, 102, 111, 138, 331, 42, 46,
     110, 385,
 ];
-/// Checksum seeds of the last two.
+/// Checksum seeds of FILE_TRANSFER_PROTOCOL and TUNNEL.
 const CARRIERS: [(u32, u8); 2] = [(110, 84), (385, 147)];
 
 /// CRC-16/MCRF4XX.
@@ -39,7 +39,7 @@ fn frame(from: Address, id: u32, payload: &[u8]) -> Vec<u8> {
     frame
 }
 
-/// One frame of a station.
+/// A frame of a station.
 #[derive(Clone, Debug)]
 struct Sent {
     from: Address,
@@ -47,7 +47,7 @@ struct Sent {
     payload: Vec<u8>,
 }
 
-/// Numbers that mean something in a command.
+/// Numbers that have a meaning in a command.
 const USUAL: [f32; 10] = [0.0, 1.0, 2.0, 3.0, 4.0, 6.0, -1.0, 21196.0, f32::NAN, f32::INFINITY];
 
 fn numbers() -> impl Strategy<Value = f32> {
@@ -58,7 +58,7 @@ fn numbers() -> impl Strategy<Value = f32> {
     ]
 }
 
-/// A command with a known number more often than not.
+/// Generates commands, most of them with a known number.
 fn commands() -> impl Strategy<Value = (u32, Vec<u8>)> {
     let id = prop_oneof![4 => prop::sample::select(Command::KNOWN.as_slice()), 1 => any::<u16>()];
     let to = prop::sample::select([[1u8, 1], [1, 0], [0, 0], [2, 1]].as_slice());
@@ -79,7 +79,7 @@ fn sent() -> impl Strategy<Value = Sent> {
 
 /// Returns the command in a frame, if it is for the vehicle.
 fn command(sent: &Sent) -> Option<Command> {
-    // Of a longer one, what is known here.
+    // Of a longer payload only the known part is read.
     let known = sent.payload.len().min(Uplink::format(sent.id)?.length_max);
     match Uplink::read(sent.id, &sent.payload[..known], VEHICLE) {
         Ok(Uplink::Command(command)) => Some(command),
@@ -87,13 +87,13 @@ fn command(sent: &Sent) -> Option<Command> {
     }
 }
 
-/// How often each command is, or is to be, answered to each station.
+/// Number of answers for each command and station.
 type Counts = BTreeMap<(u16, u8, u8), usize>;
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(128))]
 
-    /// Frames that arrive as they were sent.
+    /// The frames arrive undamaged.
     #[test]
     fn every_command_is_answered_once(ticks in prop::collection::vec(prop::collection::vec(sent(), 0..4), 1..60)) {
         let mut bench = Bench::new();
@@ -101,7 +101,7 @@ proptest! {
         let mut count = |said: &[Downlink]| {
             for message in said {
                 match *message {
-                    // "In progress" is none.
+                    // "In progress" is not the final answer.
                     Downlink::Answer { answer: Answer::InProgress, .. } => (),
                     Downlink::Answer { command, to, .. } => {
                         *reported.entry((command, to.system, to.component)).or_default() += 1;
@@ -125,8 +125,8 @@ proptest! {
         prop_assert_eq!(reported, due);
     }
 
-    /// Damaged, cut and nested frames: whatever arrives, it does not panic, and what is sent can be read
-    /// ([`Bench::said`] checks that).
+    /// Damaged, truncated and nested frames cause no panic, and the vehicle's messages can be decoded ([`Bench::said`]
+    /// checks this).
     #[test]
     fn nothing_makes_it_panic(
         frames in prop::collection::vec((sent(), any::<u8>(), any::<u16>()), 1..120),
@@ -155,7 +155,7 @@ proptest! {
         }
     }
 
-    /// While one station is in control, all that another one achieves are answers, rates, and motors that stop.
+    /// While one station is in control, another one can only get answers, set rates and stop the motors.
     #[test]
     fn a_station_that_is_not_in_control_changes_nothing(frames in prop::collection::vec(sent(), 1..80)) {
         let mut bench = Bench::new();
@@ -165,7 +165,7 @@ proptest! {
         say(&mut bench, STATION, Uplink::Command(Command::Land));
         bench.step();
         for sent in frames {
-            // A tracker is none that commands.
+            // States and poses of a tracker are no commands.
             if sent.from == STATION || [102, 138, 331].contains(&sent.id) {
                 continue;
             }
@@ -181,7 +181,7 @@ proptest! {
     }
 }
 
-/// The list of commands that need control is the one of docs/security.md: all others change nothing but what is sent.
+/// The commands that need no control are those of docs/security.md. They change nothing but the messages that are sent.
 #[test]
 fn commands_that_do_not_need_control() {
     let free = [
@@ -207,7 +207,7 @@ fn commands_that_do_not_need_control() {
     }
 }
 
-/// Control passes to another station after silence, and is handed over.
+/// Control passes to a second station when the first one releases it. Until then the second is informed once.
 #[test]
 fn a_second_station_is_informed_once_and_follows() {
     let mut bench = Bench::new();
@@ -235,7 +235,7 @@ fn a_second_station_is_informed_once_and_follows() {
     bench.hear_from(second, Uplink::Command(Command::Arm));
     let (answers, _) = heard(&mut bench);
     assert!(!answers.contains(&(Answer::Refused(afbc_station::NOT_IN_CONTROL), second)), "{answers:?}");
-    // The mission stays as it is for one that is not in control.
+    // A station that is not in control cannot clear the mission.
     bench.hear_from(first, Uplink::Mission(Mission::Clear(Plan::ALL)));
     let said: Vec<_> = (0..5).flat_map(|_| bench.step().1).collect();
     let denied =

@@ -1,4 +1,4 @@
-//! The file protocol as <https://mavlink.io/en/services/ftp.html> describes it, over files in memory.
+//! MAVLink FTP as <https://mavlink.io/en/services/ftp.html> describes it, with files in memory.
 
 use crate::memory::{Memory, bytes};
 use afbc_link::{Address, FILE_DATA_MAX, FileOpcode, FilePacket, FtpError};
@@ -9,7 +9,7 @@ use proptest::prelude::*;
 const A: Address = Address { system: 255, component: 190 };
 const B: Address = Address { system: 245, component: 191 };
 
-/// A vehicle, and stations that ask it.
+/// A vehicle and stations that send requests to it.
 struct Bench {
     ftp: Ftp<usize>,
     store: Memory,
@@ -23,7 +23,7 @@ impl Bench {
         Bench { ftp: Ftp::default(), store: Memory::with(files), now_us: 0, may_write: true, sequence: 7 }
     }
 
-    /// Sends a packet; returns its answer, of a burst the first packet, if there is one.
+    /// Sends a packet. Returns its answer, if any. The answer to a burst request is its first packet.
     fn send(&mut self, from: Address, packet: &FilePacket) -> Option<FilePacket> {
         let terms = FileTerms { now_us: self.now_us, may_write: self.may_write };
         let answer = self.ftp.answer(from, packet, &mut self.store, terms);
@@ -44,7 +44,7 @@ impl Bench {
         None
     }
 
-    /// Asks with the next number; returns what the answer has, checked as the protocol lays it down.
+    /// Sends a request with the next sequence number. Returns the answer, checked against the protocol.
     fn ask(&mut self, from: Address, opcode: FileOpcode, data: &[u8]) -> Result<FilePacket, FtpError> {
         self.ask_at(from, opcode, 0, 0, data)
     }
@@ -76,7 +76,7 @@ impl Bench {
     }
 }
 
-/// Returns the acknowledged packet, or why it was refused.
+/// Returns the acknowledged packet, or the error of a refusal.
 fn result(request: &FilePacket, answer: &FilePacket) -> Result<FilePacket, FtpError> {
     assert_eq!((answer.sequence, answer.answered), (request.sequence.wrapping_add(1), request.opcode));
     match answer.opcode {
@@ -134,7 +134,7 @@ fn files_are_read_by_blocks() {
     assert_eq!(bench.read(A, session, 1000, 239), Err(FtpError::EOF));
     assert_eq!(bench.read(A, session, u32::MAX, 239), Err(FtpError::EOF));
     assert_eq!(bench.read(A, session, 0, 240), Err(FtpError::INVALID_DATA_SIZE));
-    // The session of another station, and none.
+    // Neither another station's session nor a missing one can be read.
     assert_eq!(bench.read(B, session, 0, 239), Err(FtpError::INVALID_SESSION));
     assert_eq!(bench.read(A, 200, 0, 239), Err(FtpError::INVALID_SESSION));
     bench.ask_at(A, FileOpcode::TERMINATE_SESSION, session, 0, &[]).expect("closed");
@@ -152,16 +152,16 @@ fn sessions_are_bounded_and_those_of_their_station() {
     assert!(own.iter().map(|number| usize::from(*number)).eq(0..SESSIONS - 1), "{own:?}");
     let (other, _) = bench.open(B, "a").expect("open");
     assert_eq!(bench.open(A, "a"), Err(FtpError::NO_SESSIONS_AVAILABLE));
-    // A reset ends those of the station that asks for it.
+    // A reset ends the sessions of the station that requests it.
     bench.ask(A, FileOpcode::RESET_SESSIONS, &[]).expect("reset");
     assert_eq!(bench.store.open_count(), 1);
     assert_eq!(bench.read(B, other, 0, 9).expect("read").len(), 9);
-    // Those that nobody uses for a minute are given to others.
+    // A session that is unused for more than a minute is given to another request.
     (1..SESSIONS).for_each(|_| assert!(bench.open(A, "a").is_ok()));
     bench.now_us += 60_000_000;
     assert_eq!(bench.open(A, "a"), Err(FtpError::NO_SESSIONS_AVAILABLE));
     bench.now_us += 1;
-    // A file that is not there costs nobody a session.
+    // A request for a missing file closes no idle session.
     assert!(bench.open(B, "b").is_err());
     assert_eq!((bench.store.open_count(), bench.read(B, other, 0, 9).expect("read").len()), (SESSIONS, 9));
     bench.now_us += 60_000_001;
@@ -169,7 +169,7 @@ fn sessions_are_bounded_and_those_of_their_station() {
     assert_eq!(bench.store.open_count(), SESSIONS);
 }
 
-/// A station may number its sessions itself, as MAVProxy does; a number that it has already is not given again.
+/// A station may choose its session numbers, as MAVProxy does. A number that it already has is not given again.
 #[test]
 fn a_session_has_the_number_that_its_station_wants() {
     let mut bench = Bench::new(&[("a", bytes(9, 1)), ("b", bytes(5, 1))]);
@@ -184,7 +184,7 @@ fn a_session_has_the_number_that_its_station_wants() {
     assert_eq!(bench.read(B, 140, 0, 239).expect("read").len(), 5);
 }
 
-/// A burst arrives with holes; what is missing is read, and at the end the checksum is that of the file.
+/// A burst loses packets and the missing blocks are read afterwards. Then the checksum is that of the file.
 #[test]
 fn a_burst_with_losses_is_mended() {
     for size in [0, 1, 238, 239, 240, 239 * 256, 239 * 256 + 1, 200_000] {
@@ -242,7 +242,7 @@ fn the_checksum_is_the_protocols() {
     assert_eq!(crc32(crc32(0, b"1234"), b"56789"), 0x2DFD_2D88);
 }
 
-/// While a checksum is calculated, its request again is answered with it, and once; others are answered at once.
+/// A repeated checksum request during the calculation shares its one answer. Other requests are answered at once.
 #[test]
 fn a_checksum_is_calculated_once() {
     let mut bench = Bench::new(&[("a", bytes(50_000, 1))]);
@@ -261,7 +261,7 @@ fn a_checksum_is_calculated_once() {
     assert_eq!((bench.packet(), bench.store.open_count()), (None, 0));
 }
 
-/// An answer that was lost comes again, byte by byte, and nothing is done twice.
+/// If an answer was lost, the repeated request gets the same bytes again and is not carried out twice.
 #[test]
 fn a_repeated_request_gets_the_same_answer() {
     let mut bench = Bench::new(&[("a", bytes(9, 1)), ("b", bytes(9, 2))]);
@@ -275,11 +275,11 @@ fn a_repeated_request_gets_the_same_answer() {
     }
     assert_eq!((bench.store.changes, bench.store.open_count()), (1, 1));
     assert!(result(&remove, &first.expect("answered")).is_ok());
-    // Another station that happens to use the number has its own answer, and so has another request.
+    // Another station with the same sequence number gets its own answer, and so does another request.
     assert!(result(&remove, &bench.send(B, &remove).expect("answered")).is_err());
     let other = FilePacket::request(3, FileOpcode::REMOVE_FILE, 0, 0, 0).with(b"b");
     assert!(result(&other, &bench.send(A, &other).expect("answered")).is_ok());
-    // After ten seconds it is a new one.
+    // After ten seconds the same request counts as new.
     bench.now_us += 11_000_000;
     assert_eq!(result(&other, &bench.send(A, &other).expect("answered")), Err(FtpError::FILE_NOT_FOUND));
 }
@@ -306,13 +306,13 @@ fn files_are_written_where_that_is_allowed() {
     let opened = bench.ask(A, FileOpcode::OPEN_FILE_WO, b"log/a").expect("open");
     bench.ask_at(A, FileOpcode::WRITE_FILE, opened.session, 9, b"more").expect("written");
     assert_eq!(bench.store.files["log/a"].len(), 13);
-    // Not into a file that is open to be read, nor beyond what can be numbered.
+    // A file opened for reading cannot be written, nor can offsets beyond 32 bits.
     let (session, _) = bench.open(A, "log/a").expect("open");
     let refused = bench.ask_at(A, FileOpcode::WRITE_FILE, session, 0, b"x").err();
     assert_eq!(refused, Some(FtpError::FILE_PROTECTED));
     let refused = bench.ask_at(A, FileOpcode::WRITE_FILE, opened.session, u32::MAX, b"xy").err();
     assert_eq!(refused, Some(FtpError::INVALID_DATA_SIZE));
-    // Nor anything while that is not allowed.
+    // No change is possible while changes are not allowed.
     bench.may_write = false;
     let changes_before = bench.store.changes;
     for opcode in (0..128).map(FileOpcode).filter(|opcode| changes(*opcode)) {
@@ -335,7 +335,7 @@ fn unknown_operations_are_refused_and_answers_are_not_answered() {
     }
 }
 
-/// A packet, most often like one that a station sends.
+/// Generates packets, most of them like those of a station.
 fn packet() -> impl Strategy<Value = (bool, FilePacket)> {
     let path = prop_oneof![
         Just(b"/log/a".to_vec()),
@@ -357,8 +357,8 @@ fn packet() -> impl Strategy<Value = (bool, FilePacket)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
-    /// Whatever comes, each request has one answer that fits it, or a burst; never is anything above the root asked for
-    /// (the store checks each path), nor are there more open files than sessions and a checksum.
+    /// Each request has one matching answer or a burst. Paths never lead above the root, as the store checks. There is
+    /// at most one open file per session, and one for a checksum.
     #[test]
     fn any_packets_are_answered_in_order(packets in vec(packet(), 1..60), may_write: bool) {
         let mut bench = Bench::new(&[("log/a", bytes(2500, 1)), ("log/c", bytes(3, 2)), ("etc/passwd", bytes(9, 3))]);
@@ -374,7 +374,7 @@ proptest! {
                 prop_assert!(answer.data().is_some());
                 prop_assert!([FileOpcode::ACK, FileOpcode::NAK].contains(&answer.opcode));
                 prop_assert!(answer.opcode == FileOpcode::ACK || answer.size == 1);
-                // Asked again, it is the same.
+                // The same request gets the same answer again.
                 prop_assert_eq!(bench.ftp.answer(from, packet, &mut bench.store, terms), Some(answer));
             } else {
                 let is_long = [FileOpcode::BURST_READ_FILE, FileOpcode::CALC_FILE_CRC32].contains(&packet.opcode);

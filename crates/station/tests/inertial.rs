@@ -1,4 +1,4 @@
-//! HIGHRES_IMU: what the sensors read, corrected by what calibration has found, in the body's axes.
+//! HIGHRES_IMU has the IMU's readings with the calibration applied, in the body frame.
 
 use crate::common::{Bench, STATION};
 use afbc_calibration::RawSample;
@@ -10,7 +10,7 @@ use afbc_types::{Mounting, SensorCalibration};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
 
-/// HIGHRES_IMU.
+/// Message number of HIGHRES_IMU.
 const MESSAGE: u32 = 105;
 
 fn vector(least: f32, most: f32) -> impl Strategy<Value = Vector3<f32>> {
@@ -20,8 +20,8 @@ fn vector(least: f32, most: f32) -> impl Strategy<Value = Vector3<f32>> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// A sample that is asked for is sent once: the readings less their offsets, scaled, turned as the sensor is
-    /// mounted.
+    /// A requested sample is sent once. Offsets are subtracted from the readings, and then scale and mounting are
+    /// applied.
     #[test]
     fn a_sample_is_the_corrected_reading(
         [attitude_rad, gyro_offset_rad_s, accel_offset_m_s2] in prop::array::uniform3(vector(-0.9, 0.9)),

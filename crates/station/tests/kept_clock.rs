@@ -1,4 +1,4 @@
-//! The clock of the signatures is kept after a flight at once, every two minutes on the ground, and never in the air.
+//! The signing clock is stored right after a flight and every two minutes on the ground, never in the air.
 
 use afbc_link::{Key, SetupSigning};
 use afbc_station::services::signing::{SetupOutcome, Signing};
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 const TODAY_S: u32 = 375_700_000;
 
 proptest! {
-    /// Seconds on the ground and in the air: what is kept is the time, a second late at most.
+    /// Seconds pass on the ground and in the air. The stored clock is at most one second late.
     #[test]
     fn the_clock_is_kept_after_flights_and_every_two_minutes(
         phases in prop::collection::vec((any::<bool>(), 1..400_u32), 1..12),
@@ -18,7 +18,7 @@ proptest! {
         let from_s = TODAY_S + seconds;
         let setup = SetupSigning { key: Some(Key([42; 32])), time_10us: 100_000 * u64::from(from_s) };
         prop_assert_eq!(signing.set(0, &setup, false), SetupOutcome::Done("signing: on, key set"));
-        // The key, its check and the clock.
+        // The key takes eight records, its check value and the clock one each.
         prop_assert_eq!((0..20).filter_map(|_| signing.record(0, false)).count(), 10);
         let (mut now_s, mut kept_s, mut was_armed) = (0, 0, false);
         for (armed, length_s) in phases {

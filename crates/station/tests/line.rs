@@ -1,4 +1,4 @@
-//! The serial line: what everything at full rate leaves of it.
+//! The serial line under full load.
 
 use crate::common;
 use afbc_link::{Address, Command, Downlink, FRAME_MAX, ParameterRequest, Sender, Uplink};
@@ -10,11 +10,11 @@ use afbc_types::State;
 use common::Bench;
 use std::collections::BTreeMap;
 
-/// Bytes that the board's line has room for, `TX` in `firmware/boards/stm32f405/src/board.rs`; a tick's bytes for
-/// which there is none are lost.
+/// Size of the board's transmit buffer \[bytes\], `TX` in `firmware/boards/stm32f405/src/board.rs`. Bytes that do not
+/// fit are lost.
 const RING: usize = 1024;
 
-/// The vehicle on a line of so many baud.
+/// Returns a vehicle on a line of `baud`.
 fn on(baud: u32) -> Bench {
     let mut bench = Bench::new();
     bench.table =
@@ -23,15 +23,15 @@ fn on(baud: u32) -> Bench {
     bench
 }
 
-/// What leaves in some seconds with every stream requested each millisecond, while stations ask.
+/// Totals of a run with every stream requested each millisecond while stations send commands.
 struct Load {
     bytes: usize,
-    /// Commands asked and answered.
+    /// Number of commands sent, and of commands answered.
     asked: usize,
     answered: usize,
-    /// Largest time that an answer waited, in the vehicle and on the line \[ms\].
+    /// Longest time from a command to its answer at the end of the line \[ms\].
     waited_ms: usize,
-    /// How often each stream was sent.
+    /// Number of messages of each stream.
     streams: BTreeMap<u32, usize>,
     parameters: usize,
 }
@@ -47,7 +47,7 @@ fn load(baud: usize, seconds: usize) -> Load {
     let mut load = Load { bytes: 0, asked: 0, answered: 0, waited_ms: 0, streams: BTreeMap::new(), parameters: 0 };
     let (mut ring, mut asked_ms) = (0.0_f64, BTreeMap::new());
     for tick in 0..1000 * seconds {
-        // A state every 10 ms and a target every 20 ms come too, a command every 50 ms, from one of two stations.
+        // A state arrives every 10 ms, and a command every 50 ms from one of two stations.
         if tick.is_multiple_of(10) {
             bench.measure(&State::default());
         }
@@ -58,7 +58,7 @@ fn load(baud: usize, seconds: usize) -> Load {
             asked_ms.insert(number, (from, tick));
             load.asked += 1;
         }
-        // And texts, often and many at once: what speaks against arming.
+        // Requests for the arming checks cause many texts at once.
         if tick % 500 < 200 && tick.is_multiple_of(10) {
             bench.hear(Uplink::Command(Command::CheckArming));
         }
@@ -88,7 +88,7 @@ fn load(baud: usize, seconds: usize) -> Load {
     load
 }
 
-/// At any baud rate everything at full rate fits the line, the board's buffer never overflows, every command is
+/// At any baud rate all streams at full rate fit the line, the transmit buffer never overflows, every command is
 /// answered soon, and no stream starves.
 #[test]
 fn everything_at_full_rate_fits_the_line() {
@@ -97,7 +97,7 @@ fn everything_at_full_rate_fits_the_line() {
         let load = load(baud, seconds);
         let (line, share) = (baud / 10 * seconds, load.bytes as f64 / (baud / 10 * seconds) as f64);
         assert!(load.bytes <= line, "{baud} baud: {} bytes of {line}", load.bytes);
-        // And it is used: else the streams would be slower than need be.
+        // The line must be used well, or else streams would be slower than necessary.
         assert!(share > 0.85, "{baud} baud: {share:.2} of the line");
         assert_eq!(load.answered, load.asked, "{baud} baud");
         assert!(load.waited_ms <= 200, "{baud} baud: {} ms", load.waited_ms);
@@ -111,7 +111,7 @@ fn everything_at_full_rate_fits_the_line() {
     }
 }
 
-/// The rest of the line is for rotor commands, while they are sent.
+/// While rotor commands are sent, the rest of the line is theirs.
 #[test]
 fn rotor_commands_have_the_rest_of_a_fast_line() {
     let mut bench = on(921_600);

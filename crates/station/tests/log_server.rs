@@ -1,4 +1,4 @@
-//! A vehicle that has logs and no other files: they are listed, downloaded and erased beside everything else.
+//! A vehicle with logs but no other files: logs are listed, downloaded and erased while other messages are sent too.
 
 use crate::common::{Bench, STATION};
 use crate::memory::{Memory, bytes};
@@ -10,7 +10,7 @@ use afbc_link::{
 use afbc_onboard::Report;
 use afbc_station::LogServer;
 
-/// What it sends of its logs, and what it says.
+/// A message of the log service, or any other message of the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "a test")]
 enum Sent {
@@ -107,7 +107,7 @@ fn logs_are_listed_and_downloaded() {
     assert!(read == vehicle.store.logs[0] && !vehicle.server.is_busy(), "{} bytes", read.len());
 }
 
-/// While it is disarmed; what becomes of it is said once.
+/// Logs are erased only while the vehicle is disarmed. The result is announced once.
 #[test]
 fn logs_are_erased() {
     let mut vehicle = Vehicle::new();

@@ -1,4 +1,4 @@
-//! The log while it is made, to a station that loses parts and acknowledgements.
+//! Log stream to a station that loses parts and acknowledgements.
 
 use afbc_link::{Address, StreamedLog};
 use afbc_station::services::log_stream::{LogStream, StreamEvent};
@@ -9,11 +9,11 @@ const STATION: Address = Address { system: 255, component: 190 };
 const OTHER: Address = Address { system: 254, component: 190 };
 const HEADER: usize = 16;
 
-/// A log of which more and more is there.
+/// A log that grows over time.
 #[derive(Default)]
 struct Source {
     log: Vec<u8>,
-    /// What has been consumed, what is there, and the most that is seen at once.
+    /// Number of bytes consumed, number of bytes written so far, and most bytes returned at once.
     consumed: usize,
     made: usize,
     front: usize,
@@ -40,8 +40,8 @@ impl LogSource for Source {
     }
 }
 
-/// A log with records of these lengths: definitions, then data and whatever else there is. Returns it, where records
-/// begin, and where the first one of data does.
+/// Builds a log with records of these lengths: first definitions, then data and other records. Returns the log, the
+/// beginnings of all records and the beginning of the data.
 fn log(definitions: &[u16], data: &[(u8, u16)]) -> (Vec<u8>, Vec<usize>, usize) {
     let mut log = vec![7; HEADER];
     let mut starts = Vec::new();
@@ -60,8 +60,7 @@ fn log(definitions: &[u16], data: &[(u8, u16)]) -> (Vec<u8>, Vec<usize>, usize) 
     (log, starts, end.unwrap_or(HEADER))
 }
 
-/// Streams all of the log to a station that loses some of what is sent to it and of what it sends. Returns all parts,
-/// each once, in the order of their numbers.
+/// Streams the whole log to a station that loses acknowledgements or parts. Returns all parts once, in order.
 fn streamed(source: &mut Source, mut loses: impl FnMut() -> bool) -> Vec<StreamedLog> {
     let mut stream = LogStream::default();
     assert!(stream.start(STATION, source));
@@ -74,7 +73,7 @@ fn streamed(source: &mut Source, mut loses: impl FnMut() -> bool) -> Vec<Streame
         if let Some(event) = event {
             let StreamEvent::Part(part) = event else { panic!("{event:?}") };
             match parts.last() {
-                // The same again, until it is acknowledged.
+                // The part is repeated until it is acknowledged.
                 Some(last) if last.sequence == part.sequence => {
                     assert!(part.to_be_acknowledged && *last == part);
                 }
@@ -101,7 +100,8 @@ fn streamed(source: &mut Source, mut loses: impl FnMut() -> bool) -> Vec<Streame
 }
 
 proptest! {
-    /// The parts are the log; definitions are acknowledged, whole and alone; each part names its first record.
+    /// The parts make up the log. Parts with definitions are acknowledged and have no data. Each part names its first
+    /// record.
     #[test]
     fn parts_are_the_log(
         definitions in prop::collection::vec(0_u16..700, 1..12),
@@ -109,7 +109,7 @@ proptest! {
         front in 1_usize..600,
         mut losses in any::<u64>(),
     ) {
-        // A changed parameter is a record of data once those have begun.
+        // A changed parameter (P) after the first data record belongs to the data.
         let data: Vec<_> = [(b'D', 5)].into_iter().chain(data).collect();
         let (log, starts, end) = log(&definitions, &data);
         let mut source = Source { log: log.clone(), front, ..Source::default() };
@@ -124,19 +124,19 @@ proptest! {
             prop_assert!(part.data[bytes.len()..].iter().all(|byte| *byte == 0) && part.to == STATION);
             let first = starts.iter().find(|start| (at..at + bytes.len()).contains(start));
             prop_assert_eq!(part.first_record.map(usize::from), first.map(|start| start - at));
-            // No part with definitions has anything of the data.
+            // No part with definitions contains data.
             prop_assert_eq!(part.to_be_acknowledged, at < end);
             prop_assert!(!part.to_be_acknowledged || at + bytes.len() <= end);
             prop_assert!(part.to_be_acknowledged || bytes.len() == part.data.len());
             at += bytes.len();
         }
-        // The last part waits for more.
+        // The last part waits for more bytes.
         prop_assert!(log.len() - at < parts.first().map_or(usize::MAX, |part| part.data.len()));
         prop_assert!(at >= end);
     }
 }
 
-/// A station that has gone gets nothing more, and the vehicle makes no log for it.
+/// A station that has gone gets no more parts, and the log ends.
 #[test]
 fn a_station_that_does_not_acknowledge_is_given_up() {
     let (log, ..) = log(&[500, 500], &[(b'D', 100)]);
@@ -150,14 +150,14 @@ fn a_station_that_does_not_acknowledge_is_given_up() {
     assert!(events[..events.len() - 1].iter().all(|event| *event == StreamEvent::Part(first)));
     assert!((10..=50).contains(&events.len()), "{} times", events.len());
     assert!(!stream.is_active() && !source.runs && stream.next(&mut source, u64::MAX).is_none());
-    // Another start is another log, from its beginning.
+    // A new start begins a new log.
     assert!(stream.start(OTHER, &mut source));
     source.made = source.log.len();
     let Some(StreamEvent::Part(part)) = stream.next(&mut source, 0) else { panic!("a part") };
     assert!(part.to == OTHER && part.sequence == 0 && part.first_record == Some(16));
 }
 
-/// A vehicle without a black box says so.
+/// A vehicle without a log refuses to stream it.
 #[test]
 fn without_a_log_there_is_no_stream() {
     struct Nothing;

@@ -1,4 +1,4 @@
-//! Logs by LOG_REQUEST_LIST, LOG_REQUEST_DATA and LOG_REQUEST_END.
+//! Log download by LOG_REQUEST_LIST, LOG_REQUEST_DATA and LOG_REQUEST_END.
 
 use crate::memory::{Memory, bytes};
 use afbc_link::{LOG_DATA_MAX, LogEntry, LogRequest};
@@ -34,7 +34,7 @@ fn logs_are_listed_in_any_range() {
         (0, u16::MAX, 0..=2),
         (0, 0, 0..=0),
         (1, 2, 1..=2),
-        // Beyond the last one: the last one, so that somebody who asks waits for nothing.
+        // A request beyond the last log gets the last log, so that the station does not wait in vain.
         (7, 9, 2..=2),
         (u16::MAX, u16::MAX, 2..=2),
         (2, 0, 2..=2),
@@ -46,7 +46,7 @@ fn logs_are_listed_in_any_range() {
     assert_eq!(ask(&mut store(&[]), LogRequest::List { first: 0, last: u16::MAX }), [none]);
 }
 
-/// As a station reads a log: what comes, until a part is not full.
+/// Reads a log like a station: all data until a part is not full.
 fn read(messages: &[LogMessage], log: u16, offset: u32) -> Vec<u8> {
     let mut read = Vec::new();
     for (place, message) in messages.iter().enumerate() {
@@ -67,11 +67,11 @@ fn the_end_of_a_log_is_told() {
         assert_eq!(read(&messages, 0, 0), one.logs[0]);
         let LogMessage::Data(last) = messages[messages.len() - 1] else { panic!("data") };
         assert!(usize::from(last.count) < LOG_DATA_MAX, "{size}");
-        // Just what there is, and then no more.
+        // A request for exactly the log's size gets no more than that.
         let messages = ask(&mut one, LogRequest::Data { log: 0, offset: 0, bytes: size as u32 });
         assert_eq!((read(&messages, 0, 0), messages.len()), (one.logs[0].clone(), size.div_ceil(90).max(1)));
     }
-    // Behind the end, and of a log that there is not: an empty part at once.
+    // Beyond the end, and for a missing log, one empty part is sent at once.
     for (log, offset) in [(0, 91), (0, u32::MAX), (7, 0)] {
         let messages = ask(&mut store(&[90]), LogRequest::Data { log, offset, bytes: 900 });
         assert_eq!((read(&messages, log, offset), messages.len()), (vec![], 1));
@@ -96,7 +96,7 @@ fn the_last_request_counts() {
     }
 }
 
-/// MAVProxy asks for twenty gaps at once.
+/// MAVProxy requests twenty gaps at once.
 #[test]
 fn several_gaps_are_filled_in_turn() {
     let mut one = store(&[10_000]);
@@ -111,7 +111,7 @@ fn several_gaps_are_filled_in_turn() {
     for (gap, parts) in (0..20).zip(messages.chunks(3)) {
         assert_eq!(read(parts, 0, 400 * gap), one.logs[0][400 * gap as usize..][..270]);
     }
-    // The rest of the log is instead of them, and instead of itself.
+    // A request for the rest of the log replaces all gaps, and a new such request replaces the old one.
     logs.hear(LogRequest::Data { log: 0, offset: 0, bytes: 90 });
     for offset in [0, 9_000] {
         logs.hear(LogRequest::Data { log: 0, offset, bytes: u32::MAX });
@@ -120,8 +120,8 @@ fn several_gaps_are_filled_in_turn() {
 }
 
 proptest! {
-    /// A station that misses parts at random and asks for each gap again, as MAVSDK and QGroundControl do, has the log;
-    /// also of storage that has to be waited for.
+    /// A station that loses random parts and requests each gap again, as MAVSDK and QGroundControl do, gets the whole
+    /// log, even from slow storage.
     #[test]
     fn a_log_with_gaps_is_completed(size in 0..5000_usize, lost in any::<u64>(), slow in 0_u32..4) {
         let mut one = Memory { slow, ..store(&[size]) };

@@ -1,4 +1,4 @@
-//! What becomes of missions beside their upload: what is cleared, replaced, ended early, or cannot be flown.
+//! Missions after their upload: cleared, replaced, ended early, or impossible to fly.
 
 use crate::commands::{Current as _, bench, item, leads_to, orders, origin, refused, step, upload};
 use crate::common::Bench;
@@ -7,7 +7,7 @@ use afbc_flight_core::Mode;
 use afbc_guidance::{FlightMode, Item, Order, OrderRefusal};
 use afbc_link::{Answer, Command, Datum, Downlink, Height, Mission, MissionItem, MissionResult, Place, Plan, Uplink};
 
-/// Returns the item that the guidance has been handed last.
+/// Returns the mission item that the guidance was given last.
 fn leg(bench: &mut Bench) -> Option<afbc_guidance::Leg> {
     (0..3).for_each(|_| drop(step(bench)));
     let inputs = bench.comms.receive(&[]);
@@ -16,8 +16,8 @@ fn leg(bench: &mut Bench) -> Option<afbc_guidance::Leg> {
     bench.taken.orders.leg
 }
 
-/// What a station clears is taken from the guidance, and another mission, also a shorter one, is handed over from its
-/// first item on.
+/// If a station clears the mission, the guidance is told so. If it uploads another one, even a shorter one, the
+/// guidance gets the first item of that.
 #[test]
 fn a_mission_that_is_cleared_is_withdrawn() {
     for clear in [Mission::Clear(Plan::MISSION), Mission::Clear(Plan::ALL), Mission::Count(0, Plan::MISSION)] {
@@ -40,7 +40,7 @@ fn a_mission_that_is_cleared_is_withdrawn() {
     }
 }
 
-/// MISSION_START's last item ends the mission, until it is started without one or is another.
+/// The last item in MISSION_START ends the mission, until the mission is started without one or is replaced.
 #[test]
 fn a_mission_ends_with_the_item_that_is_to_be_the_last() {
     let mut bench = bench(true);
@@ -60,8 +60,8 @@ fn a_mission_ends_with_the_item_that_is_to_be_the_last() {
     assert_eq!(leg(&mut bench).map(|leg| (leg.number, leg.is_last)), Some((1, false)));
 }
 
-/// What the guidance would refuse in the air is refused at upload, by the item's number: far away, on the far half of
-/// the earth, beyond the cylinder around home; the same places of commands, and of rally points.
+/// Items that the guidance would refuse in flight are refused at upload: places far away, on the far half of the earth
+/// or outside the cylinder around home. The same holds for places in commands and rally points.
 #[test]
 fn what_cannot_be_flown_is_refused_at_upload() {
     let mut bench = bench(true);
@@ -73,7 +73,7 @@ fn what_cannot_be_flown_is_refused_at_upload() {
             let parameters = if command == 18 { [1.0, 0.0, 10.0, f32::NAN] } else { [0.0, 0.0, 0.0, 0.0] };
             let there = MissionItem { x, y, parameters, ..item(1, command) };
             if [x, y] == [0, 0] && [21, 22].contains(&command) {
-                // Here.
+                // 0, 0 means the vehicle's place.
                 continue;
             }
             let result = upload(&mut bench, &[item(0, 16), there]);
@@ -94,7 +94,7 @@ fn what_cannot_be_flown_is_refused_at_upload() {
         };
         assert!(said.iter().any(refused), "{said:?}");
     }
-    // The cylinder of the parameters, around home: here 21 m away, and 5 m up.
+    // The parameters set the cylinder around home. The item is 21 m from home and 5 m above it.
     let set = |bench: &mut Bench, name: &str, value: f32| {
         let mut padded = [0; 16];
         padded.iter_mut().zip(name.bytes()).for_each(|(to, from)| *to = from);
@@ -111,7 +111,7 @@ fn what_cannot_be_flown_is_refused_at_upload() {
         set(&mut bench, name, value);
         assert_eq!(upload(&mut bench, &[item(0, 16)]), Some(result), "{name} {value}");
     }
-    // What has become impossible since is refused at the start.
+    // A mission that has become impossible is refused at its start.
     leads_to(&mut bench, Command::StartMission(0, None), &[Order::Select(FlightMode::Mission)]);
     set(&mut bench, "GF_MAX_HOR_DIST", 20.0);
     for command in [Command::StartMission(0, None), Command::SelectStandardMode(6)] {
@@ -119,7 +119,7 @@ fn what_cannot_be_flown_is_refused_at_upload() {
     }
 }
 
-/// Another fence and other rally points leave the mission as it is, and what the guidance has of it.
+/// A new fence or new rally points change neither the mission nor the guidance's copy of it.
 #[test]
 fn other_plans_leave_the_mission_alone() {
     let mut vehicle = Vehicle::new();
@@ -134,14 +134,14 @@ fn other_plans_leave_the_mission_alone() {
     }
 }
 
-/// What is left of a jump's repetitions counts for a flight: a vehicle that is disarmed begins anew.
+/// Repetitions of a jump are counted per flight: disarming resets them.
 #[test]
 fn jumps_begin_anew_with_each_flight() {
     let mut vehicle = Vehicle::new();
     let jump = MissionItem { command: 177, parameters: [0.0, 1.0, 0.0, 0.0], x: 0, y: 0, z: 0.0, ..item(1, 177) };
     let items = [way(16, [20.0, -20.0]), jump, way(16, [30.0, -20.0])];
     assert_eq!(vehicle.upload(Plan::MISSION, &items), MissionResult::ACCEPTED);
-    // Returns where the jump leads, which is then made.
+    // Returns the target of the jump, and then makes the jump.
     let jump = |vehicle: &mut Vehicle| {
         vehicle.leg(2);
         let leg = vehicle.leg(1);

@@ -1,4 +1,4 @@
-//! The parameters of a vehicle that runs: table, protocol, and what is kept of it.
+//! The parameters of a running vehicle: table, protocol, and storage.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
 use crate::common::Bench;
@@ -27,12 +27,12 @@ fn all(table: &ParameterTable) -> Vec<Parameter> {
     table.iter().collect()
 }
 
-/// Bits of every value, by name.
+/// Returns the bits of every value, by name.
 fn bits(table: &ParameterTable) -> BTreeMap<RecordName, u32> {
     all(table).iter().map(|parameter| (parameter.name, parameter.value.to_bits())).collect()
 }
 
-/// The parameters as they are at first, and their bits: each takes a walk over all of them.
+/// The parameters at their defaults, and their bits. They are cached because each access walks over all parameters.
 static FIRST: LazyLock<(Vec<Parameter>, BTreeMap<RecordName, u32>)> = LazyLock::new(|| (all(&table()), bits(&table())));
 
 fn blank() -> Store<Sectors> {
@@ -41,7 +41,7 @@ fn blank() -> Store<Sectors> {
     store
 }
 
-/// What the next start reads, and its notices.
+/// Returns the table and the notices after a restart with this store.
 fn restarted(store: Store<Sectors>, kept: &Kept) -> (ParameterTable, Store<Sectors>, Vec<String>) {
     let mut store = Store::open(store.into_flash(), 0, hash(b"paper")).unwrap();
     store.make_room().unwrap();
@@ -63,14 +63,14 @@ fn every_parameter_has_a_name_and_a_place() {
         assert!(parameter.range.check(parameter.value).is_ok(), "{}", parameter.name);
     }
     assert_eq!((table.at(table.count()), table.get(name("NO_SUCH_NAME"))), (None, None));
-    // One of every group and type.
+    // There are parameters of every group and type.
     for text in ["V_MASS", "V_INERTIA_Z", "MOT_IDLE", "ARM_TILT_MAX", "EST_GYR_NOISE", "C_FORCE_MAX", "A_ROLL_GAMMA"] {
         assert_eq!(table.get(name(text)).unwrap().kind, Kind::Real32, "{text}");
     }
     assert_eq!(table.get(name("C_BUMPLESS")).unwrap().kind, Kind::Int32);
 }
 
-/// A value, often in the range and often near or beyond its ends.
+/// Returns a value, often within the range and often near or beyond its ends.
 fn value(parameter: &Parameter, way: u8, share: f32) -> f32 {
     let (min, max) = (parameter.range.min as f32, parameter.range.max as f32);
     match way % 10 {
@@ -98,7 +98,7 @@ proptest! {
             Ok(set) => {
                 prop_assert!(parameter.range.check(value).is_ok());
                 prop_assert_eq!(table.get(parameter.name), Some(set));
-                // To the bit; but a switch has no -0.
+                // The value is equal, for real numbers even in all bits. A switch has no -0.
                 prop_assert_eq!(table.get(parameter.name).unwrap().value, value);
                 if parameter.kind == Kind::Real32 {
                     prop_assert_eq!(table.get(parameter.name).unwrap().value.to_bits(), value.to_bits());
@@ -111,7 +111,7 @@ proptest! {
                 prop_assert_eq!(&bits(&table), before);
                 let text = reason.as_str();
                 prop_assert!(text.starts_with(&format!("{}: ", parameter.name)), "{text}");
-                // Not cut: it ends in a limit or in a whole word.
+                // The text is not truncated: it ends in a limit or in a whole word.
                 let end = text.rsplit([' ', ':']).next().unwrap();
                 let is_whole = end.parse::<f64>().is_ok() || ["above", "below", "number"].contains(&end);
                 prop_assert!(text.len() <= REASON_MAX && is_whole, "{text}");
@@ -120,7 +120,7 @@ proptest! {
     }
 }
 
-/// Whole numbers, choices and switches are kept as the floats of their numbers, as they were when they were floats.
+/// Whole numbers, choices and switches are stored as floats, as they were when the parameters were floats.
 #[test]
 fn what_was_kept_as_a_float_counts() {
     let mut store = blank();
@@ -142,7 +142,7 @@ fn what_was_kept_as_a_float_counts() {
     assert_eq!((net.fence_action, net.sticks_action), (FenceAction::Return, SticksAction::Return));
     assert_eq!((net.battery_action, net.cells), (BatteryAction::Warn, 4));
     assert_eq!((link.system, link.baud, settings.bumpless), (7, 57_600, false));
-    // And are sent as before.
+    // These parameters are also sent as before.
     for (text, value) in [("GF_ACTION", 3.0), ("NAV_RCL_ACT", 2.0), ("SER_TEL1_BAUD", 57_600.0)] {
         let parameter = table.get(name(text)).unwrap();
         assert_eq!((parameter.kind, parameter.value), (Kind::Int32, value));
@@ -171,7 +171,7 @@ fn refusals_say_what_to_change() {
     assert_eq!(refused("NOTHING", 1.0), "NOTHING: no such parameter");
 }
 
-/// A vehicle that takes over a configuration flies as one that was built with it, to the bit; not while armed.
+/// A vehicle that adopts a configuration flies exactly like one that was built with it. An armed vehicle adopts none.
 #[test]
 fn a_disarmed_vehicle_flies_what_is_set() {
     let mut table = table();
@@ -225,7 +225,7 @@ fn padded(text: &str) -> ParameterName {
     bytes
 }
 
-/// Everything told in `ms` ticks of a millisecond.
+/// Returns all values sent in `ms` ticks of 1 ms.
 fn reported(
     service: &mut Service,
     now_us: &mut u64,
@@ -261,7 +261,7 @@ fn a_list_is_complete_and_leaves_the_link_to_others() {
             list.extend(second);
             assert!(now_us < 60_000_000, "{}", list.len());
         }
-        // 30 to 50 % of the link, over the whole list and at most: a burst of four values comes on top.
+        // The list takes 20 to 50 % of the link, and a burst of four values comes on top.
         let share =
             f64::from(table.count()) * f64::from(VALUE_BYTES) / f64::from(bytes_s) / ((now_us - start_us) as f64 / 1e6);
         assert!(share > 0.2 && share < 0.5, "{baud}: {share}");
@@ -277,7 +277,7 @@ fn a_list_is_complete_and_leaves_the_link_to_others() {
     }
 }
 
-/// Another station asks while a list is under way: each hears all values.
+/// If another station asks during a list, both stations get all values.
 #[test]
 fn two_stations_hear_everything() {
     let (mut table, mut service, mut now_us) = (table(), Service::default(), 0);
@@ -299,7 +299,7 @@ fn gaps_are_filled_by_place_and_by_name() {
     ] {
         assert_eq!(service.hear(ask, &mut table, false), Default::default());
     }
-    // What there is not is named.
+    // An error names the missing parameter.
     for (ask, name, place) in [
         (ParameterRequest::ReadPlace(table.count()), [0; 16], table.count() as i16),
         (ParameterRequest::ReadPlace(u16::MAX), [0; 16], -1),
@@ -320,7 +320,7 @@ fn every_set_is_answered_and_an_armed_vehicle_refuses() {
     let (mut table, mut service, mut now_us) = (table(), Service::default(), 0);
     let mut set = |ask, disarmed| {
         let heard = service.hear(ask, &mut table, disarmed);
-        // At once, whatever the link.
+        // The answer is sent at once, however slow the link is.
         let said = reported(&mut service, &mut now_us, 1, 1, &table);
         assert_eq!(said.len(), 1, "{ask:?}");
         let value = f32::from_le_bytes(said[0].value);
@@ -337,7 +337,7 @@ fn every_set_is_answered_and_an_armed_vehicle_refuses() {
     let ask = |value: [u8; 4], kind| ParameterRequest::Set { name: padded("C_BUMPLESS"), value, kind };
     let as_integer = |(change, refused, value): (_, _, f32)| (change, refused, value.to_bits());
     let off = change("C_BUMPLESS", Some(0.0));
-    // A switch: as MAVSDK sends it, as ArduPilot's stations do, and as a plain number.
+    // A switch can be set in the encoding of MAVSDK, in that of ArduPilot's stations, and as a plain number.
     for (on, kind) in
         [(1_i32.to_le_bytes(), 6), (1.0_f32.to_le_bytes(), 6), (1.0_f32.to_le_bytes(), 9), ([1, 0, 0, 0], 1)]
     {
@@ -364,7 +364,7 @@ fn defaults_are_restored_and_listed() {
 }
 
 proptest! {
-    /// Whatever a station asks, every PARAM_SET of a parameter is answered or counted, and the vehicle can fly.
+    /// Whatever stations send, every PARAM_SET of a parameter is answered or counted, and the vehicle can fly.
     #[test]
     fn any_questions(
         asks in prop::collection::vec((0..5_u8, any::<u16>(), any::<[u8; 4]>(), any::<u8>(), any::<bool>()), 0..200),
@@ -388,7 +388,7 @@ proptest! {
             let before = table.configuration().clone();
             let heard = service.hear(ask, &mut table, disarmed);
             prop_assert!(disarmed || *table.configuration() == before);
-            // What is set to what it is already may not have been kept: it counts as a change, too.
+            // Setting the present value counts as a change too, since that value may not have been stored.
             prop_assert!(heard.change.is_some() || *table.configuration() == before);
             prop_assert!(heard.change.is_none() || way >= 3);
             sets += u32::from(way == 3);
@@ -403,7 +403,7 @@ proptest! {
         prop_assert!(answers + service.dropped() >= sets, "{answers} answers to {sets} sets");
     }
 
-    /// What is set is there tomorrow, to the bit, after any sequence of changes and starts.
+    /// After any sequence of changes and restarts, all stored values are exactly those that were set.
     #[test]
     fn what_is_kept_is_what_was_set(
         acts in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0.0..1.0_f32), 1..80),
@@ -434,7 +434,7 @@ proptest! {
         }
         let (found, mut store, notices) = restarted(store, &Kept::NOW);
         prop_assert_eq!((bits(&found), notices), (bits(&now), vec![]));
-        // Only what differs from the image.
+        // Only values that differ from the defaults are stored.
         let (image, mut kept) = (bits(&table()), BTreeMap::new());
         store.visit(|name, _, bits| _ = kept.insert(name, bits)).unwrap();
         let differing: BTreeMap<RecordName, u32> =
@@ -488,7 +488,7 @@ fn a_later_image_reads_what_an_earlier_one_wrote() {
     let expected =
         ["GONE: no such parameter", "MOT_IDLE: has changed, set it again", "C_LIMITS_CLIMB: must be 0.1 to 1e6"];
     assert_eq!(reasons, BTreeSet::from(expected));
-    // The new name takes over, and is restored without the old one's coming back.
+    // The new name takes over. Resetting it does not bring the old name's value back.
     found.set(name("ARM_TILT_MAX"), 0.2).unwrap();
     later.keep(&mut store, RecordChange::Set(name("ARM_TILT_MAX"), Some(0.2))).unwrap();
     let (found, mut store, _) = restarted(store, &later);
@@ -498,13 +498,13 @@ fn a_later_image_reads_what_an_earlier_one_wrote() {
     assert_eq!(found.get(name("ARM_TILT_MAX")), image.get(name("ARM_TILT_MAX")));
 }
 
-/// An image with weaker rotors cannot carry the mass that an earlier one could, but all else that was stored counts.
+/// A stored value with which the vehicle could not fly is ignored with a notice. All other stored values count.
 #[test]
 fn values_with_which_the_vehicle_could_not_fly_are_left_out() {
     let (mut store, keep) = (blank(), |store: &mut Store<_>, text: &str, value| {
         Kept::NOW.keep(store, RecordChange::Set(name(text), Some(value))).unwrap();
     });
-    // The mass needs the larger Theta_hat, which comes later.
+    // The mass is possible only with the larger limit of Theta_hat, which is stored after the mass.
     keep(&mut store, "V_MASS", 0.7);
     keep(&mut store, "A_Z_THETAMAX", 20.0);
     keep(&mut store, "MOT_IDLE", 0.04);
@@ -517,7 +517,7 @@ fn values_with_which_the_vehicle_could_not_fly_are_left_out() {
     assert!(table().set(name("V_MASS"), 0.7).is_err());
 }
 
-/// What does not fit the queues is counted, each message once; what is answered is not.
+/// Messages that do not fit the queues are counted once each. Answered messages are not counted.
 #[test]
 fn what_is_dropped_is_counted() {
     for ask in [ParameterRequest::ReadPlace(3), ParameterRequest::ReadName(padded("V_MASS")), real("V_MASS", 0.486)] {
@@ -531,7 +531,7 @@ fn what_is_dropped_is_counted() {
     }
 }
 
-/// Reads take their share of the link, whatever it carries, and after a pause no more than a burst.
+/// Reads take their share of the link at any rate, and after a pause no more than a burst.
 #[test]
 fn reads_take_their_share() {
     for link_bytes_s in [5_184, 10_000, 82_944] {

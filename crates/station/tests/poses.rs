@@ -1,4 +1,4 @@
-//! Poses over the link to a vehicle with an inertial sensor, and to one without.
+//! Poses over the link, to vehicles with and without an IMU.
 
 use crate::common::Bench;
 use afbc_estimator::Measurement;
@@ -8,19 +8,19 @@ use afbc_onboard::{Aged, Readings, Report};
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 use nalgebra::Vector3;
 
-/// Where the vehicle is, and its heading.
+/// Position and heading of the vehicle.
 const PLACE_M: Vector3<f32> = Vector3::new(3.0, -2.0, 0.5);
 const YAW_RAD: f32 = 0.7;
 /// Time in which the estimator starts \[ms\].
 const START_MS: u64 = 4_000;
 
-/// Pseudo-random numbers in -1..1, different for each time.
+/// Returns pseudo-random numbers between -1 and 1, different for each time.
 fn noise(ms: u64) -> Vector3<f32> {
     let number = |k: u64| ((ms * 3 + k).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) as f32 / (1 << 23) as f32 - 1.0;
     Vector3::new(number(0), number(1), number(2))
 }
 
-/// The motion: at rest, then to and fro along x; offset \[m\] and acceleration \[m/s2\].
+/// Returns offset \[m\] and acceleration \[m/s2\] of the motion along x: at rest, then oscillating.
 fn swing(ms: u64) -> (f32, f32) {
     const RATE_RAD_S: f32 = 2.0;
     let phase = RATE_RAD_S * (ms.saturating_sub(START_MS) as f32 * 1e-3);
@@ -33,19 +33,19 @@ fn state(offset_m: f32) -> State {
     State { position_m, attitude_rad: Vector3::new(0.0, 0.0, YAW_RAD), ..State::default() }
 }
 
-/// A sample of a level vehicle with this acceleration along the earth's x.
+/// Returns an IMU sample of a level vehicle with this acceleration along the earth's x.
 fn sample(ms: u64, acceleration_m_s2: f32) -> Readings {
     let force = Vector3::new(YAW_RAD.cos() * acceleration_m_s2, -YAW_RAD.sin() * acceleration_m_s2, 9.81);
     let value = [noise(ms) * 1e-3, force + noise(ms + 1_000_000) * 0.02];
     Readings { imu: Some(Aged { value, age_us: 0 }), ..Readings::NONE }
 }
 
-/// How poses are sent.
+/// Type of the message that carries a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum By {
-    /// As poses.
+    /// A pose message.
     Pose,
-    /// As whole states, whose velocities and rates are wrong: only the pose is used.
+    /// A state message with wrong velocities and rates: only its pose is used.
     State,
 }
 
@@ -59,7 +59,7 @@ fn message(by: By, sent_us: u64, state: State, sigmas: PoseSigmas) -> Uplink {
     }
 }
 
-/// The answer to a request to arm in the next ticks, with a setpoint at the place.
+/// Returns the answer to an arm command, with a setpoint at the vehicle's place.
 fn arm(bench: &mut Bench, from_ms: u64) -> Option<Answer> {
     let setpoint = Setpoint { position_m: PLACE_M, yaw_rad: YAW_RAD, ..Setpoint::default() };
     bench.hear(Uplink::Setpoint(setpoint));
@@ -73,14 +73,13 @@ fn arm(bench: &mut Bench, from_ms: u64) -> Option<Answer> {
     })
 }
 
-/// Poses alone, 50 times per second, tell the vehicle where it is and how it is headed. It can be
-/// armed.
+/// Poses at 50 Hz are enough for position and heading, so the vehicle can be armed.
 #[test]
 fn a_vehicle_knows_where_it_is() {
     for by in [By::Pose, By::State] {
         let (mut bench, mut reported) = (Bench::new(), None);
         for ms in 0..START_MS {
-            // The sender's clock is not the vehicle's.
+            // The sender's clock differs from the vehicle's.
             if ms % 20 == 0 {
                 let mut measured = state(0.0);
                 measured.position_m += noise(ms) * 1e-3;
@@ -96,7 +95,7 @@ fn a_vehicle_knows_where_it_is() {
     }
 }
 
-/// Without poses it knows neither heading nor position, and says so.
+/// Without poses heading and position are unknown, and arming is refused.
 #[test]
 fn without_poses_it_does_not() {
     let mut bench = Bench::new();
@@ -106,7 +105,7 @@ fn without_poses_it_does_not() {
     assert_eq!(arm(&mut bench, START_MS), Some(Answer::Refused(Refusal::HeadingUnknown as i32)));
 }
 
-/// A vehicle without an inertial sensor ignores them, even plausible ones from a tracker in use.
+/// A vehicle without an IMU ignores poses, even plausible ones of a tracker in use.
 #[test]
 fn without_an_inertial_sensor_poses_are_ignored() {
     let mut bench = Bench::new();
@@ -123,8 +122,8 @@ fn without_an_inertial_sensor_poses_are_ignored() {
     }
 }
 
-/// Poses between 5 and 155 ms late, the vehicle moving at up to 1 m/s: each counts for its own time. The 5 ms of the
-/// fastest cannot be known, and are 5 mm.
+/// Poses arrive 5 to 155 ms late while the vehicle moves at up to 1 m/s. Each is used for its own time. The shortest
+/// delay of 5 ms cannot be known, and makes an error of 5 mm.
 #[test]
 fn late_poses_count_for_their_own_time() {
     for by in [By::Pose, By::State] {
@@ -156,12 +155,12 @@ fn late_poses_count_for_their_own_time() {
                 }
             }
         }
-        // Before the vehicle estimates, late states are of no use.
+        // Until the vehicle has an estimate, late states are refused.
         assert!(late < 10, "{by:?}: {late}");
     }
 }
 
-/// A tracker that is off by 0.2 m to and fro is smoothed if it says so.
+/// A tracker that jumps by 0.2 m to and fro is smoothed if its messages give a large standard deviation.
 #[test]
 fn standard_deviations_count() {
     let wander = |position_m| {
@@ -183,24 +182,24 @@ fn standard_deviations_count() {
     assert!(unsure < 0.1 && sure > 0.15, "{unsure} m, {sure} m");
 }
 
-/// What a tracker sends to a vehicle whose inertial sensor has died.
+/// Data that a tracker sends after the IMU has failed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Left {
     States,
     Poses,
     /// The same pose again and again.
     Frozen,
-    /// Poses that call themselves bad.
+    /// Poses with a large standard deviation.
     Unsure,
-    /// Poses that arrive too late to be flown on.
+    /// Poses that arrive too late for flying.
     Late,
-    /// Positions, as the vehicle's own sensors read them.
+    /// Positions without attitude, as read by the vehicle's own sensors.
     Positions,
     Nothing,
 }
 
-/// The vehicle hovers at its place, armed at 4 s; its inertial sensor dies a second later. Returns the modes, the texts
-/// since then, and the last report.
+/// Flies a vehicle that hovers at its place, is armed after 4 s and loses its IMU one second later. Returns the modes,
+/// the texts after the failure, and the last report.
 fn outlives(left: Left) -> (Vec<Mode>, Vec<String>, Report) {
     let (mut bench, place) = (Bench::new(), state(0.0));
     let (mut modes, mut texts, mut last) = (Vec::new(), Vec::new(), None);
@@ -220,7 +219,8 @@ fn outlives(left: Left) -> (Vec<Mode>, Vec<String>, Report) {
             _ => bench.hear(Uplink::Pose { sent_us, pose: Pose::of(&reported, sigmas) }),
         }
         if dead && left == Left::Late {
-            // Read by the vehicle: the link's clock would learn a lateness that stays.
+            // The pose is put into the sensor readings, not sent over the link, whose clock would adapt to the constant
+            // delay.
             let Pose { position_m, attitude, .. } = Pose::of(&reported, sigmas);
             let value = Measurement::Pose { position_m, attitude, position_sigma_m: 0.003, attitude_sigma_rad: 0.01 };
             readings.aids = [Some(Aged { value, age_us: 60_000 }), None];
@@ -245,8 +245,8 @@ fn outlives(left: Left) -> (Vec<Mode>, Vec<String>, Report) {
     (modes, texts, last.expect("flown"))
 }
 
-/// Once the inertial sensor is silent for good, whole states of the link stand in, or else what is observed from poses,
-/// which is told once; the flight goes on. Nothing else saves the vehicle.
+/// After the IMU has failed, the vehicle continues flying on whole states of the link, or else on states observed from
+/// poses, which is announced once. No other data save the vehicle.
 #[test]
 fn a_tracker_stands_in_for_a_dead_sensor() {
     use Left::{Frozen, Late, Nothing, Poses, Positions, States, Unsure};
@@ -258,13 +258,13 @@ fn a_tracker_stands_in_for_a_dead_sensor() {
         assert_eq!(modes.last() == Some(&Mode::Flying), flies, "{left:?}: {:?}, {texts:?}", modes.last());
         assert_eq!(last.health.observed, left == Poses, "{left:?}");
         let reported = texts.iter().filter(|text| text.contains("inertial sensor failed")).count();
-        // That a tracker is frozen shows only after a moment.
+        // A frozen tracker is recognised only after a moment.
         assert_eq!(reported, usize::from(matches!(left, Poses | Frozen)), "{left:?}: {texts:?}");
         if left == Poses {
-            // Not even a moment without a state; the guidance tells of the sensor, too.
+            // The vehicle is never without a state. The guidance announces the sensor fault too.
             let others = texts.iter().filter(|text| !text.contains("inertial sensor failed"));
             assert_eq!(others.collect::<Vec<_>>(), ["sensor fault"]);
-            // The telemetry has what is observed.
+            // Telemetry shows the observed state.
             let seen = last.estimate.expect("observed");
             assert!((seen.position_m - PLACE_M).amax() < 1e-3 && seen.velocity_m_s.amax() < 0.02, "{seen:?}");
             assert!((seen.attitude_rad - Vector3::new(0.0, 0.0, YAW_RAD)).amax() < 0.01, "{seen:?}");
@@ -272,7 +272,7 @@ fn a_tracker_stands_in_for_a_dead_sensor() {
     }
 }
 
-/// A sensor that comes back is believed again, and so is a tracker.
+/// If the IMU works again it is used again, and so is the tracker.
 #[test]
 fn the_sensor_comes_back() {
     let (mut bench, place) = (Bench::new(), state(0.0));

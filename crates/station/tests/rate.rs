@@ -1,4 +1,4 @@
-//! Wrong rate or timing of the control tick, and a failing clock: the pilot is told once, and arming is refused.
+//! Wrong rate or timing of the control tick, or a failing clock: the pilot is told once, and arming is refused.
 
 use afbc_flight_core::{Mode, Refusal};
 use afbc_link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
@@ -8,7 +8,7 @@ use afbc_types::{PoseSigmas, Setpoint, State};
 
 const STATION: Address = Address { system: 255, component: 190 };
 
-/// The firmware with ticks of any period, with states at rest and a setpoint.
+/// The firmware with ticks of any period, a vehicle at rest and a setpoint.
 struct Bench {
     flight: Flight,
     comms: Comms,
@@ -18,7 +18,7 @@ struct Bench {
     decoder: Decoder<Downlink>,
     now_us: u64,
     mode: Mode,
-    /// Texts sent.
+    /// Texts sent so far.
     texts: Vec<String>,
     answers: Vec<Answer>,
 }
@@ -48,7 +48,7 @@ impl Bench {
     fn run(&mut self, ticks: u32, period_us: u64) {
         for _ in 0..ticks {
             self.now_us += period_us;
-            // Never twice the same, like measurements.
+            // States differ in each tick, like measurements.
             let mut state = State::default();
             state.position_m.z = 1e-6 * (self.now_us % 11) as f32;
             self.hear(Uplink::State { sent_us: self.now_us, state, sigmas: PoseSigmas::UNKNOWN });
@@ -66,7 +66,7 @@ impl Bench {
         }
     }
 
-    /// Returns the answer to a request to arm.
+    /// Returns the answer to an arm command.
     fn arm(&mut self) -> Answer {
         self.answers.clear();
         self.hear(Uplink::Command(Command::Arm));
@@ -83,7 +83,7 @@ fn wrong_tick_timing_is_reported_and_does_not_end_the_flight() {
     bench.run(500, 1000);
     assert_eq!(bench.texts, [""; 0]);
 
-    // A missing tick, then a second in which every tick is 5 % late.
+    // One tick is missing, and then every tick is 5 % late for two seconds.
     bench.run(1, 2000);
     assert_eq!(bench.texts, [TICK_OFF]);
     bench.run(2000, 1050);

@@ -1,5 +1,5 @@
-//! A pilot's receiver beside the stations, from its bytes to requests, orders and texts; and a station's channels in
-//! place of a receiver's.
+//! The pilot's radio receiver, from its bytes to requests, orders and texts, and RC_CHANNELS_OVERRIDE in place of a
+//! receiver.
 
 use crate::common::Bench;
 use afbc_flight_core::{Mode, Refusal, Request};
@@ -15,18 +15,18 @@ use afbc_station::{AuxSensors, RadioControl};
 
 const WARNING: MavSeverity = MavSeverity::MAV_SEVERITY_WARNING;
 const INFO: MavSeverity = MavSeverity::MAV_SEVERITY_INFO;
-/// Places of channels.
+/// Indices of channels.
 const ROLL: usize = 0;
 const THROTTLE: usize = 2;
 const ARM: usize = 4;
 const MODE: usize = 5;
-/// Sticks in their centres, switches off.
+/// Channels with centred sticks and all switches off.
 const REST: [u16; 16] =
     [1500, 1500, 1500, 1500, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000];
-/// Frames that a receiver must have sent in a row before it is believed.
+/// Number of frames in a row after which a receiver is used.
 const FRAMES: usize = 10;
 
-/// A vehicle with a receiver.
+/// A vehicle with a radio receiver.
 struct Vehicle {
     bench: Bench,
     radio: RadioControl,
@@ -64,16 +64,16 @@ impl Vehicle {
         Vehicle { bench, radio, settings, idle, mode, flight_mode, texts: Vec::new() }
     }
 
-    /// Of which the pilot is heard.
+    /// Returns a vehicle whose receiver hears a pilot.
     fn heard(protocol: RadioProtocol) -> Self {
         let mut vehicle = Vehicle::new(protocol);
-        // The switches' positions are known after two frames more.
+        // The positions of the switches are known two frames later.
         vehicle.send(FRAMES + 2, REST);
         assert_eq!(std::mem::take(&mut vehicle.texts), [(INFO, "radio: heard".to_owned())]);
         vehicle
     }
 
-    /// Runs a tick with bytes of the receiver; returns its messages and the new inputs.
+    /// Runs a tick with bytes of the receiver. Returns the vehicle's messages and the new inputs.
     fn tick(&mut self, bytes: &[u8]) -> (Vec<Downlink>, Option<ControlInputs>) {
         self.bench.now_us += 1000;
         let mut report = Report { time_us: self.bench.now_us, mode: self.mode, ..self.idle };
@@ -86,18 +86,18 @@ impl Vehicle {
         (said, self.bench.comms.pilot(&mut self.radio, bytes, &self.settings))
     }
 
-    /// Runs ticks without bytes; returns what they bring for the control tick.
+    /// Runs ticks without bytes. Returns the new inputs for the control tick.
     fn pass(&mut self, ticks: usize) -> Vec<ControlInputs> {
         (0..ticks).filter_map(|_| self.tick(&[]).1).collect()
     }
 
-    /// Takes a frame of the receiver, and four ticks.
+    /// Receives a frame of the receiver in four ticks.
     fn frame(&mut self, bytes: &[u8]) -> Vec<ControlInputs> {
         let first = self.tick(bytes).1;
         first.into_iter().chain(self.pass(3)).collect()
     }
 
-    /// Takes as many frames with these channels.
+    /// Receives frames with these channels.
     fn send(&mut self, frames: usize, us: [u16; 16]) -> Vec<ControlInputs> {
         let bytes = match self.settings.receiver.protocol {
             RadioProtocol::Crsf => crsf(us),
@@ -106,13 +106,13 @@ impl Vehicle {
         (0..frames).flat_map(|_| self.frame(&bytes)).collect()
     }
 
-    /// Takes a station's channels, and four ticks.
+    /// Receives RC_CHANNELS_OVERRIDE of a station in four ticks.
     fn relay(&mut self, us: [u16; CHANNELS]) -> Vec<ControlInputs> {
         self.bench.hear(Uplink::Target(ExternalTarget::Channels(ChannelsOverride::new(us))));
         self.pass(4)
     }
 
-    /// Returns RC_CHANNELS, if it is sent on request.
+    /// Requests RC_CHANNELS. Returns the channels and the RSSI, if the message is sent.
     fn channels(&mut self) -> Option<([u16; CHANNELS], u8)> {
         self.bench.hear(Uplink::Command(Command::RequestMessage { message: id::RC_CHANNELS, index: 0 }));
         (0..2).flat_map(|_| self.tick(&[]).0).find_map(|message| match message {
@@ -146,8 +146,8 @@ fn sticks(inputs: &[ControlInputs]) -> Vec<Sticks> {
     inputs.iter().filter_map(|inputs| inputs.orders.sticks).map(|sticks| sticks.value).collect()
 }
 
-/// A receiver is believed from its tenth frame in a row on, once; its pilot is lost when no frame has come for half a
-/// second, and both are said.
+/// A receiver is used from its tenth frame in a row on. The pilot is lost after half a second without a frame. Both are
+/// announced once.
 #[test]
 fn a_pilot_is_heard_and_lost() {
     for protocol in [RadioProtocol::Crsf, RadioProtocol::Sbus] {
@@ -158,21 +158,21 @@ fn a_pilot_is_heard_and_lost() {
         assert_eq!((inputs.len(), sticks(&inputs).len()), (1, 1), "in the frame's tick");
         assert_eq!(sticks(&vehicle.send(20, REST)).len(), 20, "the sticks of each frame");
         assert_eq!(vehicle.texts, [(INFO, "radio: heard".to_owned())]);
-        // Four ticks ago there was a frame.
+        // The last frame came four ticks ago.
         assert!(vehicle.pass(490).is_empty());
         assert!(vehicle.is_heard());
         vehicle.pass(30);
         assert_eq!(vehicle.texts[1..], [(WARNING, "radio: lost".to_owned())]);
         assert!(!vehicle.is_heard());
-        // What is left of the pilot is nothing: half a second passes until the sticks count again.
+        // The loss resets everything: sticks count again only after half a second.
         assert!(sticks(&vehicle.send(100, REST)).is_empty());
         assert!(!sticks(&vehicle.send(100, REST)).is_empty());
         assert_eq!((vehicle.said("radio: heard"), vehicle.said("radio: lost")), (2, 1));
     }
 }
 
-/// What is no frame, and what the receiver has marked as lost, begins the count anew, and is nothing to a pilot who is
-/// heard; a receiver that has given up loses the pilot at once.
+/// Damaged frames and frames marked as lost restart the count, but do not end a link that is in use. A receiver's
+/// failsafe ends it at once.
 #[test]
 fn bad_frames_begin_the_count_anew() {
     let mut damaged = crsf(REST);
@@ -182,12 +182,12 @@ fn bad_frames_begin_the_count_anew() {
         (RadioProtocol::Sbus, sbus(REST, true, false)),
         (RadioProtocol::Sbus, sbus(REST, false, true)),
         (RadioProtocol::Sbus, sbus(REST, true, true)),
-        // The end of a frame is missing: the next one begins after a pause.
+        // The end of a frame is missing. The next frame begins after a pause.
         (RadioProtocol::Sbus, sbus(REST, false, false)[..20].to_vec()),
     ];
     for (case, (protocol, bytes)) in bad.into_iter().enumerate() {
         let mut vehicle = Vehicle::new(protocol);
-        // A frame whose end is missing is found out with the next one, which has been counted by then.
+        // A truncated frame is noticed only with the next frame, which has been counted by then.
         vehicle.send(FRAMES - 2, REST);
         vehicle.frame(&bytes);
         vehicle.send(FRAMES - 1, REST);
@@ -203,7 +203,7 @@ fn bad_frames_begin_the_count_anew() {
     }
 }
 
-/// The arming switch asks for what it is moved to, on the pilot's behalf, and orders the mode of the switches.
+/// The arming switch requests the state that it is moved to, for the pilot, and orders the mode of the mode switch.
 #[test]
 fn the_arming_switch_arms_and_disarms() {
     let mut vehicle = Vehicle::heard(RadioProtocol::Crsf);
@@ -214,15 +214,15 @@ fn the_arming_switch_arms_and_disarms() {
     assert_eq!(requests(&vehicle.send(5, with(&[(ARM, 2000)]))), []);
     let inputs = vehicle.send(5, with(&[]));
     assert_eq!((requests(&inputs), orders(&inputs)), (vec![(254, Request::Disarm)], vec![]));
-    // Of the reasons not to ask, the pilot is told.
+    // The pilot is told why no request is made.
     vehicle.mode = Mode::Disarmed;
     vehicle.send(5, REST);
     assert_eq!(requests(&vehicle.send(5, with(&[(ARM, 2000), (THROTTLE, 1800)]))), []);
     assert_eq!(vehicle.texts, [(WARNING, "radio: not armed, lower the throttle".to_owned())]);
 }
 
-/// With a faulty sensor there is no request, and with switches that select a mode that lands there is nothing at all;
-/// both are said. A flying vehicle takes the same orders.
+/// A faulty sensor prevents the arm request. With the mode switch at Land or Return, there is no order either. Both
+/// refusals are announced. A flying vehicle accepts the same inputs.
 #[test]
 fn arming_is_refused_beside_the_flight_core() {
     let faulty = SensorBits { present: sensor::GYROSCOPE_2, healthy: 0 };
@@ -231,7 +231,7 @@ fn arming_is_refused_beside_the_flight_core() {
     let inputs = vehicle.send(5, with(&[(ARM, 2000)]));
     assert_eq!((requests(&inputs), orders(&inputs).len()), (vec![], 1));
     assert_eq!(vehicle.texts, [(WARNING, "arming refused: IMU 2 is faulty".to_owned())]);
-    // What is faulty stops nobody from disarming.
+    // A faulty sensor does not prevent disarming.
     vehicle.mode = Mode::Flying;
     assert_eq!(requests(&vehicle.send(5, REST)), [(254, Request::Disarm)]);
     assert_eq!(vehicle.texts.len(), 1);
@@ -251,7 +251,7 @@ fn arming_is_refused_beside_the_flight_core() {
     }
 }
 
-/// The kill switch goes on asking for what it is for, as long as the vehicle is armed.
+/// The kill switch repeats its request while the vehicle is armed.
 #[test]
 fn the_kill_switch_kills() {
     let mut vehicle = Vehicle::heard(RadioProtocol::Crsf);
@@ -263,8 +263,8 @@ fn the_kill_switch_kills() {
     assert_eq!(requests, [(254, Request::Kill); 3]);
 }
 
-/// Sticks are shaped for the mode that flies, and stamped with their tick; no station's joystick counts beside them,
-/// until they have been silent for half a second.
+/// Sticks are shaped for the flight mode and stamped with the time of their tick. A station's joystick is ignored until
+/// the pilot's sticks have been silent for half a second.
 #[test]
 fn sticks_are_shaped_and_go_first() {
     for flight_mode in FlightMode::ALL {
@@ -291,15 +291,15 @@ fn sticks_are_shaped_and_go_first() {
     assert!(!counts(&mut vehicle));
     vehicle.pass(20);
     assert!(counts(&mut vehicle));
-    // Sticks that do not count are not in its way.
+    // Sticks that are not in use do not suppress the joystick.
     let mut vehicle = Vehicle::new(RadioProtocol::Crsf);
     vehicle.settings.receiver.source = 1;
     assert!(vehicle.send(2 * FRAMES, REST).is_empty());
     assert!(vehicle.is_heard() && counts(&mut vehicle));
 }
 
-/// RC_CHANNELS has the receiver's channels, and how well it hears: of 254, what the transmitter's packets make of it;
-/// SBUS does not say.
+/// RC_CHANNELS has the receiver's channels and an RSSI. With CRSF the RSSI is the link quality, scaled to 254; SBUS has
+/// none.
 #[test]
 fn stations_see_the_channels() {
     for (quality_percent, rssi) in [(0, 0), (50, 127), (99, 251), (100, 254), (255, 254)] {
@@ -316,8 +316,7 @@ fn stations_see_the_channels() {
     assert_eq!(vehicle.channels(), None);
 }
 
-/// While no receiver is heard, a station's channels are read as its would be; that they are there is no news to it,
-/// that they are lost is.
+/// Without a receiver, a station's channels are used in its place. Their loss is announced, their arrival is not.
 #[test]
 fn channels_of_a_station_take_the_place_of_a_receivers() {
     let mut vehicle = Vehicle::new(RadioProtocol::Crsf);
@@ -334,7 +333,7 @@ fn channels_of_a_station_take_the_place_of_a_receivers() {
     assert_eq!(vehicle.texts, [(WARNING, "radio: lost".to_owned())]);
     assert!(!vehicle.is_heard());
 
-    // Given back, all of them: lost at once.
+    // If the station releases all channels, they are lost at once.
     let mut vehicle = Vehicle::new(RadioProtocol::Crsf);
     (0..FRAMES).for_each(|_| drop(vehicle.relay(padded(REST))));
     assert!(vehicle.is_heard());
@@ -343,12 +342,12 @@ fn channels_of_a_station_take_the_place_of_a_receivers() {
     assert_eq!(vehicle.texts, [(WARNING, "radio: lost".to_owned())]);
 }
 
-/// A channel that the station leaves alone stays for half a second, and is then not there; messages that leave all
-/// alone refresh nothing.
+/// A channel that the station does not set keeps its value for half a second and is then lost. A message that sets no
+/// channel refreshes none.
 #[test]
 fn a_channel_that_is_left_alone_is_lost_as_a_stick_is() {
     let mut vehicle = Vehicle::new(RadioProtocol::Crsf);
-    // The time in 32 bits of milliseconds wraps meanwhile.
+    // The 32-bit time in milliseconds wraps during this test.
     vehicle.bench.now_us = (u64::from(u32::MAX) + 1) * 1000 - 200_000;
     (0..FRAMES).for_each(|_| drop(vehicle.relay(padded(with(&[(ROLL, 1600)])))));
     let mut some = padded(REST);
@@ -366,7 +365,7 @@ fn a_channel_that_is_left_alone_is_lost_as_a_stick_is() {
     assert_eq!((vehicle.is_heard(), vehicle.said("radio: lost")), (false, 1));
 }
 
-/// A receiver that hears its pilot ends a station's channels, which begin anew after it.
+/// A receiver that hears its pilot ends a station's channels. They start afresh when the receiver loses its pilot.
 #[test]
 fn a_receiver_goes_first() {
     let mut vehicle = Vehicle::new(RadioProtocol::Crsf);

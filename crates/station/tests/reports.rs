@@ -1,11 +1,11 @@
-//! What the vehicle reports of itself, at its pace.
+//! The vehicle's periodic reports.
 
 use crate::common::{Bench, STATION};
 use afbc_link::{Command, Decoder, Downlink, FRAME_MAX, Sender, Telemetry, Uplink};
 use afbc_onboard::{Readings, Report};
 use afbc_station::services::streams::id;
 
-/// HEARTBEAT comes once per second, also over many seconds.
+/// HEARTBEAT is sent once per second over many seconds.
 #[test]
 fn heartbeats_come_once_per_second() {
     let mut bench = Bench::new();
@@ -15,7 +15,7 @@ fn heartbeats_come_once_per_second() {
     assert_eq!(beats, [3, 1003, 2003, 3003]);
 }
 
-/// DEBUG_FLOAT_ARRAY "health" has what the tick took at most, what was dropped, and what was not answered.
+/// DEBUG_FLOAT_ARRAY "health" has the longest tick, the dropped frames and the unanswered commands.
 #[test]
 fn health_reports_counts_and_times() {
     let mut bench = Bench::new();
@@ -39,7 +39,7 @@ fn health_reports_counts_and_times() {
     assert_eq!((first.tick_us, first.tick_max_us, bench.comms.bad_frames()), (1000.0, 1000.0, 0));
     let second = health(&mut bench, 100.0);
     assert_eq!((second.tick_us, second.tick_max_us), (100.0, 1000.0));
-    // A frame that is damaged, and one of an unknown message.
+    // The first frame is damaged; the zeros that follow are no frame.
     let mut frame = [0; FRAME_MAX];
     let mut bytes = Sender::new(STATION).send(&Uplink::Heartbeat, &mut frame).to_vec();
     bytes[12] ^= 1;

@@ -1,5 +1,5 @@
-//! Every message of MAVLink's common dialect that expects an answer gets one, on a full and narrow line too, and no
-//! other one does.
+//! Every message of MAVLink's common dialect that expects an answer gets one, even on a full and slow line. No other
+//! message is answered.
 
 use crate::common;
 use crate::dialect::{Expected, expected};
@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 
 const OTHER: Address = Address { system: 245, component: 191 };
 const VEHICLE: Address = Address { system: 1, component: 1 };
-/// Time within which an answer leaves \[ticks\].
+/// Longest time until an answer is sent \[ticks\].
 const WITHIN: usize = 250;
 
 /// A message as it is sent.
@@ -26,7 +26,7 @@ struct Sample {
     payload: Vec<u8>,
 }
 
-/// A message with these bytes of extension fields.
+/// Builds a message with these bytes of extension fields.
 fn extended<D: MessageData>(data: &D, extension: &[u8]) -> Sample {
     let mut payload = vec![0; 255];
     data.ser(MavlinkVersion::V2, &mut payload);
@@ -35,15 +35,15 @@ fn extended<D: MessageData>(data: &D, extension: &[u8]) -> Sample {
     Sample { id: D::ID, payload }
 }
 
-/// A message with the vehicle in these bytes.
+/// Builds a message to the vehicle, with the target at this offset.
 fn at<D: MessageData>(data: &D, system: usize, extension: &[u8]) -> Sample {
     let mut sample = extended(data, extension);
     sample.payload[system..system + 2].copy_from_slice(&[VEHICLE.system, VEHICLE.component]);
     sample
 }
 
-/// The requests of the dialect, each in its varieties, to the vehicle by its address. The offsets are those of the
-/// target in MAVLink's order of fields.
+/// Returns the requests of the dialect in all varieties, addressed to the vehicle. The offsets of the targets follow
+/// MAVLink's field order.
 fn requests() -> Vec<Sample> {
     let name = |text: &str| {
         let mut bytes = [0; 16];
@@ -78,7 +78,7 @@ fn requests() -> Vec<Sample> {
         let data = CHANGE_OPERATOR_CONTROL_DATA { target_system: 1, control_request: control, ..Default::default() };
         samples.push(extended(&data, &[]));
     }
-    // Known and unknown, by name and by place.
+    // Parameters that exist and that do not, by name and by index.
     for (place, text) in [(-1, "V_MASS"), (-1, "NO_SUCH_NAME"), (0, ""), (9_999, ""), (-7, ""), (i16::MAX, "V_MASS")] {
         let param_id = name(text).into();
         samples.push(at(&PARAM_REQUEST_READ_DATA { param_index: place, param_id, ..Default::default() }, 2, &[]));
@@ -89,7 +89,7 @@ fn requests() -> Vec<Sample> {
         samples.push(at(&PARAM_SET_DATA { param_value: value, param_id, ..Default::default() }, 4, &[]));
         samples.push(at(&PARAM_EXT_SET_DATA { param_id, ..Default::default() }, 0, &[]));
     }
-    // Missions, fences, rally points, all of them, and what there is not.
+    // Missions, fences, rally points, all of them, and an unknown type of plan.
     for plan in [0, 1, 2, 255, 99] {
         for count in [0, 1, 65] {
             samples.push(at(&MISSION_COUNT_DATA { count, ..Default::default() }, 2, &[plan]));
@@ -109,7 +109,7 @@ fn requests() -> Vec<Sample> {
         sample.payload[4] = group;
         samples.push(sample);
     }
-    // Of the vehicle, of a camera, of a gimbal; and of nobody.
+    // Commands for vehicles, cameras and gimbals, and unknown ones.
     for command in [20_u16, 176, 246, 400, 401, 510, 511, 512, 521, 527, 1000, 2000, 2500, 31_010, 60_000] {
         for mut sample in [at(&COMMAND_LONG_DATA::DEFAULT, 30, &[]), at(&COMMAND_INT_DATA::DEFAULT, 30, &[])] {
             sample.payload[28..30].copy_from_slice(&command.to_le_bytes());
@@ -122,7 +122,7 @@ fn requests() -> Vec<Sample> {
     samples
 }
 
-/// A request of the file protocol.
+/// Builds a request of MAVLink FTP.
 fn file(sequence: u16, session: u8, operation: u8) -> Sample {
     let mut sample = at(&FILE_TRANSFER_PROTOCOL_DATA::DEFAULT, 1, &[]);
     sample.payload[3..5].copy_from_slice(&sequence.to_le_bytes());
@@ -148,12 +148,12 @@ fn frame(from: Address, sample: &Sample) -> Vec<u8> {
     frame
 }
 
-/// Returns the receiver that a message from the vehicle names, by MAVLink's order of fields; none if it has no such
-/// field.
+/// Returns the target of a vehicle's message, at its offset in MAVLink's field order. Returns none if the message has
+/// no target.
 fn receiver(sample: &Sample) -> Option<Address> {
     let byte = |at: usize| sample.payload.get(at).copied().unwrap_or(0);
     let at = match sample.id {
-        // Of the station's component nothing is said.
+        // The message does not name the station's component.
         6 => return Some(Address { system: byte(0), component: 0 }),
         4 => 12,
         77 => 8,
@@ -169,8 +169,8 @@ fn receiver(sample: &Sample) -> Option<Address> {
     Some(Address { system: byte(at), component: byte(at + 1) })
 }
 
-/// A vehicle at rest that knows where it is, on a line of so many baud, which is full: every stream but the answers
-/// among them is asked for each millisecond.
+/// Returns a vehicle at rest that knows its position, on a full line of `baud`. Every stream is requested each
+/// millisecond, except those that serve as answers.
 fn on(baud: u32) -> Bench {
     let mut bench = Bench::new();
     bench.table =
@@ -190,7 +190,7 @@ fn on(baud: u32) -> Bench {
     bench
 }
 
-/// Runs a tick; returns what was sent.
+/// Runs a tick. Returns the messages sent.
 fn step(bench: &mut Bench) -> Vec<Sample> {
     if bench.now_us.is_multiple_of(10_000) {
         bench.measure(&State::default());
@@ -211,8 +211,8 @@ fn step(bench: &mut Bench) -> Vec<Sample> {
     sent
 }
 
-/// Returns the answers to the same request of these stations, in the ticks after it, until each has one; as many as
-/// there are if they do not come.
+/// Sends the same request from these stations and runs ticks until each has an answer. Returns the answers. Panics if
+/// an answer is missing.
 fn ask(bench: &mut Bench, stations: &[Address], sample: &Sample, answers: &[u32]) -> Vec<Sample> {
     for station in stations {
         bench.hear_bytes(&frame(*station, sample));
@@ -257,7 +257,7 @@ fn every_request_of_the_dialect_is_answered() {
     }
 }
 
-/// Else two vehicles would answer one another for ever.
+/// If other messages were answered, two vehicles would answer each other for ever.
 #[test]
 fn nothing_else_is_answered() {
     let quiet = |bench: &mut Bench, sample: &Sample| {
@@ -276,7 +276,7 @@ fn nothing_else_is_answered() {
             quiet(&mut bench, &Sample { id: *id, payload });
         }
     }
-    // Answers of the same message, and a shell that wants no response.
+    // These messages are answers themselves, or a SERIAL_CONTROL that wants no response.
     for operation in [128, 129, 255] {
         quiet(&mut bench, &file(9, 3, operation));
     }
@@ -285,7 +285,7 @@ fn nothing_else_is_answered() {
     for flags in [SerialControlFlag::empty(), SerialControlFlag::SERIAL_CONTROL_FLAG_REPLY] {
         quiet(&mut bench, &extended(&SERIAL_CONTROL_DATA { flags, ..SERIAL_CONTROL_DATA::DEFAULT }, &[1, 1]));
     }
-    // And requests to somebody else.
+    // Requests to another system are not answered.
     for mut sample in requests() {
         let to = match sample.id {
             110 => 1,
@@ -300,7 +300,7 @@ fn nothing_else_is_answered() {
     }
 }
 
-/// Whoever asks for logs is told that there are none, of data that it ends.
+/// The answer to a list request says that there are no logs. The answer to a data request says that the data end.
 #[test]
 fn there_are_no_logs() {
     let mut bench = on(921_600);
@@ -314,7 +314,7 @@ fn there_are_no_logs() {
     assert_eq!(none, MavMessage::LOG_DATA(LOG_DATA_DATA { ofs: 90, id: 5, ..LOG_DATA_DATA::DEFAULT }));
 }
 
-/// Every operation is refused with the next number, for the same session, with an error.
+/// Every operation is refused with the next sequence number, the same session and an error.
 #[test]
 fn every_file_operation_is_refused() {
     let mut bench = on(921_600);
@@ -324,14 +324,14 @@ fn every_file_operation_is_refused() {
             assert_eq!(reported.len(), 1);
             let payload = &reported[0].payload;
             assert_eq!(u16::from_le_bytes([payload[3], payload[4]]), next);
-            // Session, NAK, one byte of data, which operation; UnknownCommand.
+            // Session, NAK, one byte of data, operation; the data byte is UnknownCommand.
             assert_eq!(payload[5..9], [operation, 129, 1, operation]);
             assert_eq!(payload[15], 7);
         }
     }
 }
 
-/// A name that there is not is an error that names it.
+/// The error for a missing parameter names the parameter.
 #[test]
 fn what_there_is_not_is_named() {
     let mut bench = on(921_600);
@@ -345,7 +345,7 @@ fn what_there_is_not_is_named() {
         let mut payload = reported[0].payload.clone();
         payload.resize(21, 0);
         assert_eq!((reported[0].id, &payload[..2]), (345, index.to_le_bytes().as_slice()));
-        // Does not exist.
+        // Error 1: the parameter does not exist.
         assert_eq!((&payload[4..20], payload[20]), (name.as_slice(), 1));
     }
     let read =
@@ -360,7 +360,7 @@ fn what_there_is_not_is_named() {
     assert_eq!((&reported[0].payload[..16], reported[0].payload[145]), (name.as_slice(), 1));
 }
 
-/// MAV_CMD_REQUEST_MESSAGE of any message of the dialect: it is sent, or refused.
+/// MAV_CMD_REQUEST_MESSAGE is answered for every message of the dialect: the message is sent, or refused.
 #[test]
 fn any_message_can_be_requested() {
     for message in MavMessage::all_ids() {
@@ -374,7 +374,7 @@ fn any_message_can_be_requested() {
     }
 }
 
-/// An upload by the messages of old, with numbers for places.
+/// A mission is uploaded with MISSION_ITEM, which has floating-point places.
 #[test]
 fn a_mission_is_uploaded_by_messages_of_old() {
     let mut bench = on(921_600);

@@ -1,4 +1,4 @@
-//! Parameters over the link: who may set them, when, and what everyone hears of it.
+//! Parameters over the link: who may set them, when, and what all stations are told.
 
 use crate::common::Bench;
 use afbc_link::{Address, Answer, Command, Downlink, ParameterName, ParameterRequest, ParameterValue, Storage, Uplink};
@@ -22,7 +22,7 @@ fn set(name: &str, value: f32) -> Uplink {
     Uplink::Parameter(ParameterRequest::Set { name: padded(name), value: value.to_le_bytes(), kind: 9 })
 }
 
-/// What is heard in so many ticks.
+/// Messages received during a number of ticks.
 #[derive(Default)]
 struct Heard {
     values: Vec<ParameterValue>,
@@ -46,13 +46,13 @@ fn listen(bench: &mut Bench, ticks: usize) -> Heard {
     heard
 }
 
-/// The value of the last PARAM_VALUE of `name`.
+/// Returns the value of the last PARAM_VALUE of `name`.
 fn reported(heard: &Heard, name: &str) -> Option<f32> {
     let value = heard.values.iter().rev().find(|value| value.name == padded(name))?;
     Some(f32::from_le_bytes(value.value))
 }
 
-/// The height at which it takes off is what was set, in the guidance too.
+/// Returns the take-off height that the guidance uses.
 fn height(bench: &Bench) -> f32 {
     bench.table.configuration().guidance.flying.takeoff_height_m
 }
@@ -65,16 +65,16 @@ fn the_station_in_control_sets_and_everyone_hears_it() {
     assert_eq!(reported(&heard, HEIGHT), Some(4.0));
     assert_eq!((height(&bench), bench.changes.len(), heard.texts.len()), (4.0, 1, 0), "{:?}", heard.texts);
     assert!(matches!(bench.changes[..], [RecordChange::Set(_, Some(4.0))]));
-    // Another one is told who is in control, and the value that has not changed.
+    // Another station is told who is in control, and gets the unchanged value.
     bench.hear_from(SECOND, set(HEIGHT, 7.0));
     let heard = listen(&mut bench, 20);
     assert_eq!((reported(&heard, HEIGHT), height(&bench), bench.changes.len()), (Some(4.0), 4.0, 1));
     assert_eq!(heard.texts, ["245/190 ignored: 255/190 is in control"]);
-    // The same value once more: it is kept if it was not.
+    // Setting the same value again is a change too, in case the value was not stored.
     bench.hear(set(HEIGHT, 4.0));
     listen(&mut bench, 20);
     assert_eq!((bench.changes[1], bench.changes.len()), (bench.changes[0], 2));
-    // The other one may read.
+    // Another station may read.
     bench.hear_from(SECOND, Uplink::Parameter(ParameterRequest::ReadName(padded("V_MASS"))));
     assert_eq!(
         reported(&listen(&mut bench, 20), "V_MASS"),
@@ -127,11 +127,11 @@ fn defaults_are_restored_by_command() {
     let heard = listen(&mut bench, 2000);
     assert_eq!((bench.changes.last(), heard.answers), (Some(&RecordChange::Restored), vec![Answer::Accepted]));
     assert_eq!(bench.table, before);
-    // The list follows, for every station.
+    // A list of all parameters follows, for every station.
     assert_eq!(heard.values.len(), usize::from(before.count()));
 }
 
-/// A list on a line of 57,600 baud and on a fast one: complete, and within its share.
+/// A list is complete and keeps within its share of the link, at 57,600 baud and faster.
 #[test]
 fn a_list_leaves_the_link_to_others() {
     for bytes_per_s in [5_000, 46_000, 100_000] {
@@ -156,7 +156,7 @@ fn a_list_leaves_the_link_to_others() {
     }
 }
 
-/// The silence after which another station may take control is that of the table.
+/// COM_DL_LOSS_T is the silence after which another station may take control.
 #[test]
 fn a_silent_station_loses_control_after_the_time_that_is_set() {
     let mut bench = Bench::new();
@@ -170,7 +170,7 @@ fn a_silent_station_loses_control_after_the_time_that_is_set() {
     assert_eq!((bench.changes.len(), height(&bench)), (2, 4.0));
 }
 
-/// On a fast link whose streams take all that they get of a tick, values have what these leave.
+/// On a fast link with full streams, parameter values use the bytes that the streams leave in each tick.
 #[test]
 fn values_are_sent_beside_full_streams() {
     let mut bench = Bench::new();

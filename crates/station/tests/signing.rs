@@ -1,4 +1,4 @@
-//! With a key: what is heard, what is sent, and what is known after a start.
+//! Message signing with a key: accepted frames, sent frames, and the state after a restart.
 
 use crate::common::{Bench, STATION};
 use afbc_link::{
@@ -19,7 +19,7 @@ const HOUR_10US: u64 = 60 * MINUTE_10US;
 
 type Records = BTreeMap<String, u32>;
 
-/// A vehicle and a station that signs.
+/// A vehicle with a key and a station that signs.
 struct Locked {
     bench: Bench,
     records: Records,
@@ -28,7 +28,7 @@ struct Locked {
 }
 
 impl Locked {
-    /// With a key that has been set over a wire and kept.
+    /// Creates a vehicle with a key that was set over a wire and stored.
     fn new() -> Self {
         let mut locked = Locked {
             bench: Bench::new(),
@@ -43,7 +43,7 @@ impl Locked {
         locked
     }
 
-    /// Sends a key, unsigned.
+    /// Sends SETUP_SIGNING, unsigned.
     fn set(&mut self, key: Option<Key>, wired: bool) {
         let setup = SetupSigning { key, time_10us: self.time_10us };
         let frame = self.sender.send(&Uplink::Signing(setup), &mut [0; FRAME_MAX]).to_vec();
@@ -54,7 +54,7 @@ impl Locked {
         self.bench.comms.exchange(&mut decoder);
     }
 
-    /// Keeps what is to be kept in so many ticks.
+    /// Stores the records of this many ticks.
     fn keep(&mut self, ticks: usize) {
         for _ in 0..ticks {
             self.bench.step();
@@ -66,7 +66,7 @@ impl Locked {
         }
     }
 
-    /// Starts again with what is kept.
+    /// Restarts the vehicle with the stored records.
     fn restart(&mut self) {
         self.bench = Bench::new();
         let records = &self.records;
@@ -80,19 +80,19 @@ impl Locked {
         self.sender.send_signed(message, Some((key, stamp)), &mut [0; SIGNED_FRAME_MAX]).to_vec()
     }
 
-    /// True if the vehicle answers a command in these bytes.
+    /// Returns true if the vehicle answers a command in these bytes.
     fn hears(&mut self, bytes: &[u8]) -> bool {
         self.bench.hear_bytes(bytes);
         answers(&mut self.bench) > 0
     }
 }
 
-/// Returns the number of answers to commands in the next ticks, whether signed or not.
+/// Returns the number of answers to commands in the next ticks, signed or not.
 fn answers(bench: &mut Bench) -> usize {
     (0..5).map(|_| frames(bench).1.iter().filter(|it| matches!(it, Downlink::Answer { .. })).count()).sum()
 }
 
-/// Runs a tick; returns the frames sent, and the messages in them.
+/// Runs a tick. Returns the frames sent and the messages in them.
 fn frames(bench: &mut Bench) -> (Vec<Vec<u8>>, Vec<Downlink>) {
     bench.now_us += 1000;
     bench.inputs.take_into(&mut bench.taken);
@@ -104,7 +104,7 @@ fn frames(bench: &mut Bench) -> (Vec<Vec<u8>>, Vec<Downlink>) {
     (frames, messages)
 }
 
-/// A command that is answered at once, whatever the vehicle does.
+/// Returns a command that is answered at once in any state.
 fn command() -> Uplink {
     Uplink::Command(Command::Other(31_999))
 }
@@ -123,7 +123,7 @@ fn only_what_is_signed_and_new_is_heard() {
     let latest = locked.signed(&command(), &KEY);
     assert!(locked.hears(&latest));
     assert!(!locked.hears(&later), "in the wrong order");
-    // Captured long ago, from a sender that has not been heard since the start.
+    // This frame was captured long ago, from a sender that has not been heard since the restart.
     let stamp = Stamp { link: 9, time_10us: TODAY_10US - 2 * MINUTE_10US };
     let old = Sender::new(Address { system: 7, component: 7 })
         .send_signed(&command(), Some((&KEY, stamp)), &mut [0; SIGNED_FRAME_MAX])
@@ -131,7 +131,7 @@ fn only_what_is_signed_and_new_is_heard() {
     assert!(!locked.hears(&old));
 }
 
-/// Of a key that is not taken everyone is told; of one that is, and of frames that are not signed, nobody is told that.
+/// The refusal of a key is announced to all stations. Accepted keys and unsigned frames cause no such text.
 #[test]
 fn a_key_that_is_refused_is_told_of() {
     const REFUSED: &str = "signing key refused: over a wire or signed only";
@@ -189,7 +189,7 @@ fn all_that_is_sent_is_signed_with_growing_times() {
             Decoder::new(STATION).feed_accepted(&frame, accept, |_, _: Downlink| count += 1);
         }
     }
-    // Three seconds of telemetry, on the station's clock.
+    // All frames of three seconds are on the station's clock.
     assert!(count > 50, "{count}");
     assert!(last < TODAY_10US + 400_000, "{last}");
 }
@@ -227,7 +227,7 @@ fn a_key_is_set_over_a_wire_or_signed_and_never_while_armed() {
 fn a_start_forgets_neither_key_nor_clock() {
     let mut locked = Locked::new();
     let before = locked.signed(&command(), &KEY);
-    // Two hours later, all heard.
+    // Two hours pass, in which frames are accepted.
     locked.time_10us += 120 * MINUTE_10US;
     locked.bench.now_us += 120 * 10 * MINUTE_10US;
     locked.bench.step();
@@ -244,7 +244,7 @@ fn a_start_forgets_neither_key_nor_clock() {
     assert!(!locked.hears(&at_last), "replayed");
 }
 
-/// What was heard before a start, of a sender whose clock is up to an hour ahead, is not heard again after it.
+/// A frame accepted before a restart is not accepted again after it, even if its sender's clock is up to an hour ahead.
 #[test]
 fn a_start_lets_no_frame_be_replayed() {
     for ahead_10us in [10, MINUTE_10US + 10, 5 * MINUTE_10US, HOUR_10US - MINUTE_10US] {
@@ -253,7 +253,7 @@ fn a_start_lets_no_frame_be_replayed() {
         let frame = locked.signed(&command(), &KEY);
         assert!(locked.hears(&frame), "{ahead_10us}");
         locked.keep(12);
-        // The clock is kept every two minutes.
+        // The clock is stored every two minutes.
         locked.bench.now_us += 121_000_000;
         locked.keep(3);
         locked.restart();
@@ -261,8 +261,9 @@ fn a_start_lets_no_frame_be_replayed() {
     }
 }
 
-/// A holder of the key whose clock is a year ahead is heard, and locks nobody out. Where nobody has told the time since
-/// a start it does, until the key is set again, the same one or another: then all is well, whatever it goes on to send.
+/// A sender with the key whose clock is a year ahead is accepted and does not lock out others. After a restart it does,
+/// if the clock has not been set since. Setting the same or another key corrects the clock, whatever the sender sends
+/// later.
 #[test]
 fn a_clock_that_is_a_year_ahead_is_set_right_by_a_key() {
     const YEAR_10US: u64 = 365 * 24 * 60 * MINUTE_10US;
@@ -296,7 +297,7 @@ fn a_clock_that_is_a_year_ahead_is_set_right_by_a_key() {
     }
 }
 
-/// Times at the end of the wire's 48 bits are none: frames that are sent go on to have times of their own.
+/// Time stamps near the end of the 48 bits are refused, so that sent frames still have time stamps of their own.
 #[test]
 fn the_end_of_time_is_not_heard() {
     const TEN_YEARS_10US: u64 = 10 * 365 * 24 * HOUR_10US;
@@ -317,15 +318,15 @@ fn the_end_of_time_is_not_heard() {
             assert!(locked.hears(&genuine), "its clock is as it was");
         }
     }
-    // The last time that is one.
+    // This is the latest time stamp that is accepted.
     let mut locked = Locked::new();
     locked.time_10us = afbc_link::TIME_MAX - TEN_YEARS_10US - 1;
     let last = locked.signed(&command(), &KEY);
     assert!(locked.hears(&last));
 }
 
-/// The power is cut between any two records: the key is the old one, the new one, or none that anybody has; a cut never
-/// opens a vehicle that is to stay locked.
+/// Power fails between any two records. Then the key is the old one, the new one, or an incomplete one that nobody has.
+/// The vehicle is never left without signing.
 #[test]
 fn half_a_key_opens_nothing() {
     for cut in 0..=10 {
@@ -343,7 +344,7 @@ fn half_a_key_opens_nothing() {
         assert!(!(former && new), "cut after {cut}");
         assert_eq!(former, cut == 0, "cut after {cut}");
         assert_eq!(new, cut >= 9, "cut after {cut}");
-        // Whoever holds the vehicle can set one again.
+        // A person with access to the wire can set a key again.
         locked.set(Some(KEY), true);
         let genuine = locked.signed(&command(), &KEY);
         assert!(locked.hears(&genuine), "cut after {cut}");
@@ -363,9 +364,10 @@ fn more_senders_than_there_is_room_for_are_not_heard() {
 }
 
 proptest! {
-    /// Frames of random senders, links, times, keys and orders, unsigned ones among them: heard is exactly what is
-    /// signed with the key, is newer than all that was heard of its sender and link, and at its first time no older
-    /// than a minute before the clock: that of the key's setter, which others move on by an hour at most.
+    /// Frames have random senders, links, times, keys and order; some are unsigned. A frame is accepted exactly if it
+    /// is signed with the key and newer than all accepted frames of its stream. The first frame of a stream must not be
+    /// more than a minute behind the clock. That clock was set with the key, and other senders move it by an hour at
+    /// most.
     #[test]
     fn the_rule_holds(
         sent in prop::collection::vec(
@@ -391,7 +393,7 @@ proptest! {
                 }
                 None => Sender::new(from).send(&command(), &mut [0; FRAME_MAX]).to_vec(),
             };
-            // The vehicle's clock runs on between two frames.
+            // The vehicle's clock advances between two frames.
             let now_10us = newest + locked.bench.now_us / 10;
             let is_new = match streams.get(&(system, link)) {
                 Some(last) => time_10us > *last,

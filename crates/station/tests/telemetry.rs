@@ -1,4 +1,4 @@
-//! Telemetry of a vehicle that flies: what is told is what it does.
+//! Telemetry of a flying vehicle reports what the vehicle does.
 
 use crate::common::Bench;
 use afbc_link::{Command, Downlink, PositionTarget, Uplink};
@@ -6,7 +6,7 @@ use afbc_station::services::streams::id;
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 
-/// POSITION_TARGET_LOCAL_NED tells four times per second what the law is given, while the vehicle is armed.
+/// POSITION_TARGET_LOCAL_NED has the setpoint of the control law, four times per second, while the vehicle is armed.
 #[test]
 fn the_setpoint_that_is_followed_is_reported() {
     let mut bench = Bench::new();
@@ -35,7 +35,7 @@ fn the_setpoint_that_is_followed_is_reported() {
     assert!((7..=9).contains(&reported.len()), "{reported:?}");
     let (_, last) = reported.last().expect("some");
     assert!((last - Vector3::new(0.5, -0.25, 0.5)).norm() < 0.2, "{last}");
-    // And nothing that is not: a request is refused once it is disarmed.
+    // There is no setpoint after disarming, so the request is refused.
     bench.hear(Uplink::Command(Command::RequestMessage { message: id::POSITION_TARGET_LOCAL_NED, index: 0 }));
     let refused = bench.step().1.iter().any(|it| {
         matches!(it, Downlink::Answer { command: 512, answer, .. }

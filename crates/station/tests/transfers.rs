@@ -14,7 +14,7 @@ use afbc_types::State;
 const OTHER: Address = Address { system: 245, component: 191 };
 const URI: &str = "mftp://etc/general.json";
 
-/// Everything that a vehicle with storage sends.
+/// All messages that a vehicle with storage sends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "a test")]
 enum Sent {
@@ -44,12 +44,12 @@ struct Vehicle {
     transfers: Transfers<usize>,
     store: Memory,
     decoder: Decoder<Sent>,
-    /// Bytes sent so far, and those of them that transfers took.
+    /// Number of bytes sent so far, and number of those that belong to transfers.
     bytes: [usize; 2],
 }
 
 impl Vehicle {
-    /// On a line of so many baud, with every stream at its default.
+    /// Creates a vehicle on a line of `baud`, with every stream at its default.
     fn on(baud: u32) -> Self {
         let mut bench = Bench::new();
         bench.table =
@@ -109,7 +109,7 @@ impl Vehicle {
         sent
     }
 
-    /// Steps until a message is what is wanted; returns it and the ticks that it took.
+    /// Runs ticks until a wanted message is sent. Returns the message and the number of ticks.
     fn until<T>(&mut self, ticks: usize, wanted: impl Fn(&Sent) -> Option<T>) -> (T, usize) {
         for tick in 1..=ticks {
             if let Some(found) = self.step().iter().find_map(&wanted) {
@@ -134,7 +134,7 @@ fn text(sent: &Sent) -> Option<String> {
     }
 }
 
-/// On a full line as on an idle one, and to the station that asks.
+/// Requests are answered to the station that asks, on a full line as on an idle one.
 #[test]
 fn requests_are_answered_in_time() {
     for baud in [57_600, 921_600] {
@@ -160,8 +160,8 @@ fn requests_are_answered_in_time() {
     }
 }
 
-/// A download takes what is left of the line and a fifth of it at least: it takes no more of a full line, and answers
-/// to commands wait for none of it.
+/// A download takes the bytes that telemetry leaves, and at least a fifth of the line. On a full line it takes no more
+/// than that. It does not delay answers to commands.
 #[test]
 fn a_download_shares_the_line() {
     for baud in [57_600, 921_600] {
@@ -187,7 +187,7 @@ fn a_download_shares_the_line() {
                 let transferred = vehicle.bytes[1] - transferred_before;
                 (vehicle.bytes[0] - all_before - transferred, transferred, waited)
             };
-            // All that may be sent in five seconds.
+            // Number of bytes that may be sent in five seconds.
             let budget = 5 * baud as usize / 10 * 9 / 10;
             let (before, none, _) = measure(&mut vehicle);
             vehicle.store.logs[0] = bytes(1_000_000, 4);
@@ -196,7 +196,7 @@ fn a_download_shares_the_line() {
             assert_eq!(none, 0);
             assert!(during + transferred <= budget + 700, "{during} and {transferred} of {budget} bytes");
             assert!(waited <= 2, "answered after {waited} ms");
-            // A fifth at least, and all that telemetry leaves; telemetry keeps the rest.
+            // The download takes at least a fifth and all that telemetry leaves. Telemetry keeps the rest.
             let spare = budget.saturating_sub(before).max(budget / 5);
             assert!(transferred * 100 >= spare * 90, "{transferred} of {spare} bytes");
             let kept = before.min(budget * 4 / 5);
@@ -232,7 +232,7 @@ fn a_file_is_downloaded_in_bursts() {
     assert!(read == vehicle.store.files["log/a.ulg"]);
 }
 
-/// What telemetry leaves of the line is taken only as far as nothing that falls due is kept back by it.
+/// Transfers take spare bytes only if that does not delay telemetry.
 #[test]
 fn a_transfer_keeps_nothing_back() {
     let streamed = id::ATTITUDE_QUATERNION;
@@ -250,18 +250,18 @@ fn a_transfer_keeps_nothing_back() {
             vehicle.step();
         }
         begin(&mut vehicle);
-        // What the line and the transfers' own part have saved up is spent in half a second.
+        // The saved-up budgets of the line and of the transfers are spent within half a second.
         (0..500).for_each(|_| drop(vehicle.step()));
         let before = vehicle.bytes[1];
         let is_it = |sent: &Sent| matches!(sent, Sent::Usual(Downlink::Telemetry(Telemetry::Attitude(_))));
         let sent: Vec<_> = (0..5000).filter(|_| vehicle.step().iter().any(is_it)).collect();
         assert!(vehicle.bytes[1] - before > 20_000, "{} bytes", vehicle.bytes[1] - before);
-        // A heartbeat keeps it back for 5 ms.
+        // A heartbeat can delay the stream by 5 ms.
         assert!(sent.len() >= 49 && sent.windows(2).all(|two| (94..=106).contains(&(two[1] - two[0]))), "{sent:?}");
     }
 }
 
-/// MAVProxy asks for twenty gaps of a log at once.
+/// MAVProxy requests twenty gaps of a log at once.
 #[test]
 fn many_requests_at_once_are_kept() {
     let mut vehicle = Vehicle::on(921_600);
@@ -298,7 +298,7 @@ fn metadata_is_told_on_request() {
         assert_eq!((kind, metadata.crc, metadata.time_ms > 0), (message, 77, true));
         assert!(metadata.uri.starts_with(URI.as_bytes()) && metadata.uri[URI.len()] == 0);
     }
-    // Others are requested as ever, and it is told that there are files.
+    // Other messages can still be requested. The capabilities show that there is file transfer.
     vehicle.hear(STATION, &Uplink::Command(Command::RequestMessage { message: id::AUTOPILOT_VERSION, index: 0 }));
     let (capabilities, _) = vehicle.until(250, |sent| match sent {
         Sent::Usual(Downlink::Telemetry(Telemetry::Version(version))) => Some(version.capabilities),
@@ -321,7 +321,7 @@ fn logs_are_erased_while_disarmed_and_by_the_station_in_control() {
 
     let mut vehicle = Vehicle::on(921_600);
     vehicle.step();
-    // Whoever commands something is in control; others may look, but not erase.
+    // A station that gives an order takes control. Other stations may read but not erase.
     vehicle.hear(STATION, &Uplink::Command(Command::Speed(1.0)));
     vehicle.log(OTHER, LogRequest::Erase);
     vehicle.file(OTHER, remove);
@@ -336,7 +336,7 @@ fn logs_are_erased_while_disarmed_and_by_the_station_in_control() {
     assert_eq!((packet.opcode, vehicle.store.changes), (FileOpcode::ACK, 1));
 }
 
-/// Started and stopped by command, beside everything else; a vehicle that makes no log says so.
+/// A log stream is started and stopped by commands while other messages are sent. A vehicle without a log refuses it.
 #[test]
 fn the_log_is_streamed() {
     let part = |sent: &Sent| match sent {
@@ -348,7 +348,7 @@ fn the_log_is_streamed() {
     let (said, _) = vehicle.until(100, text);
     assert_eq!(said, "there is no log to stream");
 
-    // Definitions of 1 kB, then data without end.
+    // The log has definitions of 1 kB and a large amount of data.
     let mut log = vec![0; 16];
     for (kind, length, count) in [(b'P', 97_u16, 10), (b'D', 247, 4000)] {
         for _ in 0..count {
@@ -379,9 +379,9 @@ fn the_log_is_streamed() {
     }
     assert_eq!(answers, [Answer::Accepted]);
     assert_eq!(read, log[..read.len()]);
-    // Telemetry takes all of the line, but for a fifth: 3 s of 92 kB/s.
+    // Telemetry leaves the log stream a fifth of the line, for 3 s at 92 kB/s.
     assert!((40_000..80_000).contains(&read.len()), "{}", read.len());
-    // A file of somebody else comes first, and in time.
+    // Another station's file request goes first and is answered in time.
     vehicle.file(STATION, FilePacket::request(1, FileOpcode::LIST_DIRECTORY, 0, 0, 0).with(b"log"));
     vehicle.until(100, file);
 

@@ -1,4 +1,4 @@
-//! A trip of the monitor: its reason is sent once, and a command engages AFBC again.
+//! A trip of the monitor is reported once with its reason, and a command engages AFBC again.
 
 use crate::common::{Bench, STATION};
 use afbc::Trip;
@@ -15,7 +15,7 @@ fn accepted(command: MavCmd) -> Downlink {
     Downlink::Answer { command: command as u16, answer: Answer::Accepted, to: STATION }
 }
 
-/// A vehicle held at a wrong attitude trips, reports it once, and MAV_CMD_USER_1 engages AFBC again.
+/// A vehicle that is held at a wrong attitude trips and reports it once. MAV_CMD_USER_1 engages AFBC again.
 #[test]
 fn a_trip_is_reported_once_and_ended_by_command() {
     let mut bench = Bench::new();
@@ -49,7 +49,7 @@ fn a_trip_is_reported_once_and_ended_by_command() {
     assert_eq!((report.health.control.fallback, said), (None, vec![]), "AFBC flies");
 }
 
-/// A trip is reported again only if the monitor trips again, not when states return after a gap.
+/// A trip is reported again only if the monitor trips again, not if states return after a gap.
 #[test]
 fn a_gap_in_the_states_does_not_repeat_it() {
     let mut bench = Bench::new();

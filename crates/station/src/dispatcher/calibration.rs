@@ -1,4 +1,4 @@
-//! Calibration on behalf of a station.
+//! Handling of calibration commands.
 
 use super::{Dispatcher, ParameterTask};
 use crate::services::calibration::{Calibrator, Step, name};
@@ -9,7 +9,7 @@ use afbc_flight_core::Refusal;
 use afbc_link::{Address, Answer, CalibrationRequest, MavSeverity, ParameterRequest};
 use afbc_onboard::parameters::{Kind, ParameterTable};
 
-/// Begins of the texts by which stations know what has become of a calibration.
+/// Beginnings of the texts that tell stations the state of a calibration.
 const STARTED: &str = "[cal] calibration started: 2 ";
 const DONE: &str = "[cal] calibration done: ";
 const FAILED: &str = "[cal] calibration failed: ";
@@ -40,7 +40,7 @@ impl Dispatcher {
         Answer::Accepted
     }
 
-    /// Goes on with the calibration that a station has asked for.
+    /// Advances the calibration that a station has asked for.
     pub(crate) fn calibrate<const N: usize>(
         &mut self,
         calibrator: &mut Calibrator,
@@ -56,13 +56,13 @@ impl Dispatcher {
         match calibrator.step((self.calibration.number, what), sample, now, |words| texts.say(info, words)) {
             Step::Continue => (),
             Step::Set(name, value) => {
-                // As if a station had set it: so it is checked, kept, flown with and sent to all.
+                // The value is set as if by a station: it is checked, stored, adopted and sent to all stations.
                 let kind = Kind::Real32.number();
                 let request = ParameterRequest::Set { name: name.to_bytes(), value: value.to_le_bytes(), kind };
                 self.wishes.push_back(ParameterTask::Ask(request, Address::default())).ok();
             }
             Step::Finished => {
-                // The parameters' service may have refused one: what counts is what the table has.
+                // The parameter service may have refused a value, so the table is checked.
                 let is_set = |(name, value)| table.get(name).is_some_and(|parameter| parameter.value == value);
                 let all_set = calibrator.found().all(is_set);
                 self.end_calibration(calibrator, all_set.then_some(what).ok_or("values not accepted"));

@@ -1,4 +1,4 @@
-//! What each command leads to.
+//! Handling of COMMAND_LONG and COMMAND_INT.
 
 use super::{Dispatcher, Reply};
 use crate::services::commands::{BUSY, CALIBRATES, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN};
@@ -14,7 +14,7 @@ use afbc_onboard::{ControlInputs, give};
 use nalgebra::Vector3;
 
 impl Dispatcher {
-    /// Returns what speaks against arming beside the flight core's own reasons.
+    /// Returns a reason against arming that the flight core does not know of.
     fn against_arming(&self) -> Option<(&'static str, i32)> {
         if self.calibration.active.is_some() {
             return Some(("arming refused: calibrating", CALIBRATES));
@@ -22,10 +22,10 @@ impl Dispatcher {
         sensors::faulty(&self.status.aux).map(|text| (text, Refusal::SensorFailed as i32))
     }
 
-    /// Carries out a command, or leads to its being carried out: it is answered once, to `from`.
+    /// Carries out a command or passes it on. The command is answered once, to `from`.
     pub(super) fn command(&mut self, command: Command, from: Address, inputs: &mut ControlInputs) {
         let id = command.id();
-        // Nothing is done that cannot be answered, except to stop the motors.
+        // A command that cannot be answered is not carried out, except a command to stop the motors.
         if command != Command::Kill && !self.commands.has_room() {
             return self.commands.answer(id, Answer::Refused(BUSY), from);
         }
@@ -104,7 +104,7 @@ impl Dispatcher {
                 }
                 Ok(order) => {
                     if let Command::Home(_) = command {
-                        // MAVLink wants it reported whether it has changed or not.
+                        // MAVLink requires HOME_POSITION after each request, even if home has not changed.
                         self.streams.request(Requested { message: id::HOME_POSITION, index: 0 });
                     }
                     if let Order::Orbit { centre_m, radius_m, .. } = order {
@@ -114,7 +114,7 @@ impl Dispatcher {
                     }
                     if let Command::StartMission(first, last) = command {
                         if self.missions.set_last(last) {
-                            // Whether an item is the last one has changed.
+                            // The last item may have another `is_last` now, so the guidance must be given it again.
                             self.given = self.given.map(|(wanted, upload)| (wanted, upload.wrapping_sub(1)));
                         }
                         if first > 0 {
@@ -129,7 +129,7 @@ impl Dispatcher {
         self.commands.answer(id, answer, from);
     }
 
-    /// Passes an order to the guidance.
+    /// Passes an order to the guidance. `command` is the number of the command to be answered, if any.
     pub(super) fn order(&mut self, order: Order, command: Option<u16>, from: Address, inputs: &mut ControlInputs) {
         if let Some(given) = self.commands.order(order, command, from, self.now_us) {
             give(inputs.order(), given);
@@ -142,7 +142,7 @@ impl Dispatcher {
         }
     }
 
-    /// Returns the order of a command, or the answer if there is none.
+    /// Returns the guidance's order for a command, or the command's answer if there is none.
     fn order_of(&self, command: Command) -> Result<Order, Answer> {
         Ok(match command {
             Command::TakeOff(height) => Order::TakeOff(self.take_off_height(height)?),
@@ -162,7 +162,7 @@ impl Dispatcher {
                     3 => OrbitHeading::Along,
                     _ => OrbitHeading::Kept,
                 };
-                // To the left is positive in the local frame.
+                // MAVLink's positive radius is clockwise, the local frame's counterclockwise.
                 let radius_m = if radius_m.is_nan() { -ORBIT_RADIUS_M } else { -radius_m };
                 Order::Orbit { centre_m: self.local(&place)?, radius_m, speed_m_s, angle_deg, heading }
             }
@@ -174,19 +174,19 @@ impl Dispatcher {
                 }
                 Order::Select(FlightMode::Mission)
             }
-            // The other commands have nothing for the guidance.
+            // No other command is for the guidance.
             _ => return Err(Answer::Unsupported),
         })
     }
 
-    /// True if every item of the mission can be flown from here and now; tells which one cannot.
+    /// Returns true if every mission item can be flown from here and now. Otherwise warns which item cannot.
     fn is_mission_flown(&mut self) -> bool {
         let problem = self.missions.problem(&self.surroundings());
         problem.iter().for_each(|words| self.texts.say(MavSeverity::MAV_SEVERITY_WARNING, words));
         problem.is_none()
     }
 
-    /// Returns the height above where the vehicle stands \[m\].
+    /// Returns a take-off height relative to the vehicle's present height \[m\].
     fn take_off_height(&self, height: Height) -> Result<Option<f32>, Answer> {
         if height.metres.is_nan() {
             return Ok(None);
@@ -196,13 +196,13 @@ impl Dispatcher {
         Ok(Some(self.local(&place)?.z - here_m))
     }
 
-    /// Returns a place in the local frame.
+    /// Converts a place to the local frame.
     pub(super) fn local(&self, place: &Place) -> Result<Vector3<f32>, Answer> {
         use afbc_link::Datum;
         let home_m = self.status.guided.home_m.map_or(0.0, |home| home.z);
         match &self.status.aux.origin {
             Some(origin) => Ok(resolve(origin, place, home_m, self.here().z)),
-            // A height above home or here needs no origin.
+            // A height relative to home or to the vehicle needs no origin.
             None if place.latitude_e7 == Place::AS_IT_IS && place.height.above != Datum::Sea => {
                 let above_m = if place.height.above == Datum::Home { home_m } else { self.here().z };
                 Ok(Vector3::new(f32::NAN, f32::NAN, place.height.metres + above_m))
@@ -215,7 +215,7 @@ impl Dispatcher {
         self.status.state.map_or(Vector3::zeros(), |state| state.position_m)
     }
 
-    /// Queues a message on request.
+    /// Queues a requested message for sending.
     fn request(&mut self, message: u32, index: u32) -> Answer {
         let known = match message {
             id::HEARTBEAT | id::DEBUG_FLOAT_ARRAY | id::MISSION_CURRENT => true,
@@ -237,7 +237,7 @@ impl Dispatcher {
         }
     }
 
-    /// Notes that a station wants to know what speaks against arming, and reports whether another is in control.
+    /// Requests the report of arming checks, and warns the station if another one is in control.
     fn check_arming(&mut self, from: Address) {
         let holder = self.control.holder(self.now_us).filter(|holder| *holder != from);
         if let Some(holder) = holder {
@@ -247,7 +247,7 @@ impl Dispatcher {
         self.checks = Some(self.checks == Some(true) || holder.is_none());
     }
 
-    /// Tells what spoke against arming in the tick before, as the flight core sees it: what it would have answered.
+    /// Reports the arming checks of the last tick: the texts with which an arm command would have been refused.
     pub(super) fn report_checks(&mut self) {
         let (Some(may), Some(against)) = (self.checks.take(), self.status.against) else { return };
         let calibrates = self.calibration.active.is_some();

@@ -1,4 +1,4 @@
-//! The geofence: what commands, the mission and the guidance see of it.
+//! Applies the geofence to commands, the mission and the guidance.
 
 use super::Dispatcher;
 use crate::services::fence::{FenceMotion, contains, holds, holds_circle, is_clear};
@@ -8,16 +8,16 @@ use afbc_guidance::fence::StopPath;
 use afbc_guidance::{FlightMode, Item, Leg, Order};
 use nalgebra::{Vector2, Vector3};
 
-/// Time between two looks for the nearest rally point \[us\].
+/// Time between two searches for the nearest rally point \[us\].
 const SAFE_EVERY_US: u64 = 500_000;
 
 impl Dispatcher {
-    /// True if the guidance does not know what there is to know of the fence.
+    /// Returns true if the guidance does not have the latest state of the geofence or of the safe place.
     pub(crate) fn has_fence_news(&self) -> bool {
         self.fence.view() != self.fence_given || self.safe_m != self.safe_given_m
     }
 
-    /// Finds the nearest of home and rally points, now and then, unless a return is on its way there.
+    /// Finds the nearest of home and the rally points, twice per second, except during a return.
     pub(super) fn find_safe_place(&mut self) {
         let rally = self.missions.rally();
         let returns = self.status.guided.mode == FlightMode::Return;
@@ -35,18 +35,18 @@ impl Dispatcher {
         let (chart, home_m) = (origin.chart(), home_m.xy());
         let off = |place_m: &Vector2<f32>| (place_m - here_m).norm_squared();
         let points = rally.iter().map(|item| chart.local([item.x, item.y]));
-        // From home on, which takes the place of rally points that are gone.
+        // The search starts with home, which also replaces deleted rally points.
         self.safe_m = Some(points.fold(home_m, |best, point| if off(&point) < off(&best) { point } else { best }));
     }
 
-    /// Returns what plans are checked against.
+    /// Returns the position data with which plans are checked.
     pub(super) fn surroundings(&self) -> Surroundings {
         let here_m = self.status.state.filter(|_| self.status.is_located()).map(|state| state.position_m.xy());
         let (origin, home_m) = (self.status.aux.origin, self.status.guided.home_m);
         Surroundings { origin, here_m, home_m, cylinder_m: self.cylinder_m }
     }
 
-    /// Looks at a part of the fence.
+    /// Checks the next few boundaries of the fence.
     pub(super) fn watch_fence(&mut self) {
         let items = self.missions.fence();
         let (Some(origin), Some(state)) = (&self.status.aux.origin, &self.status.state) else { return };
@@ -66,7 +66,7 @@ impl Dispatcher {
         self.fence.look(items, &origin.chart(), &motion);
     }
 
-    /// True if an order would not leave the fence: its place and the straight way there.
+    /// Returns true if the order's destination and the straight path to it are inside the fence.
     pub(super) fn fence_allows(&self, order: &Order) -> bool {
         let items = self.missions.fence();
         let Surroundings { origin: Some(origin), here_m: Some(here_m), .. } = self.surroundings() else { return true };
@@ -90,7 +90,8 @@ impl Dispatcher {
         }
     }
 
-    /// Returns an item of the mission, without its place if that is outside the fence: so the guidance refuses it.
+    /// Returns a mission item. If its place is outside the fence, the place is made invalid, so that the guidance
+    /// refuses it.
     pub(super) fn fenced(&self, mut leg: Leg) -> Leg {
         let items = self.missions.fence();
         let Some(chart) = self.status.aux.origin.filter(|_| !items.is_empty()).map(|origin| origin.chart()) else {
@@ -104,7 +105,7 @@ impl Dispatcher {
             {
                 *place_m = Vector3::repeat(f32::NAN);
             }
-            // A landing without a place would be here.
+            // A NaN place would mean landing at the present position, so infinity marks this place as invalid.
             Item::Land { position_m } if !position_m.x.is_nan() && !holds(items, &chart, position_m.xy()) => {
                 *position_m = Vector3::repeat(f32::INFINITY);
             }

@@ -1,4 +1,4 @@
-//! What stations want of the parameters, and who may want it.
+//! Handling of parameter requests, and who may change parameters.
 
 use super::{Dispatcher, ParameterTask, Reply};
 use crate::services::commands::BUSY;
@@ -9,7 +9,8 @@ use afbc_onboard::ControlInputs;
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 
 impl Dispatcher {
-    /// Notes a message about parameters. A station that is not in control is sent the value that it has not set.
+    /// Queues a parameter request. For a station that is not in control, setting becomes reading: it is sent the old
+    /// value.
     pub(super) fn parameter(&mut self, request: ParameterRequest, from: Address, inputs: &mut ControlInputs) {
         let request = match request {
             ParameterRequest::Set { name, .. } if !self.may(from, inputs) => ParameterRequest::ReadName(name),
@@ -18,7 +19,8 @@ impl Dispatcher {
         self.wishes.push_back(ParameterTask::Ask(request, from)).ok();
     }
 
-    /// Answers MAV_CMD_PREFLIGHT_STORAGE. What is set is stored already, and what is stored is what is flown.
+    /// Answers MAV_CMD_PREFLIGHT_STORAGE. Loading and saving do nothing, since each change is stored and adopted at
+    /// once.
     pub(super) fn storage(&mut self, storage: Storage) -> Answer {
         match storage {
             Storage::Load | Storage::Save => Answer::Accepted,
@@ -28,7 +30,7 @@ impl Dispatcher {
         }
     }
 
-    /// Does what stations want, up to the first change of `table`, which it returns.
+    /// Handles queued parameter requests until one changes `table`. Returns that change.
     pub(crate) fn grant<const N: usize>(&mut self, table: &mut ParameterTable<N>) -> Option<RecordChange> {
         let disarmed = !self.status.mode.armed();
         while let Some(wish) = self.wishes.pop_front() {

@@ -1,4 +1,4 @@
-//! Targets of companion computers, and sticks.
+//! Handling of companion computers' setpoints, joysticks and RC overrides.
 
 use super::Dispatcher;
 use afbc_flight_core::Stamped;
@@ -10,7 +10,7 @@ use afbc_types::Setpoint;
 use nalgebra::{Quaternion, UnitQuaternion};
 
 impl Dispatcher {
-    /// Takes a complete setpoint.
+    /// Handles a complete setpoint.
     pub(super) fn setpoint(&mut self, setpoint: Setpoint, from: Address, inputs: &mut ControlInputs) {
         if self.may(from, inputs) {
             let at_us = self.now_us;
@@ -19,7 +19,7 @@ impl Dispatcher {
         }
     }
 
-    /// Takes any other target, or sticks.
+    /// Handles any other target, a joystick or an RC override.
     pub(super) fn target(&mut self, target: ExternalTarget, from: Address, inputs: &mut ControlInputs) {
         if !self.may(from, inputs) {
             return;
@@ -41,12 +41,12 @@ impl Dispatcher {
                 afbc_guidance::OffboardTarget::Attitude(AttitudeTarget { attitude, yaw_rate_rad_s, thrust })
             }
             ExternalTarget::Channels(channels) => {
-                // The newest counts, as of a receiver.
+                // The newest channels replace older ones, as with a receiver.
                 self.overrides = Some(channels);
                 return;
             }
             ExternalTarget::Sticks(sticks) => {
-                // The pilot's own sticks go first.
+                // The pilot's radio sticks take precedence over a joystick.
                 let radio_us = self.radio_us.filter(|radio_us| at_us.saturating_sub(*radio_us) <= SILENT_US);
                 if !self.takes_joystick || radio_us.is_some() {
                     return;
@@ -61,7 +61,7 @@ impl Dispatcher {
         inputs.order().target = Some(Stamped { value, at_us });
     }
 
-    /// Returns a target as the guidance takes it; none if it needs a position that the vehicle does not know.
+    /// Converts a target to the guidance's type. Returns none if the target needs an unknown position.
     fn in_local_frame(&self, target: &PositionTarget) -> Option<MotionTarget> {
         Some(match target.axes {
             Axes::Local => motion(target, false),
@@ -69,7 +69,7 @@ impl Dispatcher {
                 let here = self.status.is_located().then(|| self.here())?;
                 MotionTarget { position_m: here + target.position_m, ..motion(target, false) }
             }
-            // Either a place or a velocity: the link takes no other.
+            // A target in the body frame has either a position or a velocity: the decoder accepts no other.
             Axes::Body => motion(target, target.position_m.iter().all(|number| number.is_nan())),
             Axes::BodyOffset => motion(target, true),
         })

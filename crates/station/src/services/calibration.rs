@@ -1,5 +1,5 @@
-//! Calibration of the vehicle's sensors, as PX4's stations ask for it and follow it: by MAV_CMD_PREFLIGHT_CALIBRATION
-//! and texts, whose words QGroundControl and MAVSDK read.
+//! Sensor calibration with PX4's protocol: MAV_CMD_PREFLIGHT_CALIBRATION and texts that QGroundControl and MAVSDK
+//! parse.
 
 use crate::services::texts::Words;
 use afbc_calibration::{
@@ -12,31 +12,30 @@ use afbc_store::RecordName;
 use heapless::Vec;
 use nalgebra::Vector3;
 
-/// Silence of the sensors after which a calibration fails \[us\].
+/// A calibration fails after this silence of the sensors \[us\].
 const SILENT_US: u64 = 1_000_000;
-/// Most values that a calibration finds.
+/// Largest number of values that a calibration finds.
 const VALUES_MAX: usize = 9;
 
-/// What stations have asked for.
+/// The calibration that a station has asked for.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct CalibrationState {
-    /// Number of those that were begun, to distinguish one from the next.
+    /// Number of calibrations begun so far, to tell one from the next.
     pub(crate) number: u8,
-    /// What is calibrated.
+    /// Sensor that is being calibrated.
     pub(crate) active: Option<CalibrationRequest>,
 }
 
-/// Calibrates the sensors of a vehicle, on its [`Comms`](crate::Comms::calibrate)' behalf. A shell without sensors has
-/// none.
+/// Calibrates the vehicle's sensors for [`Comms`](crate::Comms::calibrate). A shell without sensors has no calibrator.
 #[derive(Debug, Default)]
 pub struct Calibrator {
-    /// Number of the present one.
+    /// Number of the present calibration.
     number: u8,
     heard_us: u64,
     procedure: Option<Procedure>,
-    /// Parameters and their values that were found.
+    /// Names and values of the parameters found.
     found: Vec<(RecordName, f32), VALUES_MAX>,
-    /// How many of them have been handed over.
+    /// Number of found parameters that have been returned.
     given: usize,
 }
 
@@ -49,33 +48,33 @@ enum Procedure {
     Magnetometer(MagnetometerCalibration),
 }
 
-/// What follows from a step.
+/// Result of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Step {
-    /// It goes on.
+    /// The calibration continues.
     Continue,
-    /// This parameter is to be set; the step is to be repeated.
+    /// This parameter is to be set. The calibration continues with the next step.
     Set(RecordName, f32),
-    /// Everything has been found and handed over.
+    /// All parameters have been found and returned.
     Finished,
-    /// It has failed, for this reason.
+    /// The calibration has failed for this reason.
     Failed(&'static str),
 }
 
 impl Calibrator {
-    /// One that calibrates nothing.
+    /// Creates an idle calibrator.
     pub fn new() -> Self {
         Calibrator::default()
     }
 
-    /// Forgets what it was doing.
+    /// Aborts the calibration.
     pub(crate) fn stop(&mut self) {
         self.procedure = None;
         self.found.clear();
         self.given = 0;
     }
 
-    /// Begins.
+    /// Begins a calibration.
     fn begin<const N: usize>(&mut self, what: CalibrationRequest, configuration: &Configuration<N>, now_us: u64) {
         self.stop();
         self.heard_us = now_us;
@@ -93,7 +92,7 @@ impl Calibrator {
         };
     }
 
-    /// Goes on with `what`, whose number this is, with the sensors' next sample if there is one.
+    /// Advances calibration `what`, numbered `number`, with the sensors' next sample, if there is one.
     pub(crate) fn step<const N: usize>(
         &mut self,
         (number, what): (u8, CalibrationRequest),
@@ -116,7 +115,7 @@ impl Calibrator {
             None if self.procedure.is_some() => return Step::Continue,
             None => (),
         }
-        // Values leave one in each sample's time, which a flash keeps up with.
+        // One value is returned per sample, so that writing to flash keeps up.
         match self.found.get(self.given) {
             Some((name, value)) => {
                 self.given += 1;
@@ -126,12 +125,12 @@ impl Calibrator {
         }
     }
 
-    /// Returns every parameter that was found.
+    /// Returns all parameters that were found.
     pub(crate) fn found(&self) -> impl Iterator<Item = (RecordName, f32)> {
         self.found.iter().copied()
     }
 
-    /// Advances the procedure.
+    /// Advances the procedure by one sample.
     fn find(&mut self, sample: &RawSample, mut say: impl FnMut(&Words)) -> Option<Result<(), CalibrationFailure>> {
         let found = &mut self.found;
         let mut put = |name: &str, values: Vector3<f32>| keep(found, name, &values);
@@ -152,16 +151,16 @@ impl Calibrator {
     }
 }
 
-/// Adds the parameters of three axes.
+/// Adds the parameters of the three axes.
 #[inline(never)]
 fn keep(found: &mut Vec<(RecordName, f32), VALUES_MAX>, name: &str, values: &Vector3<f32>) {
     for (axis, value) in ['X', 'Y', 'Z'].into_iter().zip(values.iter()) {
-        // Names fit, and there is room: the tests look up each.
+        // The names fit and there is room: a test looks up each of them.
         found.extend(RecordName::of(name.chars().chain([axis])).map(|name| (name, *value)));
     }
 }
 
-/// Returns what stations call a calibration.
+/// Returns the name by which stations know a calibration.
 pub(crate) fn name(what: CalibrationRequest) -> &'static str {
     match what {
         CalibrationRequest::Gyroscope => "gyro",
@@ -183,7 +182,7 @@ fn side_name(side: Side) -> &'static str {
     }
 }
 
-/// Says what happens, in PX4's words as far as stations read them. Compiled once: every step of a procedure calls it.
+/// Announces an event, in PX4's words where stations parse them. Not inlined because each procedure's step calls it.
 #[inline(never)]
 fn words(event: CalibrationEvent, say: &mut dyn FnMut(&Words)) {
     let cal = Words::of("[cal] ");
@@ -207,7 +206,7 @@ fn pending(sides: Sides) -> Words {
     sides.iter().fold(Words::of("[cal] pending:"), |words, side| words.and(" ").and(side_name(side)))
 }
 
-/// Returns why, in at most 24 characters: so many are left of a text.
+/// Returns the reason of a failure, in at most 24 characters: the text has no more room.
 fn reason(failure: CalibrationFailure) -> &'static str {
     match failure {
         CalibrationFailure::Moving => "vehicle moved",
@@ -239,7 +238,7 @@ mod tests {
         CalibrationFailure::FieldUneven,
     ];
 
-    /// No text is cut off: MAVLink's have 50 characters.
+    /// No text is truncated: a STATUSTEXT has 50 characters.
     #[test]
     fn texts_fit() {
         let of_sides = Side::ALL.into_iter().flat_map(|side| {

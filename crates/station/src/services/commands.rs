@@ -1,4 +1,4 @@
-//! Answers to commands: each exactly once, to its sender.
+//! Answers to commands. Each command is answered exactly once, to its sender.
 
 use afbc_flight_core::inbox::QUEUE_MAX;
 use afbc_flight_core::{Request, Ticketed};
@@ -6,39 +6,38 @@ use afbc_guidance::{Order, OrderRefusal};
 use afbc_link::{Address, Answer, Downlink};
 use heapless::Deque;
 
-/// Largest number of different answers that wait, besides those of flight core and guidance: a command beyond that is
-/// neither carried out nor answered, as if it had not arrived, and counted.
+/// Largest number of different queued answers, besides those of flight core and guidance. A further command is counted,
+/// but neither carried out nor answered, as if it had been lost.
 pub const ANSWERS_MAX: usize = 48;
-/// Number of answers that wait from which on further commands are refused as [`BUSY`].
+/// From this number of queued answers on, further commands are refused as [`BUSY`].
 pub const BUSY_FROM: usize = 32;
-/// Answers sent per tick, more than commands can arrive in a millisecond at 921,600 baud.
+/// Number of answers sent per tick, more than commands can arrive in a millisecond at 921,600 baud.
 pub const ANSWERS_PER_TICK: usize = 3;
-/// Time after which a request without an answer counts as handled in a tick whose report was lost \[us\].
+/// An unanswered request counts as failed after this time \[us\]: the report with its answer must have been lost.
 pub const FORGOTTEN_US: u64 = 100_000;
-/// Time between messages that a command is in progress \[us\]: stations give up after half a second without any.
+/// Time between "in progress" answers \[us\]. Stations give up after half a second without one.
 pub const IN_PROGRESS_US: u64 = 250_000;
-/// Number of the reason "too many requests are queued", for requests that do not reach the flight core.
+/// Reason number: too many requests are queued. For requests that do not reach the flight core.
 pub const BUSY: i32 = 0;
-/// Number of the reason "another station is in control".
+/// Reason number: another station is in control.
 pub const NOT_IN_CONTROL: i32 = 64;
-/// Number of the reason "it is not known where the local frame is on the earth".
+/// Reason number: the origin of the local frame is not known.
 pub const NO_ORIGIN: i32 = 65;
-/// Number of the reason "the message cannot be sent now: its content is not known".
+/// Reason number: the message has no known content and cannot be sent now.
 pub const NOT_KNOWN: i32 = 66;
 
-/// Number of the reason "the vehicle is being calibrated".
+/// Reason number: the vehicle is being calibrated.
 pub const CALIBRATES: i32 = 67;
 
-/// Keeps track of the answers.
+/// Keeps track of commands until they are answered.
 #[derive(Default)]
 pub struct Commands {
-    /// Requests that the flight core has not answered, indexed by ticket. The first place is reserved for
-    /// [`Request::Kill`], so that it is always accepted. The flight core's inbox never overflows.
+    /// Requests that the flight core has not answered, indexed by ticket. Ticket 0 is reserved for [`Request::Kill`],
+    /// so that it is always accepted. The array limits open requests, so that the flight core's inbox never overflows.
     asked: [Option<Open>; QUEUE_MAX],
-    /// Orders that the guidance has not answered, indexed by ticket. The guidance's queue never
-    /// overflows either.
+    /// Orders that the guidance has not answered, indexed by ticket. The guidance's queue cannot overflow either.
     ordered: [Option<Open>; QUEUE_MAX],
-    /// A command that is in progress, and when that was last reported \[us\].
+    /// The command in progress, and the time of its last "in progress" answer \[us\].
     in_progress: Option<(Open, u64)>,
     waiting: Deque<QueuedAnswer, ANSWERS_MAX>,
     unanswered: u32,
@@ -49,21 +48,21 @@ struct QueuedAnswer {
     command: u16,
     answer: Answer,
     to: Address,
-    /// Number of commands that it answers.
+    /// Number of commands that are to get this answer.
     times: u16,
 }
 
-/// A command that is not answered yet.
+/// A command that has not been answered yet.
 #[derive(Clone, Copy)]
 struct Open {
-    /// Its number; none for a message that is not answered.
+    /// Number of the command; none for a message that needs no answer.
     command: Option<u16>,
     from: Address,
     at_us: u64,
 }
 
 impl Commands {
-    /// Gives the flight core's request for a command; none if too many are open, which is answered.
+    /// Returns a request to the flight core for a command. If too many are open, answers the command and returns none.
     pub fn ask(&mut self, request: Request, command: u16, from: Address, at_us: u64) -> Option<Ticketed<Request>> {
         let kills = request == Request::Kill;
         let mut places = self.asked.iter_mut().zip(0..).filter(|(_, ticket)| (*ticket == 0) == kills);
@@ -73,15 +72,15 @@ impl Commands {
                 Some(Ticketed { value: request, ticket })
             }
             None => {
-                // The motors are about to be stopped already.
+                // A kill is open already: the motors are about to stop.
                 self.answer(command, if kills { Answer::Accepted } else { Answer::Refused(BUSY) }, from);
                 None
             }
         }
     }
 
-    /// Gives the guidance's order for a command, or for a message without an answer; none if too many are open, which
-    /// is answered.
+    /// Returns an order to the guidance for a command, or for a message that needs no answer. If too many are open,
+    /// answers the command and returns none.
     pub fn order(&mut self, order: Order, command: Option<u16>, from: Address, at_us: u64) -> Option<Ticketed<Order>> {
         match self.ordered.iter_mut().zip(0..).find(|(place, _)| place.is_none()) {
             Some((place, ticket)) => {
@@ -95,8 +94,8 @@ impl Commands {
         }
     }
 
-    /// Begins a command that lasts: "in progress" is sent until it is [ended](Self::end). False if there is one
-    /// already; then this one is answered.
+    /// Begins a lasting command: "in progress" is sent until it is [ended](Self::end). If another one lasts already,
+    /// refuses the command and returns false.
     pub fn begin(&mut self, command: u16, from: Address, at_us: u64) -> bool {
         let is_free = self.in_progress.is_none();
         if is_free {
@@ -108,14 +107,14 @@ impl Commands {
         is_free
     }
 
-    /// Ends the command that lasts.
+    /// Ends the lasting command.
     pub fn end(&mut self, answer: Answer) {
         if let Some((Open { command: Some(command), from, .. }, _)) = self.in_progress.take() {
             self.answer(command, answer, from);
         }
     }
 
-    /// True if another command may be carried out: there is room for its answer.
+    /// Returns true if another command may be carried out because its answer can be queued.
     pub fn has_room(&self) -> bool {
         self.waiting.len() < BUSY_FROM
     }
@@ -132,13 +131,13 @@ impl Commands {
         }
     }
 
-    /// Converts the flight core's answer to a message, to its sender.
+    /// Converts the flight core's answer to a message to the command's sender.
     pub fn settle(&mut self, answer: afbc_flight_core::RequestAnswer) -> Option<Downlink> {
         let open = self.asked.get_mut(usize::from(answer.ticket))?.take()?;
         open.answered(answer.result.map_or_else(|refusal| Answer::Refused(refusal as i32), |()| Answer::Accepted))
     }
 
-    /// Converts the guidance's answer to a message, to its sender.
+    /// Converts the guidance's answer to a message to the command's sender.
     pub fn settle_order(&mut self, ticket: u8, result: Result<(), OrderRefusal>) -> Option<Downlink> {
         let open = self.ordered.get_mut(usize::from(ticket))?.take()?;
         open.answered(result.map_or_else(|declined| Answer::Refused(declined as i32), |()| Answer::Accepted))
@@ -156,7 +155,7 @@ impl Commands {
         }
         let forgotten = |open: &mut Open| now_us.saturating_sub(open.at_us) > FORGOTTEN_US;
         let mut open = self.asked.iter_mut().chain(&mut self.ordered);
-        // A message without an answer is forgotten without one.
+        // A lost message that needs no answer is dropped silently.
         while let Some(lost) = open.find_map(|place| place.take_if(forgotten)) {
             if let Some(answer) = lost.answered(Answer::Failed) {
                 return Some(answer);

@@ -1,35 +1,35 @@
-//! Who may command.
+//! Decides which station is in control.
 //!
-//! The first station that commands is in control, until it has been silent for a time or hands over. A station is its
-//! system and component: the link has no other proof of who it is (`docs/security.md`).
+//! The first station that commands is in control, until it has been silent for a time or releases control. A station is
+//! known by its system and component number: the link has no other proof of identity (`docs/security.md`).
 
 use afbc_link::{Address, Command, ControlAnswer, ControlRequest as Wish};
 
 /// Silence after which a station is no longer in control \[us\].
 pub const SILENT_US: u64 = 10_000_000;
-/// Stations that are informed who is in control.
+/// Number of refused stations that are remembered as informed.
 const INFORMED_MAX: usize = 4;
 
-/// Who is in control.
+/// The station in control, and the stations that were told about it.
 #[derive(Clone, Copy, Debug)]
 pub struct OperatorControl {
     silent_us: u64,
     /// The station in control, and when it was last heard \[us\].
     holder: Option<(Address, u64)>,
-    /// Stations that were informed that another is in control. The oldest is overwritten.
+    /// Stations that were told that another station is in control. The oldest entry is overwritten.
     informed: [Option<Address>; INFORMED_MAX],
-    /// Place in `informed` to be written next.
+    /// Index in `informed` to be written next.
     next: usize,
 }
 
 /// The answer to a station that wants to command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ControlClaim {
-    /// It is in control.
+    /// The station is in control.
     Granted,
-    /// This one is.
+    /// Another station is in control.
     Refused {
-        /// Who is in control.
+        /// The station in control.
         holder: Address,
         /// True if the station has not been informed yet.
         first_time: bool,
@@ -54,8 +54,8 @@ impl OperatorControl {
         self.holder.filter(heard).map(|(holder, _)| holder)
     }
 
-    /// Notes that any message of a station has arrived; true if it is in control. One that is back before another has
-    /// taken over is so again.
+    /// Notes that a message of a station has arrived. Returns true if the station is in control. A holder that returns
+    /// after a silence is in control again, unless another station has taken over.
     pub fn hear(&mut self, from: Address, now_us: u64) -> bool {
         let is_holder = self.holder.is_some_and(|(holder, _)| holder == from);
         if is_holder {
@@ -64,13 +64,13 @@ impl OperatorControl {
         is_holder
     }
 
-    /// Answers a station that wants to command: it is in control from now on if nobody else is.
+    /// Answers a station that wants to command. It takes control if nobody has it.
     pub fn claim(&mut self, from: Address, now_us: u64) -> ControlClaim {
         match self.holder(now_us) {
             Some(holder) if holder != from => ControlClaim::Refused { holder, first_time: self.is_first_refusal(from) },
             Some(_) => ControlClaim::Granted,
             None => {
-                // Stations know of another holder than this one: each is to be informed anew.
+                // The holder has changed, so every station is to be informed again.
                 (self.holder, self.informed, self.next) = (Some((from, now_us)), [None; INFORMED_MAX], 0);
                 ControlClaim::Granted
             }
@@ -91,7 +91,7 @@ impl OperatorControl {
         (ControlAnswer { station: from.system, control: wish, granted }, claim)
     }
 
-    /// Returns whether a station is informed for the first time.
+    /// Returns true if a station has not been informed yet, and notes that it is now.
     fn is_first_refusal(&mut self, from: Address) -> bool {
         let first_time = !self.informed.contains(&Some(from));
         if first_time {
@@ -104,8 +104,8 @@ impl OperatorControl {
     }
 }
 
-/// True if only the station in control may give this command. Anyone may stop the motors: [`Command::Kill`] also in
-/// flight, [`Command::Disarm`] on the ground; and anyone may ask.
+/// Returns true if only the station in control may give this command. Any station may send requests and may stop the
+/// motors: [`Command::Kill`] works in flight too, [`Command::Disarm`] only on the ground.
 pub fn is_needed_for(command: Command) -> bool {
     match command {
         Command::Arm
@@ -179,7 +179,7 @@ mod tests {
         assert_eq!(control.holder(7), Some(B));
     }
 
-    /// Who lets go of what nobody holds does not take it.
+    /// Releasing control that nobody has is granted and does not take control.
     #[test]
     fn a_release_takes_nothing() {
         let mut control = OperatorControl::default();
@@ -187,14 +187,14 @@ mod tests {
         assert_eq!((answer.granted, answer.station, claim), (true, B.system, ControlClaim::Granted));
         assert_eq!(control.holder(0), None);
         assert_eq!(control.claim(A, 1), ControlClaim::Granted);
-        // Nor does one of another station.
+        // Releasing another station's control is refused and does not take control.
         let (answer, claim) = control.change(Wish::Release, B, 2);
         assert_eq!((answer.granted, claim), (false, ControlClaim::Refused { holder: A, first_time: true }));
         assert_eq!(control.holder(2), Some(A));
     }
 
-    /// Each station is informed once, as long as no more than so many others have been since; another holder is
-    /// announced anew.
+    /// Each station is informed once, unless more than `INFORMED_MAX` others have been informed since. A new holder is
+    /// announced to all again.
     #[test]
     fn stations_are_informed_once() {
         let mut control = OperatorControl::default();
@@ -210,7 +210,7 @@ mod tests {
         for system in 1..=INFORMED_MAX as u8 {
             assert_eq!(informed(&mut control, system), (A, false));
         }
-        // One more takes the place of the first, which takes that of the second.
+        // A further station overwrites the first one, which then overwrites the second one.
         for system in [9, 1] {
             assert_eq!(informed(&mut control, system), (A, true));
         }

@@ -1,16 +1,16 @@
-//! Motor controllers that tell how they are: what stations see of it.
+//! ESC telemetry for stations: ESC_STATUS and ESC_INFO.
 
 use crate::services::status::VehicleStatus;
 use afbc_drivers::esc_telemetry::EscReading;
 use afbc_link::telemetry::{ESCS_PER_MESSAGE, EscInfo, EscStatus};
 use afbc_types::Stamped;
 
-/// Temperature that is unknown.
+/// Value for an unknown temperature.
 const NO_TEMPERATURE: i16 = i16::MAX;
-/// `ESC_FAILURE_FLAGS`: what becomes of a failure.
+/// Bit of `ESC_FAILURE_FLAGS` that marks a failed rotor.
 const GENERIC: u16 = 128;
 
-/// Returns the readings of a message that begins with the controller of this number, and that number.
+/// Returns the number of the first ESC of a group of four, and the readings of the group.
 fn four(status: &VehicleStatus, page: u8) -> Option<(u8, [Option<Stamped<EscReading>>; ESCS_PER_MESSAGE])> {
     let escs = &status.escs;
     let first = page * ESCS_PER_MESSAGE as u8;
@@ -18,9 +18,10 @@ fn four(status: &VehicleStatus, page: u8) -> Option<(u8, [Option<Stamped<EscRead
     (escs.is_known() && first < status.rotors.max(1)).then(|| (first, core::array::from_fn(readings)))
 }
 
-/// Returns ESC_STATUS of the `page`-th four; none unless a motor controller has answered, and the vehicle has so many.
+/// Returns ESC_STATUS of a group of four ESCs. Returns none unless an ESC has answered and the vehicle has that many
+/// rotors.
 pub fn status(status: &VehicleStatus, page: u8) -> Option<EscStatus> {
-    // 60 s / 2 pi: revolutions per minute.
+    // Converts rad/s to revolutions per minute.
     const RPM: f32 = 60.0 / core::f32::consts::TAU;
     let (first, readings) = four(status, page)?;
     let of = |value: fn(&EscReading) -> f32| readings.map(|reading| reading.map_or(0.0, |it| value(&it.value)));
@@ -34,7 +35,7 @@ pub fn status(status: &VehicleStatus, page: u8) -> Option<EscStatus> {
     })
 }
 
-/// Returns ESC_INFO of the `page`-th four, likewise.
+/// Returns ESC_INFO of a group of four ESCs, on the same conditions as [`status`].
 pub fn info(status: &VehicleStatus, page: u8) -> Option<EscInfo> {
     let (first, readings) = four(status, page)?;
     let escs = &status.escs;

@@ -1,11 +1,11 @@
-//! Events, which the vehicle does not send: it reports in texts.
+//! Events interface. The vehicle sends texts, not events, so requests are refused.
 
 use afbc_link::{EventError, EventRequest};
 
-/// `MAV_EVENT_ERROR_REASON`: not available.
+/// `MAV_EVENT_ERROR_REASON_UNAVAILABLE`.
 const UNAVAILABLE: u8 = 0;
 
-/// Returns the answer to a request.
+/// Returns the refusal of a request.
 pub fn answer(request: EventRequest) -> EventError {
     let [number, _] = request.numbers;
     EventError { number, oldest: 0, reason: UNAVAILABLE }

@@ -1,13 +1,13 @@
-//! Extended parameters, which only cameras have.
+//! Extended parameters (PARAM_EXT). Only cameras have them, so requests are refused.
 
 use afbc_link::{ExtendedAnswer, ExtendedRequest};
 
-/// `MAV_PARAM_EXT_TYPE`: of no known type.
+/// `MAV_PARAM_EXT_TYPE_CUSTOM`: the type is not known.
 const CUSTOM: u8 = 11;
-/// `PARAM_ACK`: not supported.
+/// `PARAM_ACK_VALUE_UNSUPPORTED`.
 const UNSUPPORTED: u8 = 1;
 
-/// Returns the answer to a request: there is no parameter.
+/// Returns the refusal of a request.
 pub fn answer(request: ExtendedRequest) -> ExtendedAnswer {
     let none = |name| ExtendedAnswer::Value { name, kind: CUSTOM, count: 0, place: u16::MAX };
     match request {

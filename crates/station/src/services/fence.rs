@@ -1,8 +1,8 @@
-//! The geofence that stations upload: areas to stay in, and areas to stay out of.
+//! The geofence that stations upload: areas of inclusion and areas of exclusion.
 //!
-//! The vehicle must be inside all areas of inclusion, and outside all areas of exclusion, at any height. An area is a
-//! polygon, a vertex an item, or a circle; a circle of radius 0 is none. A few boundaries are looked at after each tick
-//! ([`FenceWatch`]), so that its cost does not depend on their number.
+//! The vehicle must stay inside all inclusions and outside all exclusions, at any height. An area is a circle (one
+//! item) or a polygon (one item per vertex). A circle of radius 0 is ignored. [`FenceWatch`] checks a few boundaries
+//! after each tick, so that its cost does not depend on their number.
 
 use crate::services::items::{Invalid, check_unused};
 use crate::services::origin::LocalChart;
@@ -12,25 +12,25 @@ use afbc_link::{MavCmd, MissionItem, MissionResult};
 use nalgebra::Vector2;
 
 const RETURN_POINT: u16 = MavCmd::MAV_CMD_NAV_FENCE_RETURN_POINT as u16;
-/// To stay in, and to stay out of.
+/// Commands of polygon vertices and circles: inclusion, then exclusion.
 const VERTEX: [u16; 2] = [
     MavCmd::MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION as u16,
     MavCmd::MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION as u16,
 ];
 const CIRCLE: [u16; 2] =
     [MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION as u16, MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION as u16];
-/// Largest radius, and distance of an area from the origin \[m\].
+/// Largest radius of a circle, and largest distance of an area from the origin along each axis \[m\].
 const FAR_M: f32 = 20_000.0;
-/// Boundaries looked at after a tick.
+/// Number of boundaries checked after each tick.
 const LOOKS: usize = 2;
-/// Speed below which a vehicle that was about to leave has stopped \[m/s\], and for how long it must have \[ticks\].
+/// A vehicle that was about to leave has stopped once it has been below this speed \[m/s\] for this time \[ticks\].
 const SLOW_M_S: f32 = 0.5;
 const STOPPED_TICKS: u16 = 500;
 
-/// Checks an item by itself.
+/// Checks one item without the others.
 ///
 /// # Errors
-/// The first thing that is wrong with it.
+/// Returns the first fault of the item.
 pub fn check_item(item: &MissionItem) -> Result<(), Invalid> {
     let refuse = |result, reason| Err(Invalid { result, reason });
     if item.command == RETURN_POINT {
@@ -44,7 +44,7 @@ pub fn check_item(item: &MissionItem) -> Result<(), Invalid> {
     if ![0, 3, 5, 6].contains(&item.frame) {
         return refuse(MissionResult::UNSUPPORTED_FRAME, "frame is not supported");
     }
-    // Unsigned, since the smallest number has no other absolute value.
+    // Unsigned, because `i32::MIN` has no absolute value in `i32`.
     if item.x.unsigned_abs() > 900_000_000 {
         return refuse(MissionResult::INVALID_X, "latitude is out of range");
     }
@@ -64,10 +64,10 @@ pub fn check_item(item: &MissionItem) -> Result<(), Invalid> {
     Ok(())
 }
 
-/// Checks the whole fence, whose items are valid by themselves, for a vehicle at `here_m`, if that is known.
+/// Checks the whole fence for a vehicle at `here_m`, if that is known. The items must be valid one by one.
 ///
 /// # Errors
-/// The number of an item, and what is wrong with it.
+/// Returns the number of an item and its fault.
 pub fn check(
     items: &[MissionItem],
     chart: Option<&LocalChart>,
@@ -121,24 +121,24 @@ pub fn check(
     Ok(())
 }
 
-/// True if a place is inside the fence.
+/// Returns true if a place is inside the fence.
 pub fn contains(items: &[MissionItem], chart: &LocalChart, place_m: Vector2<f32>) -> bool {
     areas(items).all(|area| allows(area, chart, place_m))
 }
 
-/// True if a vehicle can stop at a place: it is well inside the fence.
+/// Returns true if a place is inside the fence by at least the margin, so that a vehicle can stop there.
 pub fn holds(items: &[MissionItem], chart: &LocalChart, place_m: Vector2<f32>) -> bool {
     holds_circle(items, chart, place_m, 0.0)
 }
 
-/// True if the straight way between two places inside the fence does not leave it; also if it begins outside.
+/// Returns true if the straight path between two places does not leave the fence, or if it begins outside.
 pub fn is_clear(items: &[MissionItem], chart: &LocalChart, from_m: Vector2<f32>, to_m: Vector2<f32>) -> bool {
-    // Up to a tenth of the margin, so that a vehicle near the boundary can fly along it.
+    // The path may come as close as a tenth of the margin, so that a vehicle near a boundary can fly along it.
     let path = StopPath { from_m, via_m: to_m, to_m, beside_m: -0.9 * MARGIN_M };
     !contains(items, chart, from_m) || !boundaries(items, chart).any(|boundary| boundary.is_neared(&path))
 }
 
-/// True if a circle is inside the fence.
+/// Returns true if a circular path is inside the fence by at least the margin.
 pub fn holds_circle(items: &[MissionItem], chart: &LocalChart, centre_m: Vector2<f32>, radius_m: f32) -> bool {
     let clear = |boundary: Boundary| match boundary {
         Boundary::Edge(a_m, b_m) => {
@@ -156,52 +156,52 @@ pub fn holds_circle(items: &[MissionItem], chart: &LocalChart, centre_m: Vector2
             }
         }
     };
-    // A point of it is inside, and nothing crosses it: then all of it is.
+    // One point of the circle is inside and no boundary crosses the circle, so all of it is inside.
     contains(items, chart, centre_m + Vector2::new(radius_m, 0.0)) && boundaries(items, chart).all(clear)
 }
 
-/// How the vehicle moves.
+/// Motion of the vehicle relative to the fence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FenceMotion {
-    /// Where it is \[m\].
+    /// Position of the vehicle \[m\].
     pub here_m: Vector2<f32>,
-    /// Its horizontal speed \[m/s\].
+    /// Horizontal speed of the vehicle \[m/s\].
     pub speed_m_s: f32,
-    /// How vehicle and setpoint would stop.
+    /// Stopping paths of the vehicle and of the setpoint.
     pub stops: [StopPath; 2],
 }
 
-/// Looks at the fence, some of its boundaries after each tick.
+/// Watches the fence: checks some of the boundaries after each tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FenceWatch {
-    /// The boundary to be looked at next, by its item; the first of its area, and of the next one.
+    /// Items of the next boundary to check, of the first boundary of its area, and of the next area.
     next: u8,
     first: u8,
     end: u8,
-    /// Where the vehicle was when the polygon was begun \[m\].
+    /// Position of the vehicle at the check of the polygon's first edge \[m\].
     from_m: Vector2<f32>,
-    /// True if an odd number of the polygon's edges has been passed by a ray from there.
+    /// True if a ray from `from_m` has crossed an odd number of the polygon's edges so far.
     odd: bool,
-    /// What has been found since the first boundary.
+    /// Findings since the first boundary: the vehicle is about to leave, or it is outside.
     nears: bool,
     outside: bool,
-    /// Ticks for which it has stopped without being about to leave.
+    /// Number of ticks for which the vehicle has stood still and was not about to leave.
     stopped_ticks: u16,
     view: FenceView,
 }
 
 impl FenceWatch {
-    /// Returns what has been found.
+    /// Returns the state of the fence for the guidance.
     pub fn view(&self) -> FenceView {
         self.view
     }
 
-    /// Begins with another fence.
+    /// Restarts for another fence.
     pub fn renew(&mut self) {
         *self = FenceWatch::default();
     }
 
-    /// Looks at the next boundaries.
+    /// Checks the next boundaries.
     pub fn look(&mut self, items: &[MissionItem], chart: &LocalChart, motion: &FenceMotion) {
         let stopped = motion.speed_m_s < SLOW_M_S;
         self.stopped_ticks = if stopped { self.stopped_ticks.saturating_add(1) } else { 0 };
@@ -222,14 +222,14 @@ impl FenceWatch {
             let nears = motion.stops.iter().any(|path| boundary.is_neared(path));
             self.nears |= nears;
             if nears {
-                // At once: a round of 64 boundaries takes 32 ticks.
+                // The flag is raised at once: a round of 64 boundaries takes 32 ticks.
                 (self.view.leaves, self.stopped_ticks) = (true, 0);
             }
             match boundary {
                 Boundary::Circle { .. } => self.outside |= !boundary.allows(motion.here_m),
                 Boundary::Edge(a_m, b_m) => {
                     if next == begin {
-                        // One place for all edges: with one for each, a moving vehicle would spoil the count.
+                        // All edges use the same position: a moving one would spoil the count of crossings.
                         (self.from_m, self.odd) = (motion.here_m, false);
                     }
                     self.odd ^= passes_edge(self.from_m, a_m, b_m);
@@ -243,10 +243,10 @@ impl FenceWatch {
         }
     }
 
-    /// Ends with the last boundary.
+    /// Ends a round of checks after the last boundary.
     fn end(&mut self) {
         let FenceWatch { nears, outside, stopped_ticks, .. } = *self;
-        // Until it has stopped: a vehicle that brakes is soon no longer about to leave.
+        // The flag stays until the vehicle has stopped: once it brakes, it is soon no longer about to leave.
         let lasts = self.view.leaves && stopped_ticks < STOPPED_TICKS;
         let view = FenceView { leaves: nears || outside || lasts, outside };
         *self = FenceWatch { view, stopped_ticks, ..FenceWatch::default() };
@@ -269,7 +269,7 @@ impl Boundary {
         }
     }
 
-    /// True if a circle does not exclude a place.
+    /// Returns true if a circle permits a place. Always true for an edge.
     fn allows(&self, place_m: Vector2<f32>) -> bool {
         match *self {
             Boundary::Edge(..) => true,
@@ -280,7 +280,7 @@ impl Boundary {
     }
 }
 
-/// Returns a boundary of an area: its circle, or the edge that begins at a vertex; none of a circle of radius 0.
+/// Returns a boundary of an area: its circle, or the edge that begins at a vertex. A circle of radius 0 has none.
 fn boundary(area: &[MissionItem], place: usize, chart: &LocalChart) -> Option<Boundary> {
     let item = area.get(place)?;
     let begin_m = chart.local([item.x, item.y]);
@@ -296,12 +296,12 @@ fn boundary(area: &[MissionItem], place: usize, chart: &LocalChart) -> Option<Bo
     Some(Boundary::Edge(begin_m, chart.local([next.x, next.y])))
 }
 
-/// Returns every boundary of a fence.
+/// Returns all boundaries of a fence.
 fn boundaries<'a>(items: &'a [MissionItem], chart: &'a LocalChart) -> impl Iterator<Item = Boundary> + 'a {
     areas(items).flat_map(|area| (0..area.len()).filter_map(|place| boundary(area, place, chart)))
 }
 
-/// True if an area does not exclude a place.
+/// Returns true if an area permits a place.
 fn allows(area: &[MissionItem], chart: &LocalChart, place_m: Vector2<f32>) -> bool {
     let mut odd = false;
     for boundary in (0..area.len()).filter_map(|place| boundary(area, place, chart)) {
@@ -313,7 +313,7 @@ fn allows(area: &[MissionItem], chart: &LocalChart, place_m: Vector2<f32>) -> bo
     area.first().is_none_or(|item| is_none(item) || odd == is_inclusion(item))
 }
 
-/// Returns the areas, each with its items: as many as the first one says, or what is left.
+/// Splits the items into areas. An area has as many items as its first item says, or all that are left.
 fn areas(items: &[MissionItem]) -> impl Iterator<Item = &[MissionItem]> {
     let mut rest = items;
     core::iter::from_fn(move || {
@@ -324,7 +324,7 @@ fn areas(items: &[MissionItem]) -> impl Iterator<Item = &[MissionItem]> {
     })
 }
 
-/// Returns the number of vertices of the polygon to which an item belongs; none of a circle.
+/// Returns the number of vertices of the item's polygon. Returns none for a circle.
 fn vertices(item: &MissionItem) -> Option<u8> {
     let [count, ..] = item.parameters;
     let whole = count as u8;
@@ -336,7 +336,7 @@ fn is_inclusion(item: &MissionItem) -> bool {
     [vertex, circle].contains(&item.command)
 }
 
-/// True if an item is a circle of radius 0, which MAVSDK sends in place of none.
+/// Returns true if an item is a circle of radius 0, which MAVSDK sends for an empty fence.
 fn is_none(item: &MissionItem) -> bool {
     let [radius_m, ..] = item.parameters;
     CIRCLE.contains(&item.command) && radius_m == 0.0

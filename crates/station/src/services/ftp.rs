@@ -1,26 +1,26 @@
-//! Files by MAVLink's file protocol: <https://mavlink.io/en/services/ftp.html>.
+//! File transfer by MAVLink FTP: <https://mavlink.io/en/services/ftp.html>.
 //!
-//! A request is answered by one packet; a burst by many, which leave as there is room on the link; a checksum when all
-//! of the file has been read, a little at a time. A request that is repeated, because its answer was lost, gets the
-//! same answer again and does nothing a second time.
+//! A request is answered by one packet. A burst is answered by many packets, sent as the link has room. A checksum is
+//! answered once the whole file has been read, a few blocks at a time. A request that is repeated because its answer
+//! was lost gets the same answer again and is not carried out twice.
 
 use super::storage::{FileAccess, FileChange, FilePath, FileStore};
 use afbc_link::{Address, FILE_DATA_MAX, FileOpcode, FilePacket, FtpError};
 
-/// Files that are open at the same time.
+/// Number of files that can be open at the same time.
 pub const SESSIONS: usize = 4;
-/// Stations whose last answer is kept.
+/// Number of stations whose last answer is stored.
 const STATIONS: usize = 4;
-/// Time for which an answer is kept \[us\].
+/// Time for which an answer is stored \[us\].
 const KEPT_US: u64 = 10_000_000;
-/// Time after which a session that nobody uses may be taken \[us\].
+/// An unused session may be replaced after this time \[us\].
 const IDLE_US: u64 = 60_000_000;
-/// Packets of a burst. Then the station asks for the next one: a station that has gone gets no more.
+/// Number of packets in a burst. The station then asks for the next burst, so a lost station gets no more packets.
 const BURST_PACKETS: u16 = 256;
-/// Blocks of [`FILE_DATA_MAX`] bytes whose checksum is calculated at once.
+/// Number of blocks of [`FILE_DATA_MAX`] bytes that are added to a checksum at once.
 const CHECKSUM_BLOCKS: usize = 16;
 
-/// On what terms a request is answered.
+/// Conditions under which a request is answered.
 #[derive(Clone, Copy, Debug)]
 pub struct FileTerms {
     /// Time since power-up \[us\].
@@ -29,18 +29,18 @@ pub struct FileTerms {
     pub may_write: bool,
 }
 
-/// The files that are open, and what was answered.
+/// Open files and stored answers.
 pub struct Ftp<F> {
     sessions: [Option<Session<F>>; SESSIONS],
     answered: [Option<Answered>; STATIONS],
     checksum: Option<Checksum<F>>,
-    /// The session whose burst is served next.
+    /// Index of the session whose burst was served last.
     turn: usize,
 }
 
 struct Session<F> {
     owner: Address,
-    /// Its number, of its owner's own.
+    /// Number of the session; each owner has numbers of its own.
     number: u8,
     file: F,
     writes: bool,
@@ -48,14 +48,14 @@ struct Session<F> {
     burst: Option<Burst>,
 }
 
-/// A burst that is under way.
+/// A burst in progress.
 #[derive(Clone, Copy)]
 struct Burst {
-    /// Number of the next packet.
+    /// Sequence number of the next packet.
     sequence: u16,
     offset: u32,
     size: u8,
-    /// Packets that are left.
+    /// Number of packets left.
     left: u16,
 }
 
@@ -66,7 +66,7 @@ struct Answered {
     at_us: u64,
 }
 
-/// A checksum that is being calculated.
+/// A checksum in progress.
 struct Checksum<F> {
     from: Address,
     request: FilePacket,
@@ -82,7 +82,8 @@ impl<F> Default for Ftp<F> {
 }
 
 impl<F: Copy> Ftp<F> {
-    /// Answers a request; none if what it asks for comes as [packets](Self::next_packet), or it is an answer itself.
+    /// Answers a request. Returns none if the answer comes as [packets](Self::next_packet) or the request is itself an
+    /// answer.
     pub fn answer(
         &mut self,
         from: Address,
@@ -99,7 +100,7 @@ impl<F: Copy> Ftp<F> {
         if let Some(again) = self.answered.iter().flatten().find(is_again) {
             return Some(again.reply);
         }
-        // It is being calculated: the answer to the first request is that to this one.
+        // This checksum is being calculated. The answer to the first request also answers its repetition.
         if self.checksum.as_ref().is_some_and(|it| it.from == from && it.request == *request) {
             return None;
         }
@@ -111,7 +112,7 @@ impl<F: Copy> Ftp<F> {
         Some(reply)
     }
 
-    /// Returns the next packet of a burst, or a checksum that is ready, and who gets it.
+    /// Returns the next packet of a burst or a finished checksum, with its receiver.
     pub fn next_packet(&mut self, store: &mut impl FileStore<File = F>, now_us: u64) -> Option<(FilePacket, Address)> {
         if let Some(ready) = self.go_on_with_checksum(store, now_us) {
             return Some(ready);
@@ -130,7 +131,7 @@ impl<F: Copy> Ftp<F> {
         None
     }
 
-    /// True while there may be a [packet](Self::next_packet).
+    /// Returns true if there may be a [packet](Self::next_packet).
     pub fn is_busy(&self) -> bool {
         self.checksum.is_some() || self.sessions.iter().flatten().any(|session| session.burst.is_some())
     }
@@ -220,19 +221,19 @@ impl<F: Copy> Ftp<F> {
         }))
     }
 
-    /// Returns the place of a session of this station.
+    /// Returns the index of a station's session.
     fn place_of(&self, from: Address, number: u8) -> Option<usize> {
         let is_it = |it: &Option<Session<F>>| it.as_ref().is_some_and(|it| it.owner == from && it.number == number);
         self.sessions.iter().position(is_it)
     }
 
-    /// Returns a session of this station.
+    /// Returns a station's session.
     fn session(&mut self, from: Address, number: u8, now_us: u64) -> Result<&mut Session<F>, FtpError> {
         let place = self.place_of(from, number);
         let session = place.and_then(|place| self.sessions.get_mut(place)?.as_mut());
         let session = session.ok_or(FtpError::INVALID_SESSION)?;
         session.used_us = now_us;
-        // Whoever asks for something else has enough of a burst.
+        // Any other request of the session ends its burst.
         session.burst = None;
         Ok(session)
     }
@@ -260,11 +261,11 @@ impl<F: Copy> Ftp<F> {
             }
         };
         let (file, size) = store.open(path, access)?;
-        // Only now: a file that cannot be opened costs no idle session.
+        // An idle session is closed only now: a file that cannot be opened costs none.
         self.close(place, store);
-        // ArduPilot's clients number their sessions themselves; others ask with 0 and take what they are told.
+        // ArduPilot's clients choose session numbers. Other clients send 0 and take the number in the answer.
         let mut wanted = [request.session].into_iter().chain(0..=u8::MAX);
-        // There is one: of 256 numbers a station has four at most.
+        // A number is free: a station has at most four sessions and there are 256 numbers.
         let number = wanted.find(|number| self.place_of(from, *number).is_none()).unwrap_or_default();
         if let Some(session) = self.sessions.get_mut(place) {
             let writes = access != FileAccess::Read;
@@ -277,7 +278,7 @@ impl<F: Copy> Ftp<F> {
     fn keep(&mut self, from: Address, request: FilePacket, reply: FilePacket, now_us: u64) {
         let own = self.answered.iter().position(|it| it.as_ref().is_some_and(|it| it.from == from));
         let oldest = || {
-            // An empty place is older than any answer.
+            // An empty entry counts as older than any answer.
             let ages = self.answered.iter().map(|it| it.as_ref().map_or(0, |it| it.at_us + 1));
             ages.enumerate().min_by_key(|(_, age)| *age).map(|(place, _)| place)
         };
@@ -316,10 +317,10 @@ impl<F: Copy> Ftp<F> {
 }
 
 impl Burst {
-    /// Returns the next packet, and what is left of the burst behind it.
+    /// Returns the next packet and the rest of the burst.
     fn next<F: Copy>(self, session: u8, file: F, store: &mut impl FileStore<File = F>) -> (FilePacket, Option<Self>) {
         let Burst { sequence, offset, size, left } = self;
-        // The number before: `ack` and `nak` count on by one.
+        // `ack` and `nak` add one to the sequence number.
         let request = FilePacket::request(sequence.wrapping_sub(1), FileOpcode::BURST_READ_FILE, session, offset, size);
         let mut block = [0; FILE_DATA_MAX];
         let into = block.get_mut(..size.into()).unwrap_or_default();
@@ -336,7 +337,7 @@ impl Burst {
     }
 }
 
-/// True of the operations that change files.
+/// Returns true if an operation changes files.
 pub fn changes(opcode: FileOpcode) -> bool {
     matches!(
         opcode,
@@ -351,14 +352,14 @@ pub fn changes(opcode: FileOpcode) -> bool {
     )
 }
 
-/// Continues a checksum, of 0 at the beginning: the polynomial of CRC-32, without its inversions.
+/// Continues a checksum, which begins with 0: CRC-32 without its initial and final inversions.
 pub fn crc32(crc: u32, bytes: &[u8]) -> u32 {
     bytes.iter().fold(crc, |crc, byte| {
         (0..8).fold(crc ^ u32::from(*byte), |crc, _| if crc & 1 == 1 { (crc >> 1) ^ 0xEDB8_8320 } else { crc >> 1 })
     })
 }
 
-/// Returns how much is wanted \[bytes\]; older stations do not say.
+/// Returns the number of bytes to read. Older stations send 0 for as many as possible.
 fn length(size: u8) -> usize {
     if size == 0 { FILE_DATA_MAX } else { usize::from(size).min(FILE_DATA_MAX) }
 }
@@ -373,7 +374,7 @@ fn nak(request: &FilePacket, FtpError(error): FtpError) -> FilePacket {
     FilePacket { opcode: FileOpcode::NAK, ..ack(request) }.with(&[error])
 }
 
-/// Returns as many entries of a directory as fit: 'F', name, tab, size; or 'D', name; each with a zero behind it.
+/// Returns as many directory entries as fit: "F", name, tab, size; or "D", name. A zero ends each entry.
 fn list(request: &FilePacket, path: &FilePath, store: &mut impl FileStore) -> Result<FilePacket, FtpError> {
     use core::fmt::Write;
     let mut text = heapless::String::<FILE_DATA_MAX>::new();
@@ -385,7 +386,7 @@ fn list(request: &FilePacket, path: &FilePath, store: &mut impl FileStore) -> Re
             None => write!(text, "D{}\0", entry.name),
         };
         if written.is_err() {
-            // No part of an entry: it is the first of the next packet.
+            // An entry is not split: the next packet begins with it.
             text.truncate(length);
             break;
         }

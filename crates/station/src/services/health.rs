@@ -1,11 +1,11 @@
-//! The vehicle's health as stations read it.
+//! Health of the vehicle: SYS_STATUS, ESTIMATOR_STATUS and the landed state.
 
 use crate::services::status::{AuxSensors, VehicleStatus};
 use afbc_flight_core::{Mode, Reasons};
 use afbc_guidance::FlightMode;
 use afbc_link::telemetry::{BatteryStatus, EstimatorStatus, SystemStatus};
 
-/// `MAV_SYS_STATUS_SENSOR`.
+/// Bits of `MAV_SYS_STATUS_SENSOR`.
 pub mod sensor {
     #![allow(missing_docs, reason = "MAVLink's names")]
     pub const GYROSCOPE: u32 = 1;
@@ -22,23 +22,23 @@ pub mod sensor {
     pub const ARMING: u32 = 0x1000_0000;
 }
 
-/// Sensors with which a vehicle that has them does not start unless they are well.
+/// Sensors that must be healthy before the vehicle can be armed, if the vehicle has them.
 pub(super) const NEEDED: u32 =
     sensor::GYROSCOPE | sensor::ACCELEROMETER | sensor::GYROSCOPE_2 | sensor::ACCELEROMETER_2 | sensor::MAGNETOMETER;
 
-/// `MAV_LANDED_STATE`.
+/// Values of `MAV_LANDED_STATE`.
 const ON_GROUND: u8 = 1;
 const IN_AIR: u8 = 2;
 const TAKING_OFF: u8 = 3;
 const LANDING: u8 = 4;
 
 impl AuxSensors {
-    /// Puts what a battery's converter has read: voltage \[V\] and current \[A\], if that is measured; none for a
-    /// converter that reads no battery.
+    /// Sets the battery's voltage \[V\] and current \[A\], if the current is measured. None means that no battery was
+    /// read.
     pub fn put_battery(&mut self, reading: Option<(f32, Option<f32>)>) {
         self.sensors.present |= sensor::BATTERY;
         self.battery = reading.map(|(voltage_v, current_a)| BatteryStatus {
-            // The two largest numbers mean other things.
+            // The two largest values have special meanings.
             voltage_mv: (voltage_v * 1e3).min(65_533.0) as u16,
             current_ca: current_a.map_or(-1, |current_a| (current_a * 1e2) as i16),
             consumed_mah: -1,
@@ -51,7 +51,7 @@ impl AuxSensors {
 /// Returns SYS_STATUS.
 pub fn system(status: &VehicleStatus) -> SystemStatus {
     let aux = &status.aux;
-    // Of two inertial sensors the shell reports each.
+    // With two IMUs, the shell reports each of them.
     let first = (sensor::GYROSCOPE | sensor::ACCELEROMETER) & !aux.sensors.present;
     let inertial = first | sensor::ATTITUDE;
     let located = status.is_located();
@@ -76,7 +76,7 @@ pub fn system(status: &VehicleStatus) -> SystemStatus {
         present,
         enabled: present,
         healthy,
-        // Of a tick's millisecond.
+        // Share of the tick's 1 ms that was used.
         load_permille: status.tick_us.clamp(0.0, 1000.0) as u16,
         voltage_mv: battery.map_or(u16::MAX, |battery| battery.voltage_mv),
         current_ca: battery.map_or(-1, |battery| battery.current_ca),
@@ -85,11 +85,11 @@ pub fn system(status: &VehicleStatus) -> SystemStatus {
     }
 }
 
-/// Returns ESTIMATOR_STATUS. Uncertainties are those of the satellite receiver, where there is one.
+/// Returns ESTIMATOR_STATUS. Its uncertainties are those of the satellite receiver, if there is one.
 pub fn estimator(status: &VehicleStatus) -> EstimatorStatus {
-    /// ATTITUDE, VELOCITY_HORIZ, VELOCITY_VERT, POS_HORIZ_REL, POS_VERT_ABS.
+    /// Bits of `ESTIMATOR_STATUS_FLAGS`: ATTITUDE, VELOCITY_HORIZ, VELOCITY_VERT, POS_HORIZ_REL, POS_VERT_ABS.
     const MOTION: u16 = 1 | 2 | 4 | 8 | 32;
-    /// POS_HORIZ_ABS.
+    /// Bit POS_HORIZ_ABS.
     const ABSOLUTE: u16 = 16;
     let located = status.is_located();
     let absolute = located && status.aux.origin.is_some();
@@ -129,7 +129,7 @@ mod tests {
         status
     }
 
-    /// What MAVSDK's `health` reads: gyroscope, accelerometer, magnetometer, position, arming.
+    /// MAVSDK's `health` reads these bits: gyroscope, accelerometer, magnetometer, position, arming.
     #[test]
     fn a_vehicle_outdoors_is_all_well() {
         let SystemStatus { present, enabled, healthy, .. } = system(&well());
@@ -158,7 +158,7 @@ mod tests {
         }
     }
 
-    /// A converter's readings become SYS_STATUS; one that reads no battery is a sensor that is there and not well.
+    /// A battery's readings become SYS_STATUS. Without a reading the battery is present but not healthy.
     #[test]
     fn a_battery_is_told() {
         for (reading, told, healthy) in [
@@ -192,7 +192,7 @@ mod tests {
         assert_eq!(landed(&status), LANDING);
     }
 
-    /// Every set of what there is and what is well, by the definition of each bit.
+    /// All combinations of present and healthy sensors give the bits of their definitions.
     #[test]
     fn every_bit_is_there_and_well_by_what_it_means() {
         for case in 0..128_u32 {
@@ -247,7 +247,7 @@ mod tests {
         let mut status = well();
         status.time_us = 42;
         assert_eq!((estimator(&status).time_us, estimator(&status).sigma_m), (42, [0.5, 0.8]));
-        // What the shell says is ill is ill, and what is not there is not well.
+        // A sensor that the shell reports unhealthy is unhealthy. An absent sensor is not healthy.
         let sensors = SensorBits { present: sensor::BAROMETER, healthy: sensor::MAGNETOMETER };
         status.aux.sensors = sensors;
         let reported = system(&status);

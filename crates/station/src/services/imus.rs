@@ -1,23 +1,23 @@
-//! Two inertial sensors, of which one flies: what stations are told of them.
+//! Reports of two IMUs, one of which is used for flying.
 //!
-//! MAVLink has no field for the one that flies: a text tells each change. SYS_STATUS tells of each whether it works.
+//! MAVLink has no field for the IMU in use, so a text announces each change. SYS_STATUS shows whether each IMU works.
 
 use crate::services::health::sensor;
 use crate::services::status::SensorBits;
 use afbc_onboard::ImuPair;
 
-/// Time after power-up from which on a sensor that has read nothing has failed \[us\].
+/// An IMU without readings counts as failed from this time after power-up on \[us\].
 const SET_UP_US: u64 = 3_000_000;
 /// Shortest time between two texts \[us\].
 const PAUSE_US: u64 = 1_000_000;
 
-/// Of each sensor: its bits, and what it is called.
+/// For each IMU: its bits in SYS_STATUS and its texts.
 const BITS: [u32; 2] = [sensor::GYROSCOPE | sensor::ACCELEROMETER, sensor::GYROSCOPE_2 | sensor::ACCELEROMETER_2];
 const IN_USE: [&str; 2] = ["IMU 1 in use instead of IMU 2", "IMU 2 in use instead of IMU 1"];
 const FAILED: [&str; 2] = ["IMU 1 failed", "IMU 2 failed"];
 const WORKS: [&str; 2] = ["IMU 1 works again", "IMU 2 works again"];
 
-/// What has been told of two inertial sensors.
+/// State of two IMUs as announced to stations.
 #[derive(Clone, Copy, Debug)]
 pub struct ImuNews {
     second_flies: bool,
@@ -27,11 +27,11 @@ pub struct ImuNews {
 }
 
 impl ImuNews {
-    /// Nothing: the first flies, and both work.
+    /// Initial state: IMU 1 is in use, and both work.
     pub const NEW: Self = ImuNews { second_flies: false, works: [true; 2], told_us: None };
 
-    /// Returns what is to be told at `now_us`: which sensor flies, if that has changed; then, which does not work any
-    /// more, or works again. At most one text a second: what changes back within it is not told.
+    /// Returns the next text at `now_us`. A change of the IMU in use comes first, then an IMU that fails or works
+    /// again. There is at most one text per second, so a change that is undone within a second is not announced.
     pub fn look(&mut self, now_us: u64, pair: &ImuPair) -> Option<&'static str> {
         if self.told_us.is_some_and(|told_us| now_us.saturating_sub(told_us) < PAUSE_US) {
             return None;
@@ -58,7 +58,7 @@ impl ImuNews {
     }
 }
 
-/// Returns which sensors are there and well.
+/// Returns the IMUs that are present and healthy.
 pub fn bits(pair: &ImuPair) -> SensorBits {
     let of =
         |which: [bool; 2]| which.into_iter().zip(BITS).fold(0, |all, (is, bits)| if is { all | bits } else { all });
@@ -76,7 +76,7 @@ mod tests {
 
     const WELL: ImuPair = ImuPair { second_flies: false, present: [true; 2], works: [true; 2] };
 
-    /// Returns what is told within `seconds`, of a pair that does not change.
+    /// Returns the texts within `seconds` while `pair` does not change.
     fn told(news: &mut ImuNews, from_us: u64, seconds: u64, pair: &ImuPair) -> Vec<(u64, &'static str)> {
         let times = (0..seconds * 1000).map(|ms| from_us + ms * 1000);
         times.filter_map(|now_us| Some((now_us, news.look(now_us, pair)?))).collect()
@@ -96,7 +96,7 @@ mod tests {
         assert_eq!(told(&mut news, 30_000_000, 10, &second), texts);
     }
 
-    /// A sensor that has not been set up yet has not failed; one that never answers has.
+    /// An IMU that is not set up yet has not failed. An IMU that never answers has.
     #[test]
     fn nothing_has_failed_before_it_could_be_set_up() {
         let mut news = ImuNews::NEW;
@@ -106,7 +106,7 @@ mod tests {
         assert_eq!(told(&mut news, 1_000_000, 9, &one), [(3_000_000, "IMU 2 failed")]);
     }
 
-    /// However often it changes, a text a second at most, each fits into STATUSTEXT, and the last says how it is.
+    /// Frequent changes cause at most one text per second. Each fits into STATUSTEXT, and the last one is right.
     #[test]
     fn a_flood_of_changes_is_none_of_texts() {
         let mut news = ImuNews::NEW;
@@ -120,7 +120,7 @@ mod tests {
         assert_eq!(texts.last(), Some(&"IMU 1 in use instead of IMU 2"));
     }
 
-    /// SYS_STATUS shows each sensor, whichever flies.
+    /// SYS_STATUS shows both IMUs, whichever is in use.
     #[test]
     fn system_status_shows_each() {
         for (works, healthy) in [([true, true], 0x6_0003), ([false, true], 0x6_0000), ([true, false], 3)] {

@@ -1,4 +1,4 @@
-//! Items of a mission: what is valid, and what the guidance makes of it.
+//! Checks mission items and converts them to the guidance's items.
 
 use crate::services::origin::{EarthOrigin, LocalChart, resolve};
 use crate::services::texts::Words;
@@ -27,7 +27,7 @@ const LOOK_NOWHERE: u16 = MavCmd::MAV_CMD_DO_SET_ROI_NONE as u16;
 const OLD_LOOK: u16 = MavCmd::MAV_CMD_DO_SET_ROI as u16;
 const RALLY_POINT: u16 = MavCmd::MAV_CMD_NAV_RALLY_POINT as u16;
 
-/// Commands that stations put into missions and that are refused, with their names.
+/// Commands that stations use in missions but that are refused, with their names for the texts.
 const NAMES: [(u16, &str); 19] = [
     (82, "NAV_SPLINE_WAYPOINT"),
     (84, "NAV_VTOL_TAKEOFF"),
@@ -49,28 +49,28 @@ const NAMES: [(u16, &str); 19] = [
     (2500, "VIDEO_START_CAPTURE"),
     (2501, "VIDEO_STOP_CAPTURE"),
 ];
-/// Reason that follows the name of a command, and one that follows the number of a parameter.
+/// Ends of texts, after the name of a command and after the number of a parameter.
 const UNSUPPORTED: &str = " unsupported";
 const NOT_USED: &str = " must be 0";
-/// A place that is not flown to.
+/// Refusal of a place that is too far away.
 pub(super) const FAR: Invalid = Invalid { result: MissionResult::INVALID_X, reason: "too far away" };
-/// Most repetitions of a jump.
+/// Most repetitions of a DO_JUMP.
 const REPEATS_MAX: f32 = 1000.0;
 
-/// Why an item is refused.
+/// Reason why an item is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Invalid {
-    /// As the protocol has it.
+    /// Result for MISSION_ACK.
     pub result: MissionResult,
-    /// In words; for a command that is not supported, what follows its name.
+    /// Reason in words. For an unsupported command: the end of the text, after its name.
     pub reason: &'static str,
 }
 
 impl Invalid {
-    /// A command that is not supported.
+    /// Refusal of an unsupported command.
     pub const COMMAND: Self = Invalid { result: MissionResult::UNSUPPORTED, reason: UNSUPPORTED };
 
-    /// Returns a text on the item of this number and command in a plan.
+    /// Returns the text about an item of a plan, given the item's number and command.
     pub(super) fn text(self, plan: &str, number: u16, command: u16) -> Words {
         let words = Words::of(plan).and(" item ").number(number.into()).and(": ");
         if self.reason == NOT_USED {
@@ -88,10 +88,10 @@ impl Invalid {
     }
 }
 
-/// Checks an item of a mission.
+/// Checks a mission item.
 ///
 /// # Errors
-/// The first thing that is wrong with it.
+/// Returns the first fault of the item.
 pub fn check(item: &MissionItem) -> Result<(), Invalid> {
     let refuse = |result, reason| Err(Invalid { result, reason });
     let used = used(item).ok_or(Invalid::COMMAND)?;
@@ -123,7 +123,7 @@ pub fn check(item: &MissionItem) -> Result<(), Invalid> {
         DELAY => return refuse(MissionResult::INVALID_PARAM1, "delay is out of range"),
         YAW => {
             return match item.parameters {
-                // False of NaN.
+                // A NaN is not in the range either.
                 [angle, ..] if !(-3600.0..=3600.0).contains(&angle) => {
                     refuse(MissionResult::INVALID_PARAM1, "angle is out of range")
                 }
@@ -141,17 +141,17 @@ pub fn check(item: &MissionItem) -> Result<(), Invalid> {
                 Ok(())
             };
         }
-        // Never: it is used above.
+        // Unreachable: `used` has refused all other commands.
         _ => return Err(Invalid::COMMAND),
     }
     let Some(place) = place(item) else {
         return refuse(MissionResult::UNSUPPORTED_FRAME, "frame is not supported");
     };
-    // A take-off and a landing may be where the vehicle is.
+    // A take-off or a landing may be at the vehicle's present place.
     if !is_here(item) {
         on_earth(&place)?;
     }
-    // Heights of a landing and of a region do not matter.
+    // The height of a landing or of a region of interest is not used.
     let any_height = item.z.is_nan() && [LAND, LOOK, OLD_LOOK].contains(&item.command);
     if !any_height && !(-1e5..=1e5).contains(&item.z) {
         return refuse(MissionResult::INVALID_Z, "altitude is out of range");
@@ -179,7 +179,7 @@ pub fn check(item: &MissionItem) -> Result<(), Invalid> {
 /// Checks a rally point.
 ///
 /// # Errors
-/// The first thing that is wrong with it.
+/// Returns the first fault of the rally point.
 pub(super) fn check_rally(item: &MissionItem, origin: Option<&EarthOrigin>) -> Result<(), Invalid> {
     if item.command != RALLY_POINT {
         return Err(Invalid::COMMAND);
@@ -194,10 +194,10 @@ pub(super) fn check_rally(item: &MissionItem, origin: Option<&EarthOrigin>) -> R
     if near { Ok(()) } else { Err(FAR) }
 }
 
-/// Parameters of a place, a bit each.
+/// Bits of the parameters of a place: x, y and z.
 const PLACE: u8 = 0b111_0000;
 
-/// Returns which parameters of a command are used, a bit each from the first on; none of a command that is not known.
+/// Returns the bits of the parameters that a command uses, from the lowest on. Returns none for an unknown command.
 fn used(item: &MissionItem) -> Option<u8> {
     let [first, ..] = item.parameters;
     Some(match item.command {
@@ -205,7 +205,7 @@ fn used(item: &MissionItem) -> Option<u8> {
         LOITER => PLACE | 0b1000,
         LOITER_TURNS => PLACE | 0b0101,
         LOITER_TIME => PLACE | 0b1001,
-        // The pitch is a fixed wing's, which ground stations write into the take-off of any vehicle.
+        // The pitch is for fixed-wing aircraft, but ground stations set it for any vehicle.
         TAKE_OFF => PLACE | 0b0001,
         LAND | LOITER_TO_ALTITUDE | LOOK => PLACE,
         RETURN | LOOK_NOWHERE => 0,
@@ -219,10 +219,10 @@ fn used(item: &MissionItem) -> Option<u8> {
     })
 }
 
-/// Checks that nothing is asked for by parameters that are not `used`, a bit each: nothing is ignored in silence.
+/// Checks that no parameter outside the bits `used` is set, so that nothing is ignored silently.
 ///
 /// # Errors
-/// The first one that is neither 0 nor left out.
+/// Returns the first parameter that is neither 0 nor omitted.
 pub(in crate::services) fn check_unused(item: &MissionItem, used: u8) -> Result<(), Invalid> {
     let [p1, p2, p3, p4] = item.parameters.map(is_neutral);
     let [x, y] = [item.x, item.y].map(|whole| whole == 0 || whole == Place::AS_IT_IS);
@@ -235,17 +235,17 @@ pub(in crate::services) fn check_unused(item: &MissionItem, used: u8) -> Result<
     Ok(())
 }
 
-/// True of a parameter that asks for nothing.
+/// Returns true if a parameter is 0 or omitted.
 fn is_neutral(value: f32) -> bool {
     value == 0.0 || value.is_nan()
 }
 
-/// Speeds and throttles of DO_CHANGE_SPEED that change nothing, and that are the usual ones again.
+/// Values of DO_CHANGE_SPEED that keep the speed or throttle, or restore the default.
 const KEPT: [f32; 2] = [NO_CHANGE, USUAL];
 const NO_CHANGE: f32 = -1.0;
 const USUAL: f32 = -2.0;
 
-/// True of a take-off or a landing where the vehicle is.
+/// Returns true for a take-off or a landing at the vehicle's present place.
 fn is_here(item: &MissionItem) -> bool {
     let nowhere = [[0; 2], [Place::AS_IT_IS; 2]].contains(&[item.x, item.y]);
     nowhere && [TAKE_OFF, LAND].contains(&item.command)
@@ -261,11 +261,11 @@ fn on_earth(place: &Place) -> Result<(), Invalid> {
     Ok(())
 }
 
-/// Checks the jumps of a whole mission, whose items are valid by themselves: each leads to another item, and none goes
-/// around for ever without an item that takes time.
+/// Checks all jumps of a mission. The items must be valid one by one. Each jump must lead to another item, and no
+/// endless loop may consist only of items that take no time.
 ///
 /// # Errors
-/// The number of a jump, and what is wrong with it.
+/// Returns the number of a jump and its fault.
 pub(super) fn check_jumps(items: &[MissionItem]) -> Result<(), (u16, Invalid)> {
     let at = |place: usize| items.get(place);
     let takes_time = |item: &MissionItem| ![JUMP, SPEED, LOOK, LOOK_NOWHERE, OLD_LOOK].contains(&item.command);
@@ -277,13 +277,13 @@ pub(super) fn check_jumps(items: &[MissionItem]) -> Result<(), (u16, Invalid)> {
             return refuse(MissionResult::NO_SPACE, "more than 8 jumps");
         }
         let [target, ..] = item.parameters;
-        // Whole and not negative: `check` has refused all others.
+        // The target is a whole number and not negative, as `check` ensures.
         if target as usize >= items.len() || target as usize == place {
             return refuse(MissionResult::INVALID_PARAM1, "there is no such item");
         }
-        // Jumps that end are over some time.
+        // Jumps with a limited number of repetitions end at some time.
         let mut next = place;
-        // After as many steps as there are items, one has come twice: then it goes around.
+        // More steps than items mean that an item was reached twice: the loop is endless.
         let ends = (0..=items.len()).any(|_| {
             let Some(item) = at(next).filter(|item| !takes_time(item)) else { return true };
             let [target, repeats, ..] = item.parameters;
@@ -297,16 +297,16 @@ pub(super) fn check_jumps(items: &[MissionItem]) -> Result<(), (u16, Invalid)> {
     Ok(())
 }
 
-/// Most jumps of a mission.
+/// Most jumps in a mission.
 pub(super) const JUMPS_MAX: usize = 8;
 
-/// Returns a whole number up to `most`.
+/// Returns the number if it is whole and at most `most`.
 fn whole(number: f32, most: f32) -> Option<u16> {
     let whole = number as u16;
     ((0.0..=most).contains(&number) && f32::from(whole) == number).then_some(whole)
 }
 
-/// Returns where an item wants the vehicle to be, horizontally \[m\]; none of an item without a place.
+/// Returns the horizontal position that an item leads the vehicle to \[m\]. Returns none for an item without a place.
 pub(super) fn stop_m(item: &MissionItem, chart: &LocalChart) -> Option<Vector2<f32>> {
     let stops = [TAKE_OFF, WAYPOINT, LOITER, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE, LAND];
     if is_here(item) || !stops.contains(&item.command) {
@@ -318,8 +318,8 @@ pub(super) fn stop_m(item: &MissionItem, chart: &LocalChart) -> Option<Vector2<f
     Some(chart.local([item.x, item.y]))
 }
 
-/// Returns the item in the local frame; none for a place on the earth while the origin is unknown, or an invalid item.
-/// `home_m` is the height of home.
+/// Converts an item to the guidance's type, in the local frame. Returns none for an invalid item, or for a global place
+/// while the origin is unknown. `home_m` is the height of home.
 pub fn to_guidance(item: &MissionItem, origin: Option<&EarthOrigin>, home_m: f32) -> Option<Item> {
     let [first, second, third, fourth] = item.parameters;
     let or_zero = |number: f32| if number.is_nan() { 0.0 } else { number };
@@ -327,7 +327,7 @@ pub fn to_guidance(item: &MissionItem, origin: Option<&EarthOrigin>, home_m: f32
     Some(match item.command {
         TAKE_OFF if is_here(item) => Item::TakeOff { height_m: position_m()?.z },
         TAKE_OFF => Item::TakeOffTo { position_m: position_m()? },
-        // 0 repetitions are none, and -1 are any number: see `Jumps`.
+        // `Jumps` counts the repetitions: 0 for none, -1 for no limit.
         JUMP => Item::Jump(whole(first, f32::from(u8::MAX))?),
         LOITER => Item::Waypoint {
             position_m: position_m()?,
@@ -345,7 +345,7 @@ pub fn to_guidance(item: &MissionItem, origin: Option<&EarthOrigin>, home_m: f32
             fly_through: false,
         },
         DELAY => Item::Wait(first),
-        // Directions are to the right.
+        // MAVLink's angles are clockwise.
         YAW => Item::Yaw { yaw_rad: -first.to_radians(), relative: fourth == 1.0, direction: -(third as i8) },
         LOOK_NOWHERE => Item::Look { at_m: Vector3::repeat(f32::NAN) },
         OLD_LOOK if first == 0.0 => Item::Look { at_m: Vector3::repeat(f32::NAN) },
@@ -373,7 +373,7 @@ pub fn to_guidance(item: &MissionItem, origin: Option<&EarthOrigin>, home_m: f32
     })
 }
 
-/// Returns the place of an item in a global frame or, with coordinates in metres, in the local one.
+/// Returns the place of an item. For an item in the local frame only the height counts.
 fn place(item: &MissionItem) -> Option<Place> {
     let above = match item.frame {
         0 | 5 | LOCAL_NED => Datum::Sea,
@@ -381,13 +381,13 @@ fn place(item: &MissionItem) -> Option<Place> {
         _ => return None,
     };
     let height = Height { metres: item.z, above };
-    // Metres of the local frame are no degrees.
+    // The local coordinates are not degrees, so they are replaced by valid ones.
     let coordinates = if item.frame == LOCAL_NED { [1; 2] } else { [item.x, item.y] };
     let [latitude_e7, longitude_e7] = coordinates;
     Some(Place { latitude_e7, longitude_e7, height })
 }
 
-/// MAV_FRAME_LOCAL_NED.
+/// `MAV_FRAME_LOCAL_NED`.
 const LOCAL_NED: u8 = 1;
 
 fn resolve_item(item: &MissionItem, origin: Option<&EarthOrigin>, home_m: f32) -> Option<Vector3<f32>> {

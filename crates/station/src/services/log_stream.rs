@@ -1,50 +1,50 @@
-//! The black box's log while it is made: MAV_CMD_LOGGING_START, LOGGING_DATA_ACKED, LOGGING_ACK, LOGGING_DATA.
+//! Streams the flight log while it is written: MAV_CMD_LOGGING_START, LOGGING_DATA_ACKED, LOGGING_ACK, LOGGING_DATA.
 //!
-//! As PX4 does it: the definitions at the log's beginning come in parts each of which must be acknowledged before the
-//! next is sent, so that the log can be read whatever of the rest is lost. From its first message of data on, parts
-//! are sent once; each names its first whole record, so that a reader finds its way after a loss.
+//! The protocol is PX4's. The definitions at the beginning of the log are sent in parts, each of which must be
+//! acknowledged before the next is sent. So the log can be read even if later parts are lost. All parts after the
+//! definitions are sent once. Each part names its first whole record, so that a reader can continue after a loss.
 
 use super::storage::LogSource;
 use afbc_link::{Address, STREAM_DATA_MAX, StreamedLog};
 
-/// Time after which a part that is not acknowledged is sent again, and how often it is sent \[us\].
+/// A part without an acknowledgement is sent again after this time \[us\], and this many times in all.
 const REPEAT_US: u64 = 200_000;
 const TRIES: u8 = 25;
-/// Length of a log's header \[bytes\].
+/// Length of the ULog file header \[bytes\].
 const HEADER: u32 = 16;
-/// Bytes of a record before its content: length, kind.
+/// Length of a record's header \[bytes\]: length and type.
 const HEAD: usize = 3;
-/// Kinds of records that belong to the definitions.
+/// Types of records that belong to the definitions.
 const DEFINITIONS: &[u8] = b"BFIMPQA";
 
-/// The log that one station gets.
+/// Log stream to one station.
 #[derive(Clone, Debug, Default)]
 pub struct LogStream {
-    /// None if there is none.
+    /// The stream, if one is active.
     stream: Option<Stream>,
 }
 
-/// What has become of a stream.
+/// Result of a step of the stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(clippy::large_enum_variant, reason = "one at a time")]
 pub enum StreamEvent {
-    /// A part is to be sent.
+    /// This part is to be sent.
     Part(StreamedLog),
-    /// The station does not acknowledge, and the stream has ended.
+    /// The station has not acknowledged a part, and the stream has ended.
     Unheard,
 }
 
 #[derive(Clone, Debug)]
 struct Stream {
     to: Address,
-    /// Number of the next part.
+    /// Sequence number of the next part.
     sequence: u16,
-    /// True until the first record of data.
+    /// True until the first data record.
     defines: bool,
     records: Records,
-    /// The part that is being filled.
+    /// Part that is being filled.
     part: Part,
-    /// The part that is to be acknowledged, when it was sent last, and how often.
+    /// Part to be acknowledged, the time at which it was last sent, and the number of times it was sent.
     waiting: Option<(StreamedLog, u64, u8)>,
 }
 
@@ -52,7 +52,7 @@ struct Stream {
 struct Part {
     bytes: [u8; STREAM_DATA_MAX],
     length: usize,
-    /// Where its first record begins.
+    /// Offset of the first record that begins in the part.
     first_record: Option<usize>,
 }
 
@@ -71,12 +71,12 @@ impl Part {
     }
 }
 
-/// Where records begin.
+/// Finds the beginnings of records.
 #[derive(Clone, Debug)]
 struct Records {
-    /// Bytes until the next one.
+    /// Number of bytes until the next record.
     left: u32,
-    /// Its head, as far as it is known.
+    /// Header bytes of the next record, and the number of them received.
     head: [u8; HEAD],
     known: usize,
 }
@@ -88,7 +88,7 @@ impl Records {
         self.left == 0 && self.known == 0
     }
 
-    /// Takes the next byte; returns the kind of a record whose head ends with it.
+    /// Takes the next byte. If the byte completes a record's header, returns the type of the record.
     fn take(&mut self, byte: u8) -> Option<u8> {
         if self.left > 0 {
             self.left -= 1;
@@ -108,7 +108,7 @@ impl Records {
 }
 
 impl LogStream {
-    /// Begins a log for a station; false if the source has none. One that is under way ends.
+    /// Begins a log for a station, and ends any log in progress. Returns false if the source has no log.
     pub fn start(&mut self, to: Address, source: &mut impl LogSource) -> bool {
         self.stop(source);
         let starts = source.start_log();
@@ -130,12 +130,12 @@ impl LogStream {
         }
     }
 
-    /// True if there is one.
+    /// Returns true while a stream is active.
     pub fn is_active(&self) -> bool {
         self.stream.is_some()
     }
 
-    /// Notes that a station has the part with this number.
+    /// Notes that a station has acknowledged a part.
     pub fn acknowledge(&mut self, from: Address, sequence: u16) {
         if let Some(stream) = &mut self.stream
             && stream.to == from
@@ -145,7 +145,7 @@ impl LogStream {
         }
     }
 
-    /// Returns what is next, if anything is.
+    /// Returns the next event, if any.
     pub fn next(&mut self, source: &mut impl LogSource, now_us: u64) -> Option<StreamEvent> {
         let stream = self.stream.as_mut()?;
         if let Some((part, sent_us, tries)) = &mut stream.waiting {
@@ -168,7 +168,7 @@ impl LogStream {
 }
 
 impl Stream {
-    /// Takes bytes of the source until a part is whole, and returns that.
+    /// Takes bytes from the source until a part is complete. Returns that part.
     fn fill(&mut self, source: &mut impl LogSource) -> Option<StreamedLog> {
         loop {
             let front = source.log_bytes();
@@ -191,9 +191,9 @@ impl Stream {
         }
     }
 
-    /// Adds a byte; returns the part that is whole with it, or before it.
+    /// Adds a byte. Returns a part that the byte completes, or one that had to end before the byte.
     fn push(&mut self, byte: u8) -> Option<StreamedLog> {
-        // The head of a record of data must not be in a part with definitions.
+        // The header of a data record must not be in the same part as definitions.
         let is_at_start = self.records.is_at_start();
         let split = is_at_start && self.defines && self.part.room() < HEAD;
         let before = split.then(|| self.cut(0, true));
@@ -204,14 +204,14 @@ impl Stream {
         let kind = self.records.take(byte);
         if self.defines && kind.is_some_and(|kind| !DEFINITIONS.contains(&kind)) {
             self.defines = false;
-            // Unless the part begins with it.
+            // A part that has only this header continues as a part with data.
             return (self.part.length > HEAD).then(|| self.cut(HEAD, true));
         }
         before.or_else(|| (self.part.room() == 0).then(|| self.cut(0, self.defines)))
     }
 
-    /// Ends the part so many bytes before its end, where a record begins if there are any, and begins the next one with
-    /// them.
+    /// Ends the part `rest` bytes before its end, and begins the next part with these bytes. They must begin with a
+    /// record.
     fn cut(&mut self, rest: usize, to_be_acknowledged: bool) -> StreamedLog {
         let Part { mut bytes, length, first_record } = core::mem::replace(&mut self.part, Part::EMPTY);
         let length = length.saturating_sub(rest);
@@ -226,7 +226,7 @@ impl Stream {
         }
         let (to, sequence) = (self.to, self.sequence);
         self.sequence = self.sequence.wrapping_add(1);
-        // Both fit into a byte.
+        // Both numbers are below 256.
         let first_record = first_record.filter(|at| *at < length).map(|at| at as u8);
         StreamedLog { to, sequence, length: length as u8, first_record, data: bytes, to_be_acknowledged }
     }

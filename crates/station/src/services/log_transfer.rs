@@ -1,7 +1,7 @@
-//! Logs by LOG_REQUEST_LIST, LOG_REQUEST_DATA, LOG_REQUEST_END and LOG_ERASE.
+//! Log download: LOG_REQUEST_LIST, LOG_REQUEST_DATA, LOG_REQUEST_END and LOG_ERASE.
 //!
-//! None of their messages names a receiver, so that one list and one log are sent at a time: what was asked for last.
-//! Only of one log several short parts wait for one another, as stations ask for what they have missed.
+//! The answers have no target address, so only one list and one log are sent at a time: those requested last. A station
+//! asks again for pieces of a log that it has missed, so several short parts of the same log can be queued.
 
 use super::storage::LogStore;
 pub use afbc_link::LogMessage;
@@ -9,39 +9,40 @@ use afbc_link::{LOG_DATA_MAX, LogData, LogEntry, LogRequest};
 use core::task::Poll;
 use heapless::Deque;
 
-/// Parts of a log that wait; then the oldest is dropped.
+/// Most queued parts of a log. A further part replaces the oldest.
 const PARTS_MAX: usize = 20;
-/// Longest part that another one waits for \[bytes\].
+/// Longest part that can be queued with other parts \[bytes\]. A longer part replaces them.
 const SHORT: u32 = 1 << 20;
 
-/// What is being sent.
+/// Requested list and parts of a log.
 #[derive(Clone, Debug, Default)]
 pub struct LogTransfer {
-    /// What is to be listed.
+    /// List that is being sent.
     listing: Option<Listing>,
     parts: Deque<Part, PARTS_MAX>,
 }
 
-/// A list of logs.
+/// A requested list of logs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Listing {
-    /// From the first to the last one wanted; they are to be counted.
+    /// First and last log requested. The logs have not been counted yet.
     Wanted([u16; 2]),
-    /// How many logs there are, and the next and the last one to be listed.
+    /// Number of logs, and the next and the last log to be listed.
     Counted([u16; 3]),
 }
 
-/// A part of a log.
+/// A requested part of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Part {
     log: u16,
     offset: u32,
-    /// Bytes that are left.
+    /// Number of bytes left.
     left: u32,
 }
 
 impl LogTransfer {
-    /// Takes a request, except to erase logs. A request for anything ends what is being sent of its kind.
+    /// Handles a request. A new list replaces the old list, a new log the old log. LOG_ERASE only ends all transfers:
+    /// the caller erases the logs.
     pub fn hear(&mut self, request: LogRequest) {
         match request {
             LogRequest::List { first, last } => self.listing = Some(Listing::Wanted([first, last])),
@@ -58,22 +59,22 @@ impl LogTransfer {
                 }
             }
             LogRequest::End | LogRequest::Erase => *self = LogTransfer::default(),
-            // Of a streamed log.
+            // This acknowledges a log stream.
             LogRequest::Received(_) => {}
         }
     }
 
-    /// True while there is a [next](Self::next) message, or will be one.
+    /// Returns true while a [next](Self::next) message is ready or expected.
     pub fn is_busy(&self) -> bool {
         self.listing.is_some() || !self.parts.is_empty()
     }
 
-    /// Returns the next message; none also while the logs have to be waited for.
+    /// Returns the next message. Returns none also while the storage is busy.
     pub fn next(&mut self, store: &mut (impl LogStore + ?Sized)) -> Option<LogMessage> {
         if let Some(Listing::Wanted([first, last])) = self.listing {
             let Poll::Ready(count) = store.count_logs() else { return None };
             let newest = count.saturating_sub(1);
-            // Not beyond the last: `clamp` panics if its limits are the wrong way round.
+            // `clamp` would panic if the first log were beyond the last one.
             let first = first.min(newest);
             self.listing = Some(Listing::Counted([count, first, last.clamp(first, newest)]));
         }
@@ -89,12 +90,12 @@ impl LogTransfer {
         let wanted = LOG_DATA_MAX.min(left as usize);
         let into = data.get_mut(..wanted).unwrap_or_default();
         let Poll::Ready(count) = store.read_log(log, offset, into) else { return None };
-        // Only now: while the store is waited for, the part is asked for again.
+        // The part is removed only now: while the storage was busy it had to stay.
         self.parts.pop_front();
         let count = count.min(wanted);
-        // No underflow: `count` is at most `wanted`, and that at most `left`.
+        // No underflow: `count` is at most `wanted`, which is at most `left`.
         let (offset_then, left) = (offset.saturating_add(count as u32), left - count as u32);
-        // A part that is not full tells the end of the log; behind the last full one, an empty one.
+        // LOG_DATA that is not full marks the end of the log. If the last one is full, an empty one follows.
         if count == LOG_DATA_MAX && left > 0 {
             self.parts.push_front(Part { log, offset: offset_then, left }).ok();
         }

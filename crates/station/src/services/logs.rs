@@ -1,8 +1,8 @@
-//! Logs, of which a vehicle without storage has none: downloads end at once.
+//! Log download of a vehicle without storage: answers that there are no logs, so that downloads end at once.
 
 use afbc_link::{LogAnswer, LogRequest};
 
-/// Returns the answer to a request, if it expects one: no log, or no data.
+/// Returns the answer to a request that expects one: no log, or no data.
 pub fn answer(request: LogRequest) -> Option<LogAnswer> {
     Some(match request {
         LogRequest::List { .. } => LogAnswer::Entry { log: 0, logs: [0; 2] },

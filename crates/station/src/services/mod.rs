@@ -1,5 +1,5 @@
-//! What the vehicle does for stations: each service a state machine without input and output of its own. Those that it
-//! does not have answer every question with a refusal, so that nobody waits.
+//! Services of the vehicle for stations, each a state machine without input or output of its own. Services that the
+//! vehicle does not offer answer each request with a refusal, so that no station waits.
 
 pub mod calibration;
 pub mod commands;

@@ -1,9 +1,9 @@
-//! Flight modes as stations know them: custom modes in PX4's encoding, and MAVLink's standard modes.
+//! Flight modes in MAVLink: PX4's custom modes and the standard modes.
 
 use afbc_guidance::FlightMode;
 use afbc_link::{AvailableMode, CurrentMode};
 
-/// Main mode in bits 16 to 23 of `custom_mode`, sub mode in bits 24 to 31.
+/// Returns a `custom_mode`: main mode in bits 16 to 23, sub mode in bits 24 to 31.
 const fn custom_of(main: u8, sub: u8) -> u32 {
     u32::from_le_bytes([0, 0, main, sub])
 }
@@ -11,7 +11,7 @@ const fn custom_of(main: u8, sub: u8) -> u32 {
 /// PX4's main mode "auto".
 const AUTO: u8 = 4;
 
-/// Returns the `custom_mode` of a mode in HEARTBEAT.
+/// Returns the `custom_mode` of a flight mode, for HEARTBEAT.
 pub const fn custom(mode: FlightMode) -> u32 {
     match mode {
         FlightMode::Altitude => custom_of(2, 0),
@@ -27,12 +27,12 @@ pub const fn custom(mode: FlightMode) -> u32 {
     }
 }
 
-/// Returns the mode with this `custom_mode`.
+/// Returns the flight mode with this `custom_mode`.
 pub fn of_custom(custom_mode: u32) -> Option<FlightMode> {
     FlightMode::ALL.into_iter().find(|mode| custom(*mode) == custom_mode)
 }
 
-/// Returns the `MAV_STANDARD_MODE`, 0 if the mode is none of these.
+/// Returns the `MAV_STANDARD_MODE` of a flight mode, 0 for a non-standard mode.
 pub const fn standard(mode: FlightMode) -> u8 {
     match mode {
         FlightMode::Position => 1,
@@ -45,20 +45,20 @@ pub const fn standard(mode: FlightMode) -> u8 {
     }
 }
 
-/// Returns the mode with this `MAV_STANDARD_MODE`.
+/// Returns the flight mode with this `MAV_STANDARD_MODE`.
 pub fn of_standard(standard_mode: u8) -> Option<FlightMode> {
     FlightMode::ALL.into_iter().find(|mode| standard_mode != 0 && standard(*mode) == standard_mode)
 }
 
-/// `MAV_MODE_PROPERTY`: flies by itself.
+/// `MAV_MODE_PROPERTY_AUTO_MODE`: the vehicle flies by itself.
 const AUTOMATIC: u32 = 4;
-/// `MAV_MODE_PROPERTY`: not for beginners.
+/// `MAV_MODE_PROPERTY_ADVANCED`: the mode is not for beginners.
 const ADVANCED: u32 = 1;
 
-/// Number of modes.
+/// Number of flight modes.
 pub const COUNT: u8 = FlightMode::ALL.len() as u8;
 
-/// Returns AVAILABLE_MODES of the mode at a place from 1 on.
+/// Returns AVAILABLE_MODES for the mode with this index, counted from 1.
 pub fn available(place: u8) -> Option<AvailableMode> {
     let mode = *FlightMode::ALL.get(usize::from(place.checked_sub(1)?))?;
     let properties = match mode {
@@ -72,15 +72,16 @@ pub fn available(place: u8) -> Option<AvailableMode> {
     Some(AvailableMode { count: COUNT, place, standard: standard(mode), custom: custom(mode), properties, name })
 }
 
-/// Bit of a request's index that asks for the modes that follow, too.
+/// Bit of a request's index that requests all following modes too.
 const ALL: u32 = 1 << 31;
 
-/// Returns the index of a request for all modes from a place on.
+/// Returns the index of a request for this mode and all following ones.
 pub(crate) fn all_from(place: u8) -> u32 {
     ALL | u32::from(place)
 }
 
-/// Returns the place that a request's index asks for, and whether also for all that follow. 0 asks for all.
+/// Returns the mode that a request's index stands for, and true if all following modes are requested too. 0 requests
+/// all.
 pub(crate) fn place(index: u32) -> (u8, bool) {
     let place = u8::try_from(index & !ALL).unwrap_or(0);
     if index == 0 { (1, true) } else { (place, index & ALL != 0) }
@@ -96,7 +97,7 @@ pub fn current(mode: FlightMode, intended: FlightMode) -> CurrentMode {
 mod tests {
     use super::*;
 
-    /// The numbers that MAVSDK and QGroundControl read as PX4's.
+    /// The custom modes are PX4's, as MAVSDK and QGroundControl read them.
     #[test]
     fn custom_modes_are_px4s() {
         let expected = [
@@ -133,8 +134,8 @@ mod tests {
         assert_eq!(of_standard(0), None);
     }
 
-    /// MAV_MODE_PROPERTY: what a pilot flies has none, acro and offboard are for the advanced, all others fly by
-    /// themselves.
+    /// `MAV_MODE_PROPERTY`: Acro and Offboard are advanced, other manual modes have no property, and the rest are
+    /// automatic, as is Offboard.
     #[test]
     fn properties_and_names_are_the_modes() {
         for (mode, place) in FlightMode::ALL.into_iter().zip(1..) {
@@ -164,7 +165,7 @@ mod tests {
         assert_eq!([2, 3, 9, 255].map(of_standard), [None; 4]);
     }
 
-    /// 0 asks for all modes; what follows a mode of those asks for the next, and a number for that one alone.
+    /// 0 requests all modes, any other number one mode. With the top bit set, all following modes are requested too.
     #[test]
     fn an_index_asks_for_one_mode_or_for_all_that_follow() {
         assert_eq!(place(0), (1, true));

@@ -1,17 +1,17 @@
-//! Local and global coordinates.
+//! Conversion between local and global coordinates.
 //!
-//! The local frame is tangent to the WGS 84 ellipsoid at its origin, x to the north, y to the west; z is the difference
-//! in altitude, along the curvature of the earth. Exact but for rounding, in either direction.
+//! The local frame is tangent to the WGS 84 ellipsoid at its origin: x is north, y is west. z is the difference in
+//! altitude, so z follows the curvature of the earth. Both conversions are exact except for rounding.
 
 use afbc_link::Place;
 use nalgebra::{Vector2, Vector3};
 
-/// Semi-major axis \[m\] and square of the eccentricity of WGS 84.
+/// Semi-major axis \[m\] and squared eccentricity of WGS 84.
 const AXIS_M: f64 = 6_378_137.0;
 const ECCENTRICITY_2: f64 = 6.694_379_990_141_33e-3;
 const DEG: f64 = core::f64::consts::PI / 180.0;
 
-/// A place on the earth in degrees and metres above the sea.
+/// A place on the earth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Global {
     /// Latitude \[deg\].
@@ -28,41 +28,42 @@ pub struct EarthOrigin {
     at: Global,
     sine: f64,
     cosine: f64,
-    /// Distance from the axis of the earth, and from the plane of the equator \[m\].
+    /// Distances from the earth's axis and from the equatorial plane \[m\].
     from_axis_m: f64,
     from_equator_m: f64,
 }
 
 impl EarthOrigin {
-    /// Of simulators: PX4's usual place near Zurich.
+    /// Default origin of simulators: PX4's usual place near Zurich.
     pub const SIMULATED: Global = Global { latitude_deg: 47.397_742, longitude_deg: 8.545_594, altitude_m: 488.0 };
 
-    /// Creates the origin at a place, none within a kilometre of a pole.
+    /// Creates an origin at a place. Returns none within about a kilometre of a pole, or if a coordinate is out of
+    /// range.
     pub fn new(at: Global) -> Option<Self> {
         let Global { latitude_deg, longitude_deg, altitude_m } = at;
-        // At a pole there is no east: `global` and `chart` divide by the cosine. False of NaN.
+        // At a pole there is no east: `global` and `chart` divide by the cosine. NaN fails the test too.
         let possible = latitude_deg.abs() < 89.99 && longitude_deg.abs() <= 180.0 && altitude_m.abs() <= 1e5;
         let (sine, cosine) = libm::sincos(latitude_deg * DEG);
         let [from_axis_m, from_equator_m] = meridian(sine, cosine, altitude_m);
         possible.then_some(EarthOrigin { at, sine, cosine, from_axis_m, from_equator_m })
     }
 
-    /// Returns where it is.
+    /// Returns the global position of the origin.
     pub fn at(&self) -> Global {
         self.at
     }
 
-    /// Returns the place in the local frame \[m\].
+    /// Converts a global position to the local frame \[m\].
     pub fn local(&self, place: &Global) -> Vector3<f32> {
         let [north, east] = self.tangent(place);
         Vector3::new(north as f32, -east as f32, (place.altitude_m - self.at.altitude_m) as f32)
     }
 
-    /// Returns the place on the earth of a position in the local frame \[m\].
+    /// Converts a local position \[m\] to a global one.
     pub fn global(&self, position_m: &Vector3<f32>) -> Global {
         let [x, y, z] = [position_m.x, position_m.y, position_m.z].map(f64::from);
         let mut place = Global { altitude_m: self.at.altitude_m + z, ..self.at };
-        // Newton's method with the metric of a sphere; four steps reach 0.1 mm at 10 km.
+        // Newton's method with the metric of a sphere. Four steps reach 0.1 mm at a distance of 10 km.
         for _ in 0..4 {
             let [north, east] = self.tangent(&place);
             place.latitude_deg += (x - north) / (AXIS_M * DEG);
@@ -71,7 +72,7 @@ impl EarthOrigin {
         place
     }
 
-    /// Returns what converts places near the origin without trigonometry.
+    /// Returns a converter for places near the origin that needs no trigonometry.
     pub fn chart(&self) -> LocalChart {
         let Global { latitude_deg, longitude_deg, altitude_m } = self.at;
         let flattened = 1.0 - ECCENTRICITY_2 * self.sine * self.sine;
@@ -86,11 +87,11 @@ impl EarthOrigin {
         }
     }
 
-    /// Returns the distances to the north and to the east in the tangent plane at the origin's altitude \[m\]. Places
-    /// on the far half of the earth have none there: they are infinitely far.
+    /// Returns the distances to the north and to the east in the tangent plane, at the origin's altitude \[m\]. The far
+    /// half of the earth has no place in the plane, so its distances are infinite.
     fn tangent(&self, place: &Global) -> [f64; 2] {
         let (sine, cosine) = libm::sincos(place.latitude_deg * DEG);
-        // Altitudes are along the vertical of the place: only directions count.
+        // Altitudes are along the vertical of the place, so the horizontal position does not depend on them.
         let [from_axis_m, from_equator_m] = meridian(sine, cosine, self.at.altitude_m);
         let degrees = place.longitude_deg - self.at.longitude_deg;
         let turn = if degrees > 180.0 {
@@ -110,23 +111,23 @@ impl EarthOrigin {
     }
 }
 
-/// Places near an origin: to a centimetre within a kilometre, to 0.2 m within 10 km, to 1 m within 20 km.
+/// Approximate conversion of places near an origin: accurate to 1 cm within 1 km, 0.2 m within 10 km, 1 m within 20 km.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalChart {
     at_e7: [i32; 2],
-    /// Metres of a ten-millionth of a degree.
+    /// Metres per 1e-7 degrees of latitude, and of longitude.
     north_m: f32,
     east_m: f32,
-    /// Curvature of the parallel \[1/m\].
+    /// Curvature of the circle of latitude \[1/m\].
     bend_1_m: f32,
 }
 
 impl LocalChart {
-    /// Returns a place of this latitude and longitude in the local frame \[m\].
+    /// Converts latitude and longitude \[1e-7 deg\] to the local frame \[m\].
     pub fn local(&self, [latitude_e7, longitude_e7]: [i32; 2]) -> Vector2<f32> {
         const TURN: i64 = 3_600_000_000;
         let [at_latitude, at_longitude] = self.at_e7;
-        // In 64 bits: a whole turn does not fit into 32.
+        // A whole turn does not fit into 32 bits.
         let off = i64::from(longitude_e7) - i64::from(at_longitude);
         let off = off
             - if off > TURN / 2 {
@@ -136,7 +137,7 @@ impl LocalChart {
             } else {
                 0
             };
-        // The origin's own fraction is far below a centimetre.
+        // The origin is rounded to 1e-7 degrees, about a centimetre.
         let north_m = (i64::from(latitude_e7) - i64::from(at_latitude)) as f32 * self.north_m;
         let east_m = off as f32 * self.east_m;
         let bent_m = east_m * self.bend_1_m;
@@ -144,7 +145,7 @@ impl LocalChart {
     }
 }
 
-/// Returns the distances of a place from the axis of the earth and from the plane of the equator \[m\].
+/// Returns the distances of a place from the earth's axis and from the equatorial plane \[m\].
 fn meridian(sine: f64, cosine: f64, altitude_m: f64) -> [f64; 2] {
     let normal_m = AXIS_M / libm::sqrt(1.0 - ECCENTRICITY_2 * sine * sine);
     [(normal_m + altitude_m) * cosine, (normal_m * (1.0 - ECCENTRICITY_2) + altitude_m) * sine]
@@ -161,15 +162,15 @@ impl Global {
         libm::round(self.altitude_m * 1e3) as i32
     }
 
-    /// Returns a place with coordinates in 1e-7 degrees.
+    /// Creates a place from coordinates in 1e-7 degrees.
     pub fn of_e7([latitude, longitude]: [i32; 2], altitude_m: f64) -> Self {
         let [latitude_deg, longitude_deg] = [latitude, longitude].map(|e7| f64::from(e7) * 1e-7);
         Global { latitude_deg, longitude_deg, altitude_m }
     }
 }
 
-/// Returns a place of a station in the local frame \[m\], NaN where it is not given. Altitudes count from `home_m` or
-/// from `here_m`, if they are said to. A horizontal coordinate alone is not given.
+/// Converts a station's place to the local frame \[m\]. Omitted coordinates become NaN; x and y are both NaN if one of
+/// them is omitted. Heights may be relative to `home_m` or to `here_m`.
 pub fn resolve(origin: &EarthOrigin, place: &Place, home_m: f32, here_m: f32) -> Vector3<f32> {
     use afbc_link::Datum;
     let height = f64::from(place.height.metres);
@@ -192,13 +193,13 @@ mod tests {
     use super::*;
     use afbc_link::{Datum, Height};
 
-    /// Axes: north is x, west is y.
+    /// North is x and west is y.
     #[test]
     fn axes_point_north_and_west() {
         let origin = EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible");
         let north = Global { latitude_deg: EarthOrigin::SIMULATED.latitude_deg + 0.001, ..EarthOrigin::SIMULATED };
         let east = Global { longitude_deg: EarthOrigin::SIMULATED.longitude_deg + 0.001, ..EarthOrigin::SIMULATED };
-        // A thousandth of a degree at 47.4 degrees: 111.178 m and 75.46 m (Bureau international de l'heure).
+        // Lengths of 0.001 degrees at 47.4 degrees: 111.178 m and 75.46 m (Bureau international de l'heure).
         let [n, e] = [north, east].map(|place| origin.local(&place));
         assert!((n.x - 111.18).abs() < 0.05 && n.y.abs() < 1e-2, "{n}");
         assert!((e.y + 75.46).abs() < 0.05 && e.x.abs() < 1e-2, "{e}");
@@ -249,7 +250,7 @@ mod tests {
         }
     }
 
-    /// The units of the wire, rounded, and back.
+    /// Global coordinates are rounded to the units of MAVLink, and converted back.
     #[test]
     fn units_are_those_of_the_wire() {
         for (altitude_m, mm) in [(488.0, 488_000), (-12.3456, -12_346), (0.0006, 1), (0.0004, 0)] {
@@ -262,8 +263,8 @@ mod tests {
         assert_eq!(back.altitude_m, 7.5);
     }
 
-    /// Any place on the earth is where it is, as far as its distance over the ground says, or at least beyond all that
-    /// is flown to: none is taken for one near the origin.
+    /// Each place's local distance agrees with its great-circle distance, or is beyond any distance that is flown. No
+    /// far place is taken for one near the origin.
     #[test]
     fn no_place_is_folded_onto_another() {
         for at in [[47.4, 8.5], [0.0, 0.0], [-33.9, 151.2], [89.9, 10.0], [-89.9, -170.0], [60.0, 179.9]] {
@@ -284,7 +285,7 @@ mod tests {
         }
     }
 
-    /// Heights above the origin, in both directions, and across the date line to the west too.
+    /// Heights above the origin are converted both ways. The date line is crossed to the west too.
     #[test]
     fn heights_and_the_date_line_have_two_sides() {
         let origin = EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible");
@@ -297,7 +298,7 @@ mod tests {
         assert!((local.y - 22.26).abs() < 0.05, "{local}");
     }
 
-    /// A place with both coordinates is where it is, at the height that it says; with one alone it is nowhere.
+    /// A place with both coordinates is resolved with its height. A place with only one has no horizontal position.
     #[test]
     fn a_place_of_a_station_is_resolved() {
         let origin = EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible");

@@ -1,9 +1,9 @@
-//! Sensors that a vehicle does not start with, and their own tests.
+//! Sensors without which the vehicle is not armed, and their self-tests.
 
 use crate::services::health::sensor;
 use crate::services::status::{AuxSensors, SensorBits};
 
-/// Inertial sensors and magnetometer: bits, and what is told when one is faulty, has failed its own test or passed it.
+/// Bits of the IMUs and the compass, with their texts: arming refused, self-test failed, self-test passed.
 const SENSORS: [(u32, [&str; 3]); 3] = [
     (
         sensor::GYROSCOPE | sensor::ACCELEROMETER,
@@ -23,14 +23,14 @@ const SENSORS: [(u32, [&str; 3]); 3] = [
     ),
 ];
 
-/// Returns what is told of the first of these sensors that is there and not well; none if all are.
+/// Returns the text about the first sensor that is present but unhealthy. Returns none if all are healthy.
 pub fn faulty(aux: &AuxSensors) -> Option<&'static str> {
     let SensorBits { present, healthy } = aux.sensors;
     let (_, [faulty, ..]) = first(present & !healthy)?;
     Some(faulty)
 }
 
-/// Returns what is told of the first of the sensors that are `tested`, after its own test, and its bits.
+/// Returns the text about the self-test of the first sensor in `tested`, and the bits of that sensor.
 pub fn tested(tested: u32, passes: bool) -> Option<(&'static str, u32)> {
     let (bits, [_, failed, passed]) = first(tested)?;
     Some((if passes { passed } else { failed }, bits))
@@ -44,7 +44,7 @@ fn first(bits: u32) -> Option<(u32, [&'static str; 3])> {
 mod tests {
     use super::*;
 
-    /// Each sensor is named, and every text fits into STATUSTEXT.
+    /// Each sensor has texts, and each text fits into STATUSTEXT.
     #[test]
     fn each_sensor_is_named() {
         let aux = |present, healthy| AuxSensors { sensors: SensorBits { present, healthy }, ..AuxSensors::default() };
@@ -52,7 +52,7 @@ mod tests {
         assert_eq!(all, super::super::health::NEEDED, "those without which it does not start");
         assert_eq!(faulty(&aux(all, all)), None);
         assert_eq!(faulty(&aux(0, 0)), None);
-        // A barometer is the guidance's.
+        // The guidance, not this module, checks the barometer.
         assert_eq!(faulty(&aux(all | sensor::BAROMETER, all)), None);
         for (bits, [text, failed, passed]) in SENSORS {
             assert_eq!(faulty(&aux(all, all & !bits)), Some(text));

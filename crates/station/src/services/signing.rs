@@ -1,8 +1,8 @@
-//! Signed frames: which are accepted, what is signed, and what of it is kept.
+//! Message signing: decides which frames are accepted, stamps frames to be signed, and stores the key and the clock.
 //!
-//! Without a key every frame is accepted and none is signed. With one, everything that is sent is signed, and what
-//! is not signed with it, or was sent before, is not heard. A key is set or removed by SETUP_SIGNING while the vehicle
-//! is disarmed: by a frame signed with the present key, or by any frame over a wire ([`Decoder::wired`]).
+//! Without a key every frame is accepted and none is signed. With a key every sent frame is signed, and a received
+//! frame is ignored if it is unsigned or replayed. SETUP_SIGNING sets or removes the key while the vehicle is disarmed.
+//! Its frame must be signed with the present key or come over a wire ([`Decoder::wired`]).
 //!
 //! [`Decoder::wired`]: afbc_link::Decoder::wired
 
@@ -10,43 +10,43 @@ use afbc_link::{Address, Key, ReceivedFrame, SetupSigning, Stamp, TIME_MAX};
 use afbc_store::RecordName;
 use heapless::Vec;
 
-/// Senders by one of their links that are accepted between two starts.
+/// Number of streams accepted between two starts. A stream is a sender on one of its links.
 pub const STREAMS_MAX: usize = 6;
-/// How far the first frame of a sender may be behind the clock \[10 us\]: a minute.
+/// How far the first frame of a sender may be behind the clock \[10 us\]: one minute.
 const BEHIND_MAX_10US: u64 = 6_000_000;
-/// How far a sender may move on the clock that has come with the key \[10 us\]: an hour. What is further ahead is heard
-/// but not remembered beyond the next start, so it could be replayed then.
+/// How far a sender's frame may move a clock that was set together with the key \[10 us\]: one hour. Frames further
+/// ahead are accepted but do not move the clock, so they could be replayed after the next start.
 const AHEAD_MAX_10US: u64 = 360_000_000;
-/// Latest time that a frame may have \[10 us\]: ten years before the wire's 48 bits end, so that those that are sent
-/// later have times of their own.
+/// Latest time stamp that is accepted \[10 us\]: ten years before the 48 bits overflow, so that frames sent later still
+/// have time stamps.
 const LATEST_10US: u64 = TIME_MAX - 10 * 365 * 86_400 * SECOND_10US;
 const SECOND_10US: u64 = 100_000;
-/// Seconds that the clock runs before it is kept again while the vehicle is disarmed.
+/// Period of storing the clock while the vehicle is disarmed \[s\].
 const KEPT_EVERY_S: u32 = 120;
-/// The vehicle's own link.
+/// Link number of the vehicle.
 const LINK: u8 = 0;
 
-/// Text on a vehicle that has no key.
+/// Text of a vehicle without a key.
 const OFF: &str = "signing: off, no key";
 
-/// Names of the records: check of the key, seconds of the clock, words of the key.
+/// Names of the records: check value of the key, clock \[s\], words of the key.
 const CHECK: &str = "_SIGN_CHECK";
 const CLOCK: &str = "_SIGN_TIME";
 const WORDS: [&str; 8] = ["_SIGN_0", "_SIGN_1", "_SIGN_2", "_SIGN_3", "_SIGN_4", "_SIGN_5", "_SIGN_6", "_SIGN_7"];
 
-/// What frames need.
+/// Requirement that received frames must meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Lock {
-    /// Nothing.
+    /// No requirement.
     #[default]
     Open,
-    /// A signature with this key.
+    /// Frames must be signed with this key.
     Signed(Key),
-    /// There is a key, of which a cut of power has left a part: nothing is accepted but a new one over a wire.
+    /// A loss of power has left an incomplete key. No frame is accepted but a new key over a wire.
     Broken,
 }
 
-/// The last frame of a sender by one of its links.
+/// The last frame of a sender on one of its links.
 #[derive(Clone, Copy, Debug)]
 struct Stream {
     from: Address,
@@ -54,51 +54,51 @@ struct Stream {
     time_10us: u64,
 }
 
-/// A record of the store that outlasts the parameters' return to their defaults.
+/// A record of the store that is not deleted when the parameters are reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SigningRecord {
-    /// Its name.
+    /// Name of the record.
     pub name: RecordName,
-    /// Its bits; none to take it back.
+    /// Bits of the record; none to delete it.
     pub bits: Option<u32>,
 }
 
-/// What a request to change the key came to.
+/// Result of a request to change the key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SetupOutcome {
-    /// There is a key now, or none.
+    /// The key was set or removed.
     Done(&'static str),
-    /// Why not.
+    /// Reason why the key was not changed.
     Refused(&'static str),
 }
 
-/// The signatures' state.
+/// State of message signing.
 #[derive(Clone, Debug, Default)]
 pub struct Signing {
     lock: Lock,
-    /// The clock at power-up, and of the last frame signed, since the beginning of 2015 \[10 us\].
+    /// Clock at power-up, and time of the last signed frame, since the beginning of 2015 \[10 us\].
     started_10us: u64,
     signed_10us: u64,
-    /// What a sender that is not known has sent up to here is not heard: the clock that was kept at the last start, or
-    /// that has come with the same key again \[10 us\].
+    /// Frames of an unknown sender up to this time are ignored \[10 us\]. It is the stored clock at the last start, or
+    /// the time at which the same key was set again.
     floor_10us: u64,
-    /// True if the clock has come with the key since the start: it is right, whatever a sender's is.
+    /// True if the clock was set together with a key since the start. Then it is right even if a sender's clock is not.
     is_set: bool,
     streams: Vec<Stream, STREAMS_MAX>,
-    /// Seconds of the clock that are kept.
+    /// Stored time of the clock \[s\].
     kept_s: u32,
-    /// Records yet to be kept, of [`STEPS`](Self::STEPS): the first of them; none if all are.
+    /// Index of the next of [`STEPS`](Self::STEPS) records to be stored; none if all are stored.
     unkept: Option<u8>,
-    /// True if a key has been refused since this was last asked.
+    /// True if a key has been refused since the last query.
     refused: bool,
     was_armed: bool,
 }
 
 impl Signing {
-    /// Records of a change of the key.
+    /// Number of records to store after a change of the key.
     const STEPS: u8 = 10;
 
-    /// Reads what is kept; `get` returns the record of a name.
+    /// Restores the stored state. `get` returns the record with a name.
     pub fn kept(mut get: impl FnMut(RecordName) -> Option<u32>) -> Self {
         let mut words = [None; WORDS.len()];
         let mut read = |name: &str| RecordName::new(name).and_then(&mut get);
@@ -108,7 +108,7 @@ impl Signing {
         Self::of(read(CHECK), read(CLOCK), words)
     }
 
-    /// Makes it of check, clock and words. Out of line, so that the start's stack does not have it.
+    /// Builds the state from check value, clock and words. Not inlined, to save stack during the start.
     #[inline(never)]
     fn of(check: Option<u32>, clock: Option<u32>, words: [Option<u32>; WORDS.len()]) -> Self {
         let kept_s = clock.unwrap_or_default();
@@ -126,12 +126,12 @@ impl Signing {
         Signing { lock, started_10us, floor_10us: started_10us, kept_s, ..Signing::default() }
     }
 
-    /// True if frames need a signature.
+    /// Returns true if frames must be signed.
     pub fn is_on(&self) -> bool {
         self.lock != Lock::Open
     }
 
-    /// True once if a key has come over a link that is no wire, and was not set.
+    /// Returns true once after a key was refused because its frame was not validly signed and did not come over a wire.
     pub fn has_refused(&mut self) -> bool {
         core::mem::take(&mut self.refused)
     }
@@ -146,9 +146,9 @@ impl Signing {
         self.started_10us = self.started_10us.max(time_10us.saturating_sub(now_us / 10));
     }
 
-    /// True if a frame is heard, which has come over a wire or not.
+    /// Returns true if a frame is accepted. `wired` is true if the frame came over a wire.
     pub fn accepts(&mut self, now_us: u64, frame: &ReceivedFrame<'_>, wired: bool) -> bool {
-        // Whoever holds the wire could as well flash another key.
+        // A person who has access to the wire could also flash another key.
         let sets_key = frame.id == SetupSigning::ID;
         if sets_key && wired {
             return true;
@@ -162,7 +162,7 @@ impl Signing {
         accepted
     }
 
-    /// True if a frame is signed with the key and newer than all of its sender; the next must be newer than this one.
+    /// Returns true if a frame is signed with the key and newer than the stream's previous frames. Remembers its time.
     fn is_genuine(&mut self, now_us: u64, frame: &ReceivedFrame<'_>, key: &Key) -> bool {
         let Some(Stamp { link, time_10us }) = frame.stamp() else { return false };
         if time_10us > LATEST_10US {
@@ -174,11 +174,11 @@ impl Signing {
             Some(stream) => time_10us > stream.time_10us,
             None => {
                 let is_late = time_10us < clock_10us.saturating_sub(BEHIND_MAX_10US) || time_10us <= self.floor_10us;
-                // No sender gives way: frames of one that is forgotten, up to a minute old, could be replayed.
+                // No stream is replaced: frames of a forgotten sender could be replayed for a minute.
                 !is_late && !self.streams.is_full()
             }
         };
-        // The time first: what is replayed costs no hash.
+        // The time is checked first, so that a replayed frame costs no hash.
         if !is_new || !frame.is_signed_by(key) {
             return false;
         }
@@ -187,15 +187,15 @@ impl Signing {
             // There is room.
             None => drop(self.streams.push(Stream { from: frame.from, link, time_10us })),
         }
-        // One whose clock is ahead is heard, and must not lock others out. After a start nobody knows how long the
-        // vehicle has been off: the newest frame says it.
+        // A frame far ahead is accepted but must not lock out other senders by moving the clock. After a start the
+        // clock does not include the time without power, so it follows the newest frame.
         if !self.is_set || time_10us <= clock_10us.saturating_add(AHEAD_MAX_10US) {
             self.set_clock(now_us, time_10us);
         }
         true
     }
 
-    /// Sets or removes the key, for a frame that was accepted.
+    /// Sets or removes the key. The frame must have been accepted.
     pub fn set(&mut self, now_us: u64, setup: &SetupSigning, armed: bool) -> SetupOutcome {
         if armed {
             return SetupOutcome::Refused("signing key not changed: armed");
@@ -207,11 +207,11 @@ impl Signing {
         if lock == Lock::Open && !self.is_on() {
             return SetupOutcome::Done(OFF);
         }
-        // With the same key, what was signed before does not count again, and what is sent goes on to grow. The next
-        // frame of whoever sets it may have the same time.
+        // If the key stays the same, old frames must not be accepted again, and time stamps of sent frames must keep
+        // growing. `floor_10us` is 1 below the new time because the sender's next frame may have that time.
         let (floor_10us, signed_10us) =
             if lock == self.lock { (setup.time_10us.saturating_sub(1), self.signed_10us) } else { (0, 0) };
-        // A clock that was set wrong does not stay so, nor do senders that are not there any more.
+        // A clock that was wrong is replaced, and senders are forgotten.
         let started_10us = setup.time_10us.saturating_sub(now_us / 10);
         let was_armed = self.was_armed;
         let new = Signing { lock, started_10us, signed_10us, floor_10us, was_armed, ..Signing::default() };
@@ -219,23 +219,23 @@ impl Signing {
         SetupOutcome::Done(if self.is_on() { "signing: on, key set" } else { OFF })
     }
 
-    /// Returns key and stamp of the next frame to be sent, if it is to be signed.
+    /// Returns the key and the stamp of the next frame if it is to be signed.
     pub fn stamp(&mut self, now_us: u64) -> Option<(&Key, Stamp)> {
-        // Two frames within 10 us would have one time, and the second would count as a replay.
+        // Two frames within 10 us must not have the same time, or the second one would count as a replay.
         let time_10us = self.clock_10us(now_us).max(self.signed_10us.saturating_add(1));
         let Lock::Signed(key) = &self.lock else { return None };
         self.signed_10us = time_10us;
         Some((key, Stamp { link: LINK, time_10us }))
     }
 
-    /// Returns the next record to be kept, once.
+    /// Returns the next record to be stored. Each record is returned once.
     pub fn record(&mut self, now_us: u64, armed: bool) -> Option<SigningRecord> {
         let landed = core::mem::replace(&mut self.was_armed, armed) && !armed;
         let Some(record) = self.unkept else { return self.clock_record(now_us, armed, landed) };
         self.unkept = Some(record + 1).filter(|next| *next < Self::STEPS);
         let (name, bits) = match self.lock {
             Lock::Signed(key) => match WORDS.get(usize::from(record)) {
-                // The check last: with half of a key there is none, or a broken one.
+                // The check value is stored last: until then there is no key, or the key counts as incomplete.
                 Some(name) => {
                     let word = key.0.chunks_exact(4).nth(usize::from(record)).and_then(|word| word.first_chunk());
                     (*name, word.copied().map(u32::from_le_bytes))
@@ -244,7 +244,7 @@ impl Signing {
                 None => return self.clock_record(now_us, false, true),
             },
             _ => match record.checked_sub(1) {
-                // The check first: without it there is no key.
+                // The check value is deleted first: without it there is no key.
                 None => (CHECK, None),
                 Some(word) => (WORDS.get(usize::from(word)).copied().unwrap_or(CHECK), None),
             },
@@ -252,12 +252,12 @@ impl Signing {
         RecordName::new(name).map(|name| SigningRecord { name, bits })
     }
 
-    /// Returns the clock's record, if it is to be kept again: `at_once`, or after some time.
+    /// Returns the clock's record if it is to be stored again: `at_once`, or after [`KEPT_EVERY_S`].
     fn clock_record(&mut self, now_us: u64, armed: bool, at_once: bool) -> Option<SigningRecord> {
         if armed || !self.is_on() {
             return None;
         }
-        // Rounded up: what was heard before stays behind.
+        // The time is rounded up, so that frames accepted before are older than the stored clock.
         let now_s = self.clock_10us(now_us).div_ceil(SECOND_10US) as u32;
         if now_s < self.kept_s.saturating_add(if at_once { 1 } else { KEPT_EVERY_S }) {
             return None;

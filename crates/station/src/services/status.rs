@@ -1,4 +1,4 @@
-//! What the services know of the vehicle.
+//! State of the vehicle that the services use.
 
 use crate::services::origin::EarthOrigin;
 use afbc_flight_core::supervisor::COAST_US;
@@ -9,94 +9,94 @@ use afbc_onboard::{EscTelemetry, Report};
 use afbc_radio::Channels;
 use afbc_types::{ROTORS_MAX, State};
 
-/// What the shell reports, since the control tick does not know it.
+/// Data from the shell that the control tick does not have.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AuxSensors {
-    /// Where the local frame's origin is on the earth.
+    /// Global position of the local frame's origin.
     pub origin: Option<EarthOrigin>,
-    /// The satellite receiver's newest fix, if there is a receiver.
+    /// Newest fix of the satellite receiver, if there is a receiver.
     pub receiver: Option<GnssReceiver>,
-    /// The battery, if it is measured.
+    /// State of the battery, if it is measured.
     pub battery: Option<BatteryStatus>,
-    /// Further sensors: magnetometer, barometer and the like, as `MAV_SYS_STATUS_SENSOR`.
+    /// State of further sensors such as magnetometer and barometer.
     pub sensors: SensorBits,
-    /// Time since 1970 at power-up, 0 if unknown \[us\].
+    /// Unix time at power-up \[us\]; 0 if unknown.
     pub powered_up_us: u64,
 }
 
-/// A satellite receiver.
+/// Fix of a satellite receiver.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GnssReceiver {
-    /// `GPS_FIX_TYPE`: 1 no fix, 3 in three dimensions.
+    /// `GPS_FIX_TYPE`: 1 for no fix, 3 for a fix in three dimensions.
     pub kind: u8,
     /// Number of satellites; 255 if unknown.
     pub satellites: u8,
-    /// Horizontal and vertical uncertainty; 0 if unknown \[mm\].
+    /// Horizontal and vertical uncertainty \[mm\]; 0 if unknown.
     pub sigma_mm: [u32; 2],
 }
 
 impl GnssReceiver {
-    /// Without a fix.
+    /// A receiver without a fix.
     pub const NO_FIX: Self = GnssReceiver { kind: 1, satellites: 0, sigma_mm: [0; 2] };
     /// [`kind`](Self::kind) of a fix in three dimensions.
     pub const FIX_3D: u8 = 3;
 }
 
-/// Sets of sensors, as `MAV_SYS_STATUS_SENSOR`.
+/// Sets of sensors, in bits of `MAV_SYS_STATUS_SENSOR`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SensorBits {
-    /// What is there.
+    /// Sensors that are present.
     pub present: u32,
-    /// What of it is well.
+    /// Present sensors that are healthy.
     pub healthy: u32,
 }
 
-/// The vehicle after a tick.
+/// State of the vehicle after a tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct VehicleStatus {
     /// Start of the tick, since power-up \[us\].
     pub time_us: u64,
     /// Mode of the flight core.
     pub mode: Mode,
-    /// What the guidance decided.
+    /// State of the guidance.
     pub guided: Guided,
-    /// The newest state, its own or the link's.
+    /// Newest state, from the vehicle's estimator or from the link.
     pub state: Option<State>,
-    /// True if the vehicle has an inertial sensor.
+    /// True if the vehicle has an IMU and estimates its state.
     pub senses: bool,
-    /// True if it serves files.
+    /// True if the vehicle serves files.
     pub has_files: bool,
     /// Health of the flight core.
     pub health: TickHealth,
-    /// What spoke against arming in the tick; none before the first.
+    /// Reasons against arming in this tick; none before the first tick.
     pub against: Option<Reasons>,
-    /// Throttles: 0, or 48 to 2047.
+    /// Throttles in units of DSHOT: 0, or 48 to 2047.
     pub throttles: [u16; ROTORS_MAX],
     /// Number of rotors.
     pub rotors: u8,
     /// Duration of the tick \[us\].
     pub tick_us: f32,
-    /// Frames dropped since power-up.
+    /// Number of frames dropped since power-up.
     pub dropped_frames: u32,
-    /// The pilot's channels, if one is heard.
+    /// Channels of the pilot, if they are received.
     pub radio: Option<RadioStatus>,
-    /// What the shell has reported.
+    /// Data from the shell.
     pub aux: AuxSensors,
-    /// What the motor controllers have told.
+    /// Telemetry of the motor controllers.
     pub escs: EscTelemetry,
 }
 
-/// A pilot's channels.
+/// Radio channels of a pilot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RadioStatus {
-    /// The channels.
+    /// Channels as received.
     pub channels: Channels,
-    /// How well the pilot is received, 0 to 254; 255 if unknown.
+    /// Quality of reception, 0 to 254; 255 if unknown.
     pub rssi: u8,
 }
 
 impl VehicleStatus {
-    /// Updates it by a tick's report, except for the state.
+    /// Updates everything but the state from a tick's report.
     pub(crate) fn update<const N: usize>(&mut self, report: &Report<N>, tick_us: f32) {
         self.time_us = report.time_us;
         (self.mode, self.guided, self.health) = (report.mode, report.guided, report.health);
@@ -111,18 +111,18 @@ impl VehicleStatus {
         (self.time_us / 1000) as u32
     }
 
-    /// Returns the flight mode that is reported to stations: that of the guidance, which orders change as soon as the
-    /// state is back, also while the flight core still descends.
+    /// Returns the flight mode for stations: Land while the flight core descends without a state, else the guidance's
+    /// mode. Orders change that mode as soon as the state is back, even during the descent.
     pub fn flight_mode(&self) -> FlightMode {
         if self.mode == Mode::Descending && !self.is_located() { FlightMode::Land } else { self.guided.mode }
     }
 
-    /// True if the vehicle knows where it is.
+    /// Returns true if the vehicle's position is known.
     pub fn is_located(&self) -> bool {
         self.state.is_some() && self.health.state_age_us <= COAST_US
     }
 
-    /// True in the air, as far as is known.
+    /// Returns true if the vehicle is in the air, as far as the guidance knows.
     pub fn is_airborne(&self) -> bool {
         self.guided.airborne
     }

@@ -1,23 +1,23 @@
-//! What the services of files and logs need of storage: a shell implements it.
+//! Interfaces of storage that the file and log services need. A shell implements them.
 
 use afbc_link::{FILE_DATA_MAX, FtpError};
 use core::task::Poll;
 use heapless::String;
 
-/// Longest name of a file or directory that is listed \[bytes\].
+/// Longest name of a listed file or directory \[bytes\].
 pub const NAME_MAX: usize = 128;
 
-/// A path that a station has named, from the root of what is served: never above it.
+/// A path that a station has sent. It is relative to the served root and never leads above it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FilePath(String<FILE_DATA_MAX>);
 
 impl FilePath {
-    /// Reads a path up to its first zero. Slashes at its ends and repeated ones mean nothing, nor does a part ".". None
-    /// if it is no text, or has a part "..", a control character, a backslash or a colon.
+    /// Parses a path up to its first zero byte. Leading, trailing and repeated slashes and parts "." are dropped.
+    /// Returns none if the path is not UTF-8 or has a part "..", a control character, a backslash or a colon.
     pub fn of(bytes: &[u8]) -> Option<Self> {
         let text = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
         let text = core::str::from_utf8(text).ok()?;
-        // Backslash and colon: on some hosts they lead to another folder, or to another drive.
+        // On some hosts, a backslash or a colon leads to another folder or drive.
         if text.contains(|letter: char| letter.is_control() || letter == '\\' || letter == ':') {
             return None;
         }
@@ -34,20 +34,20 @@ impl FilePath {
         Some(FilePath(path))
     }
 
-    /// Returns the path without slashes at its ends; empty for the root.
+    /// Returns the path without leading and trailing slashes; empty for the root.
     pub fn as_str(&self) -> &str {
         &self.0
     }
 }
 
-/// What a file is opened for.
+/// Purpose for which a file is opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileAccess {
-    /// To be read.
+    /// The file is read.
     Read,
-    /// To be written; it is there.
+    /// An existing file is written.
     Write,
-    /// To be written; it is not there yet.
+    /// A new file is created and written.
     Create,
 }
 
@@ -60,51 +60,51 @@ pub enum FileChange<'a> {
     CreateDirectory(&'a FilePath),
     /// Removes an empty directory.
     RemoveDirectory(&'a FilePath),
-    /// Cuts a file to so many bytes.
+    /// Truncates a file to this number of bytes.
     Truncate(&'a FilePath, u32),
-    /// Gives a file another path, the second.
+    /// Moves a file from the first path to the second.
     Rename(&'a FilePath, &'a FilePath),
 }
 
 /// An entry of a directory.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DirectoryEntry {
-    /// Its name.
+    /// Name of the entry.
     pub name: String<NAME_MAX>,
-    /// Size of a file \[bytes\]; none of a directory.
+    /// Size of a file \[bytes\]; none for a directory.
     pub size: Option<u32>,
 }
 
-/// Files. What can only be read keeps the methods that change something as they are.
+/// Storage of files. A read-only store keeps the default methods, which refuse changes.
 pub trait FileStore {
     /// An open file.
     type File: Copy;
 
-    /// Opens a file; returns its size, too.
+    /// Opens a file. Returns the file and its size.
     ///
     /// # Errors
-    /// The answer of the protocol.
+    /// Returns the protocol's error.
     fn open(&mut self, path: &FilePath, access: FileAccess) -> Result<(Self::File, u32), FtpError>;
 
     /// Closes a file.
     fn close(&mut self, file: Self::File);
 
-    /// Reads from `offset` on as much as there is and fits; returns how much.
+    /// Reads as many bytes from `offset` on as exist and fit. Returns their number.
     ///
     /// # Errors
-    /// The answer of the protocol.
+    /// Returns the protocol's error.
     fn read(&mut self, file: Self::File, offset: u32, into: &mut [u8]) -> Result<usize, FtpError>;
 
-    /// Returns the entry of a directory at this place, none behind the last one.
+    /// Returns the directory entry with this index. Returns none after the last one.
     ///
     /// # Errors
-    /// The answer of the protocol.
+    /// Returns the protocol's error.
     fn entry(&mut self, directory: &FilePath, place: u32) -> Result<Option<DirectoryEntry>, FtpError>;
 
-    /// Writes from `offset` on.
+    /// Writes bytes from `offset` on.
     ///
     /// # Errors
-    /// The answer of the protocol.
+    /// Returns the protocol's error.
     fn write(&mut self, _file: Self::File, _offset: u32, _bytes: &[u8]) -> Result<(), FtpError> {
         Err(FtpError::FILE_PROTECTED)
     }
@@ -112,55 +112,55 @@ pub trait FileStore {
     /// Changes a file or directory.
     ///
     /// # Errors
-    /// The answer of the protocol.
+    /// Returns the protocol's error.
     fn change(&mut self, _change: FileChange<'_>) -> Result<(), FtpError> {
         Err(FtpError::FILE_PROTECTED)
     }
 }
 
-/// What is known of a log.
+/// Size and date of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LogInfo {
     /// Size \[bytes\].
     pub size: u32,
-    /// When it was written, since 1970; 0 if that is unknown \[s\].
+    /// Unix time at which the log was written \[s\]; 0 if unknown.
     pub utc_s: u32,
 }
 
-/// Logs, each at a place that it keeps until they are counted again.
+/// Storage of logs. The index of a log does not change until the logs are counted again.
 ///
-/// Storage that has to be waited for answers [`Poll::Pending`], and is asked for the same again a little later, until
-/// it answers or something else is asked for.
+/// Storage that is busy answers [`Poll::Pending`]. The same request is then repeated until it is answered or another
+/// request replaces it.
 pub trait LogStore {
     /// Counts the logs.
     fn count_logs(&mut self) -> Poll<u16>;
 
-    /// Returns what is known of the log at a place.
+    /// Returns the size and date of a log.
     fn log(&mut self, place: u16) -> Poll<Option<LogInfo>>;
 
-    /// Reads from `offset` on as much as there is and fits; returns how much.
+    /// Reads as many bytes from `offset` on as exist and fit. Returns their number.
     fn read_log(&mut self, place: u16, offset: u32, into: &mut [u8]) -> Poll<usize>;
 
-    /// Erases all logs but one that is being written; false if it cannot.
+    /// Erases all logs but the one being written. Returns false on failure.
     fn erase_logs(&mut self) -> Poll<bool>;
 }
 
-/// The black box's log, made while it is sent. A vehicle that has none keeps the methods as they are.
+/// Source of the flight log while it is written. A vehicle without a log keeps the default methods.
 pub trait LogSource {
-    /// Begins a log; false if there is none.
+    /// Begins a log. Returns false if there is none.
     fn start_log(&mut self) -> bool {
         false
     }
 
-    /// Ends it.
+    /// Ends the log.
     fn stop_log(&mut self) {}
 
-    /// Returns bytes of the log that wait; none if there are none now.
+    /// Returns the next bytes of the log; empty if there are none yet.
     fn log_bytes(&self) -> &[u8] {
         &[]
     }
 
-    /// Removes so many of them.
+    /// Removes this many of the next bytes.
     fn consume_log(&mut self, _bytes: usize) {}
 }
 

@@ -1,8 +1,8 @@
-//! Telemetry at intervals, and messages on request, within what the link carries.
+//! Sends telemetry at intervals, and messages on request, within the rate of the link.
 //!
-//! Each stream has an interval, which stations set. A budget of bytes per second is shared: while it does not allow all
-//! streams, the one that is latest in proportion to its interval goes first, so that all rates shrink by the same
-//! factor.
+//! Stations set the interval of each stream. All streams share a budget of bytes per second. If the budget is too small
+//! for all streams, the stream that is latest in proportion to its interval is sent first. So all rates shrink by the
+//! same factor.
 
 use afbc_link::DataStream;
 use heapless::Deque;
@@ -40,7 +40,7 @@ pub mod id {
     pub const CURRENT_MODE: u32 = 436;
 }
 
-/// Streams with their default intervals; 0: off \[us\]. `docs/station.md` has the same list.
+/// Streams with their default intervals \[us\]; 0 for off. `docs/station.md` has the same list.
 pub const DEFAULTS: [(u32, u32); 23] = [
     (id::SYS_STATUS, 1_000_000),
     (id::SYSTEM_TIME, 1_000_000),
@@ -66,49 +66,49 @@ pub const DEFAULTS: [(u32, u32); 23] = [
     (id::ESC_INFO, 1_000_000),
     (id::ESC_STATUS, 100_000),
 ];
-/// Shortest interval: a tick \[us\].
+/// Shortest interval \[us\]: one tick.
 pub const INTERVAL_MIN_US: u32 = 1_000;
-/// Messages that can be requested but not streamed; the heartbeat's rate is fixed.
+/// Messages that can be requested but not streamed. HEARTBEAT has a fixed rate.
 const ONCE: [u32; 4] = [id::HEARTBEAT, id::AUTOPILOT_VERSION, id::PROTOCOL_VERSION, id::AVAILABLE_MODES];
-/// Most requested messages that wait to be sent.
+/// Most queued requests for messages.
 pub const REQUESTS_MAX: usize = 16;
-/// Bytes that may be sent at once after a pause: with as much again for texts and replies, a frame that has just fitted
-/// and answers, less than a kilobyte, the buffer of the board's line \[1e-3 bytes\].
+/// Bytes that streams may send at once after a pause \[1e-3 bytes\]. Texts and replies may use as many again. Together
+/// with answers and one frame that just fitted this is less than 1 kB, the size of the board's transmit buffer.
 const BURST: i64 = 300_000;
 
 /// A message that a station has requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Requested {
-    /// Its number.
+    /// Number of the message.
     pub message: u32,
-    /// Second parameter of the request.
+    /// Index of the message (`param2` of the request).
     pub index: u32,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Stream {
-    /// Time between two; 0: off \[us\].
+    /// Interval between two messages \[us\]; 0 for off.
     interval_us: u32,
-    /// When the next one is due \[us\].
+    /// Time at which the next message is due \[us\].
     due_us: u64,
 }
 
-/// What is sent, and when.
+/// Telemetry streams, queued requests and the link's budget.
 #[derive(Clone, Debug)]
 pub struct Streams {
     streams: [Stream; DEFAULTS.len()],
-    /// True if a simulator has asked for rotor commands, which are outside of the budget.
+    /// True if a simulator has requested rotor commands, which do not count against the budget.
     rotors: bool,
     requested: Deque<Requested, REQUESTS_MAX>,
     bytes_per_s: u32,
-    /// What may be sent now; negative after more was sent than there was room for \[1e-3 bytes\].
+    /// Bytes that may be sent now \[1e-3 bytes\]. Negative if more was sent than the budget allows.
     room: i64,
 }
 
 impl Streams {
-    /// The default streams, for a link of so many bytes per second.
+    /// Creates the default streams for a link of `bytes_per_s`.
     pub fn new(bytes_per_s: u32) -> Self {
-        // Not all in one tick.
+        // The first messages are spread over several ticks.
         let mut phase_us = 0;
         let streams = DEFAULTS.map(|(_, interval_us)| {
             phase_us += 1_000;
@@ -117,17 +117,17 @@ impl Streams {
         Streams { streams, rotors: false, requested: Deque::new(), bytes_per_s, room: BURST }
     }
 
-    /// Returns what may be sent, rotor commands aside \[bytes/s\].
+    /// Returns the rate of the link without the share of rotor commands \[bytes/s\].
     pub fn bytes_per_s(&self) -> u32 {
         if self.rotors { self.bytes_per_s / 9 * 5 } else { self.bytes_per_s }
     }
 
-    /// True if rotor commands are sent after the ticks.
+    /// Returns true if rotor commands are sent.
     pub fn rotors(&self) -> bool {
         self.rotors
     }
 
-    /// Sets the interval of a message: 0 for the default, -1 for never. False if there is no such stream.
+    /// Sets the interval of a message: 0 for the default, -1 for off. Returns false if there is no such stream.
     pub fn set(&mut self, message: u32, interval_us: i32, now_us: u64) -> bool {
         if message == id::HIL_ACTUATOR_CONTROLS {
             self.rotors = interval_us > 0;
@@ -139,12 +139,12 @@ impl Streams {
             Ok(interval_us) => interval_us.max(INTERVAL_MIN_US),
             Err(_) => 0,
         };
-        // A shorter interval need not wait for the end of the longer one before it.
+        // The new interval counts from now if the old due time is later.
         stream.due_us = stream.due_us.min(now_us.saturating_add(stream.interval_us.into()));
         true
     }
 
-    /// Returns the interval of a message: -1 if it is off, 0 if there is no such stream \[us\].
+    /// Returns the interval of a message \[us\]: -1 if it is off, 0 if there is no such stream.
     pub fn interval_us(&self, message: u32) -> i32 {
         if message == id::HIL_ACTUATOR_CONTROLS {
             return if self.rotors { INTERVAL_MIN_US as i32 } else { -1 };
@@ -157,10 +157,10 @@ impl Streams {
         }
     }
 
-    /// Carries out REQUEST_DATA_STREAM of older stations: rates of a `MAV_DATA_STREAM`. Returns what it is then, with
-    /// no rate if there is no such group.
+    /// Handles REQUEST_DATA_STREAM of older stations: sets the rates of the messages in a `MAV_DATA_STREAM` group.
+    /// Returns the new rate, 0 for an unknown group.
     pub fn set_group(&mut self, request: DataStream, now_us: u64) -> DataStream {
-        // Without a rate the group is switched off.
+        // A rate of 0 turns the group off.
         let interval_us = 1_000_000_i32.checked_div(request.rate_hz.into()).unwrap_or(-1);
         let group: &[u32] = match request.group {
             2 => &[id::SYS_STATUS, id::BATTERY_STATUS, id::GPS_RAW_INT, id::MISSION_CURRENT],
@@ -186,44 +186,43 @@ impl Streams {
         DataStream { rate_hz: if group.is_empty() { 0 } else { request.rate_hz }, ..request }
     }
 
-    /// True if a message can be requested.
+    /// Returns true if a message can be requested.
     pub fn knows(message: u32) -> bool {
         ONCE.contains(&message) || DEFAULTS.iter().any(|(known, _)| *known == message)
     }
 
-    /// Queues a message for once; false if too many wait.
+    /// Queues a requested message. Returns false if the queue is full.
     pub fn request(&mut self, requested: Requested) -> bool {
         self.requested.push_back(requested).is_ok()
     }
 
-    /// Queues a message before all others; it is dropped if too many wait.
+    /// Queues a message before all others. Drops the message if the queue is full.
     pub(crate) fn request_first(&mut self, requested: Requested) {
         self.requested.push_front(requested).ok();
     }
 
-    /// Begins a tick: makes room for what the link carries in a millisecond.
+    /// Begins a tick: adds the bytes that the link carries in 1 ms to the budget.
     pub fn tick(&mut self) {
         // Bytes per second are thousandths of bytes per millisecond.
         self.room = (self.room + i64::from(self.bytes_per_s())).min(BURST);
     }
 
-    /// True if there is room for texts and replies, which can wait a little: as much again as a burst, also when
-    /// streams have taken that.
+    /// Returns true if texts and replies may be sent. They may overdraw the budget by one burst.
     pub fn has_room(&self) -> bool {
         self.room > -BURST
     }
 
-    /// True if so many bytes may be sent without keeping back what falls due next.
+    /// Returns true if this many bytes can be sent without delaying the streams.
     pub(crate) fn spares(&self, bytes: usize) -> bool {
         self.room >= 1000 * bytes as i64
     }
 
-    /// Notes that so many bytes were sent, of a stream or not.
+    /// Subtracts sent bytes from the budget, whether they belong to a stream or not.
     pub fn spend(&mut self, bytes: usize) {
         self.room -= 1000 * bytes as i64;
     }
 
-    /// Returns the next message to be sent at `now_us`, if there is room; its interval begins anew.
+    /// Returns the next message to be sent at `now_us` if the budget allows, and schedules its stream again.
     pub fn next(&mut self, now_us: u64) -> Option<Requested> {
         if self.room <= 0 {
             return None;
@@ -231,7 +230,7 @@ impl Streams {
         if let Some(requested) = self.requested.pop_front() {
             return Some(requested);
         }
-        // Thousandths of its interval that each is late.
+        // Lateness of a stream, in thousandths of its interval.
         let late = |stream: &Stream| {
             let late_us = now_us.checked_sub(stream.due_us).filter(|_| stream.interval_us > 0)?;
             Some((late_us.saturating_mul(1000) + 1).checked_div(stream.interval_us.into()).unwrap_or(0))
@@ -245,7 +244,7 @@ impl Streams {
             }
         }
         let (_, message, stream) = latest?;
-        // On time it keeps its phase; what was missed is not made up for.
+        // A stream that is on time keeps its phase. Missed messages are not sent later.
         let interval_us = u64::from(stream.interval_us);
         let next_us = stream.due_us.saturating_add(interval_us);
         stream.due_us = if next_us > now_us { next_us } else { now_us.saturating_add(interval_us) };
@@ -265,7 +264,7 @@ mod tests {
     use super::*;
     use std::collections::BTreeMap;
 
-    /// Returns how often each message is sent in `seconds`, when each has `bytes`.
+    /// Returns how often each message is sent in `seconds` if each message has `bytes`.
     fn counts(streams: &mut Streams, from_us: u64, seconds: u64, bytes: usize) -> BTreeMap<u32, u64> {
         let mut counts = BTreeMap::new();
         for tick in 1..=1000 * seconds {
@@ -287,7 +286,7 @@ mod tests {
         }
     }
 
-    /// All rates shrink by the same factor, and the link is full but not more.
+    /// All rates shrink by the same factor, and the link is fully used but not overloaded.
     #[test]
     fn rates_shrink_on_a_narrow_link() {
         let wanted: u64 = DEFAULTS.iter().filter_map(|(_, us)| 60_000_000_u64.checked_div((*us).into())).sum();
@@ -348,7 +347,7 @@ mod tests {
         assert_eq!(streams.interval_us(id::VFR_HUD), 250_000);
     }
 
-    /// Each group sets its own messages and no other, to the rate that is asked for.
+    /// Each group sets the requested rate for its own messages and no others.
     #[test]
     fn each_group_has_its_messages() {
         use id::*;
@@ -385,7 +384,8 @@ mod tests {
         }
     }
 
-    /// What is sent is taken from the budget, which grows with the time up to its burst; 5/9 remain beside rotors.
+    /// Sent bytes are subtracted from the budget, which grows with time up to a burst. Rotor commands leave 5/9 of the
+    /// rate.
     #[test]
     fn the_budget_is_what_the_link_carries() {
         let mut streams = Streams::new(9_000);
@@ -399,7 +399,7 @@ mod tests {
             assert_eq!(streams.has_room(), spent < 600, "{spent}");
             assert_eq!(streams.next(1_000_000).is_some(), spent < 300, "{spent}");
         }
-        // 9 bytes come back per tick, and never more than 300 are there.
+        // Each tick adds 9 bytes, up to 300.
         let mut streams = Streams::new(9_000);
         streams.spend(300);
         (0..10).for_each(|_| streams.tick());
@@ -412,7 +412,7 @@ mod tests {
         assert!(streams.next(1_000_000).is_none());
     }
 
-    /// A stream that is late keeps no more than one message waiting, and one on time keeps its phase.
+    /// After a gap a stream sends one message, not all that were missed. On time it keeps its phase.
     #[test]
     fn phases_are_kept_and_gaps_are_not_made_up_for() {
         let mut streams = Streams::new(1_000_000);
@@ -426,12 +426,13 @@ mod tests {
             }
         }
         assert_eq!(sent, [4_000, 14_000, 24_000, 47_000, 57_000]);
-        // A shorter interval counts at once, a longer one from the next message on.
+        // A shorter interval counts at once, a longer one after the next message.
         assert!(streams.set(id::ATTITUDE, 2_000, 57_000));
         assert_eq!([58_000, 59_000, 60_000].map(|now_us| streams.next(now_us).is_some()), [false, true, false]);
     }
 
-    /// A message may be known and yet not be streamed; the first request goes before all others.
+    /// Some messages can be requested but not streamed. A request queued with `request_first` is sent before all
+    /// others.
     #[test]
     fn what_can_be_requested_is_known() {
         for message in 0..500 {

@@ -1,4 +1,4 @@
-//! Messages of telemetry, each from what is known of the vehicle.
+//! Composes telemetry messages from the state of the vehicle.
 
 use crate::services::health;
 use crate::services::modes;
@@ -11,10 +11,10 @@ use afbc_link::{Clock, Downlink, RadioChannels, Telemetry};
 use micromath::F32Ext;
 use nalgebra::Vector3;
 
-/// `MAV_PROTOCOL_CAPABILITY`: commands and items with integers, encoding of parameters by bytes, targets of attitude
-/// and position, MAVLink 2, missions.
+/// `MAV_PROTOCOL_CAPABILITY`: MISSION_INT, COMMAND_INT, bytewise parameters, attitude and both position targets,
+/// MAVLink 2.
 const CAPABILITIES: u64 = 4 | 8 | 16 | 64 | 128 | 256 | 8192;
-/// FTP.
+/// `MAV_PROTOCOL_CAPABILITY_FTP`.
 const FILES: u64 = 32;
 const TAU: f32 = core::f32::consts::TAU;
 
@@ -77,12 +77,12 @@ pub fn compose(message: u32, status: &VehicleStatus) -> Option<Downlink> {
     }
 }
 
-/// Returns a throttle of 48 to 2047 as 0 to 1.
+/// Converts a throttle from 48 to 2047 to a number from 0 to 1.
 fn throttle(throttle: u16) -> f32 {
     f32::from(throttle.saturating_sub(47)) / 2000.0
 }
 
-/// Reads a number of the version.
+/// Parses a part of the version number.
 fn version(digits: &str) -> u8 {
     digits.bytes().fold(0, |number, digit| number.wrapping_mul(10).wrapping_add(digit.saturating_sub(b'0')))
 }
@@ -92,15 +92,15 @@ fn quaternion(state: &afbc_types::State) -> [f32; 4] {
     [q.w, q.x, q.y, q.z]
 }
 
-/// Returns the compass heading of a yaw to the left \[deg\], 0 to 360.
+/// Returns the compass heading \[deg\], from 0 to below 360, of a yaw that is positive counterclockwise.
 fn heading_deg(yaw_rad: f32) -> f32 {
     let turns = -yaw_rad / TAU;
     let heading = 360.0 * (turns - F32Ext::floor(turns));
-    // A yaw just above 0 is rounded up to a whole turn.
+    // The heading of a yaw just above 0 is rounded up to 360.
     if heading < 360.0 { heading } else { 0.0 }
 }
 
-/// Returns home, or the origin of the local frame while there is none.
+/// Returns home, or the origin of the local frame if there is no home.
 fn home_m(status: &VehicleStatus) -> Vector3<f32> {
     status.guided.home_m.unwrap_or_default()
 }
@@ -130,7 +130,7 @@ fn fix(status: &VehicleStatus) -> Option<Fix> {
     let (place_e7, altitude_mm) = known.as_ref().map_or(([0; 2], 0), |(_, place, _)| (place.e7(), place.altitude_mm()));
     let (speed_cm_s, course_cdeg) = known.map_or((u16::MAX, u16::MAX), |(.., state)| {
         let v = state.velocity_m_s;
-        // To 0.16 degrees; a receiver's own course is good to some degrees.
+        // The approximate arctangent is accurate to 0.16 degrees. A receiver's own course is accurate to a few degrees.
         let course = heading_deg(F32Ext::atan2(v.y, v.x)) * 100.0;
         ((sqrt(v.xy().norm_squared()) * 100.0) as u16, (course as u16).min(35_999))
     });
@@ -178,7 +178,7 @@ mod tests {
         assert_eq!(["0", "7", "12"].map(version), [0, 7, 12]);
     }
 
-    /// Telemetry contains no value that is not known; a vehicle without any reports that it is not healthy.
+    /// Unknown values are not reported. A vehicle that knows nothing still reports its health.
     #[test]
     fn what_is_not_known_is_not_reported() {
         let status = VehicleStatus::default();
@@ -200,7 +200,7 @@ mod tests {
         }
     }
 
-    /// A vehicle that flies, of which everything is known.
+    /// Returns a flying vehicle of which everything is known.
     fn flying() -> VehicleStatus {
         let state = afbc_types::State {
             position_m: Vector3::new(30.0, -20.0, 12.5),
@@ -226,7 +226,7 @@ mod tests {
         }
     }
 
-    /// The messages of the state, each number by its meaning: z up and y to the left here, down and to the right there.
+    /// Each message has the right values. The state's z is up and y is left; MAVLink's z is down and y is right.
     #[test]
     fn a_flying_vehicle_reports_its_state() {
         let status = flying();
@@ -235,17 +235,17 @@ mod tests {
         let Telemetry::Global(global) = reported(id::GLOBAL_POSITION_INT, &status) else { panic!("another") };
         assert_eq!((global.time_ms, global.place_e7, global.altitude_mm), (5_000, here.e7(), 500_500));
         assert_eq!((global.relative_mm, global.velocity_ned_cm_s), (10_000, [300, 400, -125]));
-        // Half a radian to the right.
+        // Half a radian to the right is 28.64 degrees.
         assert_eq!(global.heading_cdeg, 2864);
         let Telemetry::Fix(fix) = reported(id::GPS_RAW_INT, &status) else { panic!("another") };
         assert_eq!((fix.time_us, fix.place_e7, fix.altitude_mm), (5_000_123, here.e7(), 500_500));
         assert_eq!((fix.kind, fix.satellites, fix.sigma_mm), (3, 11, [700, 900]));
-        // 3 m/s north, 4 m/s east: 53.13 degrees, to 0.16.
+        // 3 m/s north and 4 m/s east make a course of 53.13 degrees, accurate to 0.16.
         assert_eq!(fix.speed_cm_s, 500);
         assert!(fix.course_cdeg.abs_diff(5313) <= 16, "{}", fix.course_cdeg);
         let Telemetry::Summary(summary) = reported(id::VFR_HUD, &status) else { panic!("another") };
         assert_eq!((summary.speed_m_s, summary.altitude_m, summary.climb_m_s), (5.0, 500.5, 1.25));
-        // Nothing, half, full, half.
+        // The throttles of the four rotors are 0, 1/2, 1 and 1/2.
         assert_eq!((summary.heading_deg, summary.throttle_percent), (28, 50));
         let Telemetry::Attitude(attitude) = reported(id::ATTITUDE_QUATERNION, &status) else { panic!("another") };
         let q = state.quaternion().coords;
@@ -273,7 +273,7 @@ mod tests {
         assert_eq!(outputs.throttles, [0.0, 0.5, 1.0, 0.5, 0.0, 0.0, 0.0, 0.0]);
     }
 
-    /// Without a place on the earth, or a position, only what is known is reported.
+    /// If the origin or the position is unknown, the other values are still reported.
     #[test]
     fn what_is_half_known_is_reported_by_halves() {
         let mut status = flying();
@@ -286,7 +286,7 @@ mod tests {
         let Telemetry::Summary(summary) = reported(id::VFR_HUD, &status) else { panic!("another") };
         assert_eq!(summary.altitude_m, 12.5);
         assert_eq!([id::HOME_POSITION, id::GPS_GLOBAL_ORIGIN].map(|it| compose(it, &status)), [None, None]);
-        // While there is no home, heights count from the origin.
+        // Without home, heights are relative to the origin.
         let mut status = flying();
         status.guided.home_m = None;
         let Telemetry::Global(global) = reported(id::GLOBAL_POSITION_INT, &status) else { panic!("another") };
@@ -301,8 +301,8 @@ mod tests {
         status.aux.powered_up_us = 0;
         assert_eq!(compose(id::SYSTEM_TIME, &status), time(0));
         let Telemetry::Version(version) = reported(id::AUTOPILOT_VERSION, &status) else { panic!("another") };
-        // MISSION_INT, COMMAND_INT, PARAM_ENCODE_BYTEWISE; SET_ATTITUDE_TARGET, both SET_POSITION_TARGET; MAVLINK2; and
-        // FTP where there is storage.
+        // MISSION_INT, COMMAND_INT, PARAM_ENCODE_BYTEWISE, SET_ATTITUDE_TARGET, both SET_POSITION_TARGET and MAVLINK2;
+        // also FTP if there is storage.
         let bits = [2, 3, 4, 6, 7, 8, 13];
         assert_eq!(version.capabilities, bits.into_iter().map(|bit| 1 << bit).sum::<u64>());
         let stored = VehicleStatus { has_files: true, ..status };
@@ -330,7 +330,7 @@ mod tests {
 
     #[test]
     fn a_heading_is_never_360_degrees() {
-        // The largest yaw to the left whose heading is below a whole turn.
+        // The headings of these small yaws round to just below 360 degrees, or to 0.
         for yaw in [1e-9, 1e-7, f32::MIN_POSITIVE, 0.0] {
             assert!((0.0..360.0).contains(&heading_deg(yaw)), "{yaw}");
         }

@@ -1,21 +1,21 @@
-//! Texts to be sent.
+//! Status texts (STATUSTEXT) for stations.
 
 use afbc_guidance::OrderRefusal;
 use afbc_guidance::notice::Severity;
 use afbc_link::{Address, Downlink, MavSeverity, Text};
 use heapless::{Deque, String};
 
-/// Most texts that wait; further ones are dropped.
+/// Most queued texts. Further texts are dropped.
 const TEXTS_MAX: usize = 12;
-/// Longest text.
+/// Longest text \[bytes\].
 const LENGTH_MAX: usize = 50;
 
-/// A text of at most 50 characters; what is longer is cut off.
+/// A text of at most 50 bytes. Longer texts are truncated.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Words(String<LENGTH_MAX>);
 
 impl Words {
-    /// A text.
+    /// Creates a text.
     pub fn of(text: &str) -> Self {
         Words::default().and(text)
     }
@@ -28,14 +28,14 @@ impl Words {
         self
     }
 
-    /// Appends a number. Without the library's formatting, which takes 10 kB of flash.
+    /// Appends a number, without `core::fmt`, which would need 10 kB of flash.
     pub fn number(self, number: u32) -> Self {
         let higher = if number > 9 { self.number(number / 10) } else { self };
         let digit = char::from_digit(number % 10, 10).unwrap_or('0');
         higher.and(digit.encode_utf8(&mut [0; 4]))
     }
 
-    /// Appends a station.
+    /// Appends a station as "system/component".
     pub fn station(self, station: Address) -> Self {
         self.number(station.system.into()).and("/").number(station.component.into())
     }
@@ -45,7 +45,7 @@ impl Words {
     }
 }
 
-/// Texts in the order in which they came up.
+/// Queue of texts.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Texts(Deque<(MavSeverity, Text), TEXTS_MAX>);
 
@@ -55,19 +55,19 @@ impl Texts {
         self.0.push_back((severity, Text::from(text))).ok();
     }
 
-    /// Queues words.
+    /// Queues composed words.
     pub(crate) fn say(&mut self, severity: MavSeverity, words: &Words) {
         self.0.push_back((severity, words.text())).ok();
     }
 
-    /// Returns the oldest text.
+    /// Removes and returns the oldest text.
     pub(crate) fn next(&mut self) -> Option<Downlink> {
         let (severity, text) = self.0.pop_front()?;
         Some(Downlink::Text { severity, text })
     }
 }
 
-/// Returns the severity of an announcement.
+/// Returns the MAVLink severity of a notice.
 pub(crate) fn urgency(severity: Severity) -> MavSeverity {
     match severity {
         Severity::Critical => MavSeverity::MAV_SEVERITY_CRITICAL,
@@ -78,7 +78,7 @@ pub(crate) fn urgency(severity: Severity) -> MavSeverity {
     }
 }
 
-/// Returns why an order is declined, in words.
+/// Returns the reason of a refused order, in words.
 pub(crate) fn reason(declined: OrderRefusal) -> &'static str {
     match declined {
         OrderRefusal::NoPosition => "refused: position unknown",
@@ -141,7 +141,7 @@ mod tests {
         assert_eq!(numbers, [2, 3, 4, 5, 6]);
     }
 
-    /// Texts leave in the order in which they came; what does not fit is dropped.
+    /// Texts are sent in order. Texts that do not fit into the queue are dropped.
     #[test]
     fn texts_wait_in_order() {
         let mut texts = Texts::default();

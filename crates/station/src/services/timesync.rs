@@ -2,17 +2,17 @@
 
 use afbc_link::{Address, Clock};
 
-/// Returns the answer to a message about time from `from`, at `now_us` since power-up, by the vehicle at `me`.
+/// Returns the answer to a TIMESYNC or PING of `from`, at `now_us` since power-up. `me` is the vehicle's address.
 pub fn answer(message: Clock, from: Address, me: Address, now_us: u64) -> Option<Clock> {
     match message {
-        // Nanoseconds of 292 years fit.
+        // 64 bits hold 292 years in nanoseconds.
         Clock::Sync { answered_ns: 0, asked_ns, to } if me.is_meant_by(to) => {
             Some(Clock::Sync { answered_ns: (now_us as i64).wrapping_mul(1000), asked_ns, to: from })
         }
         Clock::Ping { time_us, number, to: Address { system: 0, component: 0 } } => {
             Some(Clock::Ping { time_us, number, to: from })
         }
-        // Answers to questions that the vehicle has not asked, and the time of day.
+        // Answers to requests that the vehicle has not made, and the time of day, need no answer.
         Clock::Sync { .. } | Clock::Ping { .. } | Clock::Time { .. } => None,
     }
 }
@@ -34,7 +34,7 @@ mod tests {
         assert_eq!(answer(ping, STATION, ME, 0), Some(Clock::Ping { time_us: 9, number: 3, to: STATION }));
     }
 
-    /// Else two vehicles would answer each other for ever.
+    /// If answers were answered, two vehicles would answer each other for ever.
     #[test]
     fn answers_are_not_answered() {
         for message in [

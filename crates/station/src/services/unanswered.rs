@@ -1,16 +1,16 @@
-//! What stations send without waiting for an answer, and the vehicle has no use for: it says so, now and then.
+//! Refuses unsupported messages that MAVLink has no answer for, by an occasional text.
 
 use afbc_link::UnansweredWish;
 
-/// Time between two texts about the same \[us\].
+/// Time between two texts about the same kind of message \[us\].
 const QUIET_US: u64 = 20_000_000;
 
-/// What has been said last, and when.
+/// The last refused kind of message, and its time \[us\].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Unanswered(Option<(UnansweredWish, u64)>);
 
 impl Unanswered {
-    /// Returns what is to be said of a wish at `now_us`; nothing if that was said a short time ago.
+    /// Returns the text that refuses a message at `now_us`. Returns none if the same text was sent a short time ago.
     pub fn text(&mut self, wish: UnansweredWish, now_us: u64) -> Option<&'static str> {
         let said = |(last, at_us): &(UnansweredWish, u64)| *last == wish && now_us.saturating_sub(*at_us) < QUIET_US;
         if self.0.as_ref().is_some_and(said) {

@@ -14,7 +14,7 @@ pub struct Bench {
     pub flight: Flight,
     pub comms: Comms,
     pub table: ParameterTable,
-    /// What has changed in the table.
+    /// Changes of the table so far.
     pub changes: Vec<RecordChange>,
     pub inputs: ControlInputs,
     pub taken: ControlInputs,
@@ -36,7 +36,7 @@ impl Bench {
         }
     }
 
-    /// Armed, and carried by its rotors long enough to be in flight.
+    /// Returns an armed vehicle that has been flying long enough to be airborne.
     pub fn flying() -> Self {
         let mut bench = Bench::new();
         for tick in 0..2000 {
@@ -49,7 +49,7 @@ impl Bench {
         bench
     }
 
-    /// Orders it to follow setpoints.
+    /// Selects Offboard mode.
     pub fn follow(&mut self) {
         self.hear(Uplink::Command(Command::SelectMode(modes::custom(FlightMode::Offboard))));
     }
@@ -68,7 +68,7 @@ impl Bench {
         self.hear_from(STATION, message);
     }
 
-    /// Receives this state, with noise.
+    /// Receives this state with some noise.
     pub fn measure(&mut self, state: &State) {
         // A tracker never repeats a state exactly.
         let mut state = *state;
@@ -76,12 +76,12 @@ impl Bench {
         self.hear(Uplink::State { sent_us: self.now_us, state, sigmas: PoseSigmas::UNKNOWN });
     }
 
-    /// Runs a tick with what was received; returns its report and all messages.
+    /// Runs a tick with the received inputs. Returns its report and all messages.
     pub fn step(&mut self) -> (Report, Vec<Downlink>) {
         self.sense(&Readings::NONE)
     }
 
-    /// Runs a tick with what was received and these readings; returns its report and all messages.
+    /// Runs a tick with the received inputs and these sensor readings. Returns its report and all messages.
     pub fn sense(&mut self, readings: &Readings) -> (Report, Vec<Downlink>) {
         self.now_us += 1000;
         self.inputs.take_into(&mut self.taken);
@@ -89,7 +89,7 @@ impl Bench {
         (report, self.said(&report))
     }
 
-    /// Runs a tick in which this state is received; returns its report, and the answers and texts.
+    /// Runs a tick in which this state is received. Returns its report, its answers and its texts.
     pub fn tick(&mut self, state: &State) -> (Report, Vec<Downlink>) {
         self.measure(state);
         self.hear(Uplink::Setpoint(Setpoint::default()));
@@ -98,7 +98,8 @@ impl Bench {
         (report, said)
     }
 
-    /// Returns the messages after a tick with this report; checks that they fit the firmware's buffer and are decoded.
+    /// Returns the messages after a tick with this report. Checks that they fit the firmware's buffer and can be
+    /// decoded.
     pub fn said(&mut self, report: &Report) -> Vec<Downlink> {
         let (mut messages, mut length, mut frames) = (Vec::new(), 0, 0);
         let Bench { flight, comms, table, changes, decoder, .. } = self;

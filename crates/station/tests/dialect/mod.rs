@@ -1,26 +1,26 @@
-//! What MAVLink's common dialect expects of whoever receives one of its messages.
+//! Answers that MAVLink's common dialect expects to each of its messages.
 
 use mavlink::dialects::common::*;
 
-/// What is expected of whoever receives a message.
+/// Answer that is expected from the receiver of a message.
 pub(crate) enum Expected {
     /// One of these messages.
     Answer(&'static [u32]),
-    /// Nothing.
+    /// No answer.
     None,
 }
 
-/// Returns what the dialect's definitions (`common.xml`, and the pages of mavlink.io on each service) expect. Without a
-/// default: a message that is new in the dialect has to be put somewhere.
+/// Returns the expected answer by the dialect's definitions: `common.xml`, and mavlink.io's page on each service. There
+/// is no default case, so that a new message in the dialect must be added.
 pub(crate) fn expected(message: &MavMessage) -> Expected {
     use Expected::{Answer, None};
     use MavMessage as M;
     match message {
-        // Ping protocol, time synchronisation: the same message comes back.
+        // Ping protocol and time synchronisation: the same message is sent back.
         M::PING(_) => Answer(&[4]),
         M::TIMESYNC(_) => Answer(&[111]),
-        // Commands: COMMAND_ACK. SET_MODE and SET_HOME_POSITION are commands of old, the latter answered with
-        // HOME_POSITION, too: "vehicle should emit ... irrespective of whether it has changed".
+        // Commands: COMMAND_ACK. SET_MODE and SET_HOME_POSITION are older commands. SET_HOME_POSITION is answered with
+        // HOME_POSITION too: "vehicle should emit ... irrespective of whether it has changed".
         M::COMMAND_LONG(_) | M::COMMAND_INT(_) | M::SET_MODE(_) => Answer(&[77]),
         M::SET_HOME_POSITION(_) => Answer(&[77, 242]),
         M::SET_GPS_GLOBAL_ORIGIN(_) => Answer(&[49]),
@@ -38,7 +38,7 @@ pub(crate) fn expected(message: &MavMessage) -> Expected {
         M::MISSION_ITEM(_) | M::MISSION_ITEM_INT(_) => Answer(&[40, 51, 47]),
         M::MISSION_CLEAR_ALL(_) => Answer(&[47]),
         M::MISSION_SET_CURRENT(_) => Answer(&[42]),
-        // "Response: DATA_STREAM", whose streams are the answer proper.
+        // "Response: DATA_STREAM". The streams themselves follow.
         M::REQUEST_DATA_STREAM(_) => Answer(&[67]),
         // Logs, files, events, shells (with the flag "respond"), heights of the terrain.
         M::LOG_REQUEST_LIST(_) => Answer(&[118]),
@@ -48,7 +48,7 @@ pub(crate) fn expected(message: &MavMessage) -> Expected {
         M::SERIAL_CONTROL(_) => Answer(&[126]),
         M::TERRAIN_CHECK(_) => Answer(&[136]),
 
-        // Answers, and what belongs to a transfer that the receiver has begun.
+        // Answers, and parts of a transfer that the receiver has begun.
         M::AUTOPILOT_VERSION(_)
         | M::AVAILABLE_MODES(_)
         | M::CHANGE_OPERATOR_CONTROL_ACK(_)
@@ -78,15 +78,15 @@ pub(crate) fn expected(message: &MavMessage) -> Expected {
         | M::TERRAIN_DATA(_)
         | M::TERRAIN_REPORT(_) => None,
 
-        // Requests without a receiver for whoever has what they ask for: cameras, modems, access points, stations with
-        // maps. Those answer, and a refusal by anybody else would be in their way.
+        // Requests without a target for cameras, modems, access points and stations with maps. These answer; a refusal
+        // by another component would disturb.
         M::CELLULAR_CONFIG(_)
         | M::DATA_TRANSMISSION_HANDSHAKE(_)
         | M::RESOURCE_REQUEST(_)
         | M::TERRAIN_REQUEST(_)
         | M::WIFI_CONFIG_AP(_) => None,
 
-        // Orders that nothing answers: their effect is seen in telemetry.
+        // Orders without an answer: telemetry shows their effect.
         M::ACTUATOR_CONTROL_TARGET(_)
         | M::AUTH_KEY(_)
         | M::CAN_FILTER_MODIFY(_)
@@ -140,7 +140,7 @@ pub(crate) fn expected(message: &MavMessage) -> Expected {
         | M::VISION_POSITION_ESTIMATE(_)
         | M::VISION_SPEED_ESTIMATE(_) => None,
 
-        // Identification of other aircraft, broadcast by them.
+        // Identification of other aircraft, which they broadcast.
         M::ADSB_VEHICLE(_)
         | M::AIS_VESSEL(_)
         | M::COLLISION(_)

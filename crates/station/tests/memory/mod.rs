@@ -1,4 +1,4 @@
-//! Files and logs in memory, which check what they are asked for.
+//! Storage of files and logs in memory that checks its callers.
 
 use afbc_link::FtpError;
 use afbc_station::services::storage::{
@@ -7,20 +7,20 @@ use afbc_station::services::storage::{
 use std::collections::{BTreeMap, BTreeSet};
 use std::task::Poll;
 
-/// A store of files, all of which may be changed, and of logs.
+/// Storage of writable files and of logs.
 #[derive(Default)]
 pub struct Memory {
     pub files: BTreeMap<String, Vec<u8>>,
     pub directories: BTreeSet<String>,
-    /// The file of each handle, while it is open.
+    /// Path of each file handle that is open.
     pub open: Vec<Option<String>>,
     pub logs: Vec<Vec<u8>>,
-    /// The log that is made while it is sent, if the vehicle makes one, and whether it does now.
+    /// The log to be streamed, if the vehicle has one, and whether it is being streamed.
     pub made: Option<Vec<u8>>,
     pub makes: bool,
-    /// Changes carried out.
+    /// Number of changes carried out.
     pub changes: usize,
-    /// Times that whoever asks for something of a log has to ask again, and how often somebody has asked.
+    /// Number of times a log request must be repeated, and number of log requests so far.
     pub slow: u32,
     pub asked: u32,
 }
@@ -30,7 +30,7 @@ fn is_in(path: &str, directory: &str) -> bool {
     folder == directory
 }
 
-/// Everything that a store is asked for is below its root.
+/// Checks that a path does not lead above the root.
 fn checked(path: &FilePath) -> &str {
     let path = path.as_str();
     let parts = || path.split('/');
@@ -40,7 +40,7 @@ fn checked(path: &FilePath) -> &str {
 }
 
 impl Memory {
-    /// With these files, and the directories that they are in.
+    /// Creates a storage with these files and their directories.
     pub fn with(files: &[(&str, Vec<u8>)]) -> Self {
         let mut memory = Memory::default();
         memory.directories.insert(String::new());
@@ -53,7 +53,7 @@ impl Memory {
         memory
     }
 
-    /// True if what is asked for of a log is not there yet.
+    /// Returns true if the storage is still busy with a log request.
     fn not_yet(&mut self) -> bool {
         self.asked += 1;
         !self.asked.is_multiple_of(self.slow + 1)
@@ -188,7 +188,7 @@ impl LogStore for Memory {
     }
 }
 
-/// Bytes that are like no others.
+/// Returns pseudo-random bytes.
 pub fn bytes(count: usize, seed: u32) -> Vec<u8> {
     let next = |state: &mut u32| {
         *state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

@@ -1,4 +1,4 @@
-//! Fences as stations send them.
+//! Fences are uploaded, checked and watched like those of real stations.
 #![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used, reason = "tests")]
 
 extern crate std;
@@ -44,7 +44,7 @@ fn around(here: Option<[f32; 2]>) -> Surroundings {
     Surroundings { origin: Some(origin()), here_m: here.map(Vector2::from), ..Surroundings::default() }
 }
 
-/// Uploads a fence; returns the outcome and the text.
+/// Uploads a fence. Returns the result and the text.
 fn upload(missions: &mut Missions, items: &[MissionItem], around: &Surroundings) -> (MissionResult, Option<Words>) {
     let mut heard = missions.hear(Mission::Count(items.len() as u16, Plan::FENCE), A, true, 0, around);
     while let Some((message, to)) = missions.next_message() {
@@ -75,7 +75,7 @@ fn stars() -> impl Strategy<Value = Vec<[f32; 2]>> {
     })
 }
 
-/// Polygons and circles, of inclusion and exclusion.
+/// Generates fences of polygons and circles, inclusions and exclusions.
 fn fences() -> impl Strategy<Value = Vec<MissionItem>> {
     let area =
         prop_oneof![
@@ -86,7 +86,7 @@ fn fences() -> impl Strategy<Value = Vec<MissionItem>> {
     prop::collection::vec(area, 0..5).prop_map(|areas| numbered(areas.concat()))
 }
 
-/// By the definitions, in double precision, from the places of the items.
+/// Returns true if a place is inside, computed from the definitions in double precision.
 fn inside(items: &[MissionItem], place: [f64; 2]) -> bool {
     let mut rest = items;
     let local = |item: &MissionItem| {
@@ -107,7 +107,7 @@ fn inside(items: &[MissionItem], place: [f64; 2]) -> bool {
             }
             continue;
         }
-        // The sum of the angles under which the edges are seen.
+        // Sum of the angles that the edges subtend at the place.
         let seen: f64 = (0..count)
             .map(|edge| {
                 let ([a, b], [c, d]) = (local(&area[edge]), local(&area[(edge + 1) % count]));
@@ -125,7 +125,7 @@ fn inside(items: &[MissionItem], place: [f64; 2]) -> bool {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
 
-    /// A download gives back what was uploaded, to the bit, beside a mission that stays.
+    /// A download returns exactly the uploaded items. The mission in the same storage does not change.
     #[test]
     fn what_was_uploaded_can_be_downloaded(items in fences(), mission in 0..5_u16) {
         let mut missions = Missions::default();
@@ -153,7 +153,7 @@ proptest! {
         prop_assert_eq!(missions.items().len(), usize::from(mission));
     }
 
-    /// A place is inside by the watch as by the definition; what is only near a boundary does not count.
+    /// Fence watch and definition agree on whether a place is inside. Places close to a boundary are left out.
     #[test]
     fn a_vehicle_is_inside_or_not(items in fences(), x in -400.0_f32..400.0, y in -400.0_f32..400.0) {
         let chart = origin().chart();
@@ -171,7 +171,7 @@ proptest! {
             watch.look(&items, &chart, &motion);
         }
         prop_assert_eq!(watch.view(), FenceView { leaves: !truth, outside: !truth });
-        // The upload of the same is refused where the vehicle is outside.
+        // The same fence is refused if the vehicle is outside.
         let refused = check(&items, Some(&chart), Some(here_m)).err().map(|(_, invalid)| invalid.reason);
         prop_assert_eq!(refused, (!truth).then_some("the vehicle is outside"));
     }
@@ -199,7 +199,7 @@ proptest! {
         }
     }
 
-    /// Neither bytes of items nor numbers in them stop anything.
+    /// Any item is answered, and none causes a panic.
     #[test]
     fn any_items_are_answered(
         items in prop::collection::vec(
@@ -221,7 +221,7 @@ proptest! {
         let (result, text) = upload(&mut missions, &items, &around(Some([0.0, 0.0])));
         prop_assert!(checked || result != MissionResult::ACCEPTED);
         prop_assert_eq!(text.is_some(), result != MissionResult::ACCEPTED);
-        // As a fence, too, whatever it is.
+        // Nor does any fence of such items cause a panic.
         let chart = origin().chart();
         let _ = contains(&items, &chart, Vector2::zeros());
         let (braking, none) = (Limits::DEFAULT.braking(), Vector2::zeros());
@@ -234,7 +234,7 @@ proptest! {
     }
 }
 
-/// Each refusal has its result, and names the item and what is wrong with it.
+/// Each refusal has its own result, and its text names the item and the fault.
 #[test]
 fn a_fence_that_is_none_is_refused_by_name() {
     use MissionResult as Is;
@@ -272,7 +272,7 @@ fn a_fence_that_is_none_is_refused_by_name() {
         (with(&|item| item.x = 900_000_001), Is::INVALID_X, "fence item 0: latitude is out of range"),
         (with(&|item| item.y = -1_800_000_001), Is::INVALID_Y, "fence item 0: longitude is out of range"),
         (with(&|item| item.x = 0), Is::INVALID_X, "fence item 0: farther away than 20 km"),
-        // Places on the earth, if far ones.
+        // These places are valid, but too far away.
         (with(&|item| item.x = -900_000_000), Is::INVALID_X, "fence item 0: farther away than 20 km"),
         (with(&|item| item.y = 1_800_000_000), Is::INVALID_X, "fence item 0: farther away than 20 km"),
     ];
@@ -287,13 +287,13 @@ fn a_fence_that_is_none_is_refused_by_name() {
     let fence = numbered(square(5001, [0.0, 0.0], 20.0));
     let unknown = upload(&mut Missions::default(), &fence, &Surroundings::default());
     assert_eq!(unknown, (Is::ERROR, Some(Words::of("fence item 0: no position yet, try again"))));
-    // More than there is room for.
+    // The fence has more items than there is room for.
     let many = numbered((0..65).map(|_| item(5003, 50.0, [0.0, 0.0])).collect());
     let refused = upload(&mut Missions::default(), &many, &around(None));
     assert_eq!(refused, (Is::NO_SPACE, Some(Words::of("fence refused: room for 64 items"))));
 }
 
-/// MAVSDK's example sends a circle of radius 0 at 0, 0 for none.
+/// MAVSDK's example sends a circle of radius 0 at 0, 0 in place of no circle.
 #[test]
 fn a_circle_without_radius_is_none() {
     let none = MissionItem { command: 5003, frame: 5, ..MissionItem::default() };
@@ -302,7 +302,7 @@ fn a_circle_without_radius_is_none() {
     assert!(contains(&fence, &origin().chart(), Vector2::new(5.0, 5.0)));
 }
 
-/// Places, ways and circles that orders ask for.
+/// Places, paths and circles of orders are inside or not.
 #[test]
 fn places_ways_and_circles_are_inside_or_not() {
     let chart = origin().chart();
@@ -314,7 +314,7 @@ fn places_ways_and_circles_are_inside_or_not() {
     assert!(
         !is_clear(&fence, &chart, m(0.0, 0.0), m(40.0, 0.0)) && is_clear(&fence, &chart, m(0.0, 0.0), m(40.0, 20.0))
     );
-    // Along the boundary, and in from outside.
+    // Paths along the boundary and in from outside are allowed.
     assert!(
         is_clear(&fence, &chart, m(49.5, -40.0), m(49.5, 40.0)) && is_clear(&fence, &chart, m(60.0, 0.0), m(40.0, 0.0))
     );

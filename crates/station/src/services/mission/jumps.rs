@@ -1,25 +1,25 @@
-//! Jumps of a mission, which are over after a number of repetitions.
+//! Counts the repetitions of a mission's jumps.
 
 use crate::services::items::{JUMP, JUMPS_MAX};
 use afbc_link::MissionItem;
 use heapless::Vec;
 
-/// How often each jump that has begun is still made.
+/// Numbers of the jump items that have been made, each with its repetitions left.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Jumps(Vec<(u16, u16), JUMPS_MAX>);
 
 impl Jumps {
-    /// Begins anew.
+    /// Resets all jumps.
     pub(super) fn clear(&mut self) {
         self.0.clear();
     }
 
-    /// Returns the item that follows a jump: where it leads, or the next one once it is over.
+    /// Returns the item that follows a jump: its target, or the next item once no repetitions are left.
     pub(super) fn next(&self, item: &MissionItem, target: u16) -> u16 {
         if self.left(item) == Some(0) { item.number.saturating_add(1) } else { target }
     }
 
-    /// Notes that an item is done: if it is a jump, it has been made, or it was over and begins anew.
+    /// Notes that an item is done. A jump uses up one repetition, or is reset if none were left.
     pub(super) fn made(&mut self, item: &MissionItem) {
         let (true, Some(left)) = (item.command == JUMP, self.left(item)) else { return };
         self.0.retain(|(number, _)| *number != item.number);
@@ -29,7 +29,7 @@ impl Jumps {
         }
     }
 
-    /// Returns how often a jump is still made; none for ever.
+    /// Returns the number of repetitions left. Returns none for an endless jump.
     fn left(&self, item: &MissionItem) -> Option<u16> {
         let [_, repeats, ..] = item.parameters;
         let begun = self.0.iter().find(|(number, _)| *number == item.number);

@@ -1,8 +1,8 @@
-//! Plans: mission, geofence and rally points. Upload, download and deletion by MAVLink's mission protocol, and what the
-//! guidance gets of the mission.
+//! Plans: mission, geofence and rally points. Handles their upload, download and deletion by MAVLink's mission
+//! protocol, and gives the guidance the mission's items.
 //!
-//! An upload takes the place of the plan only once it is complete and every item is valid. Downloads have no state: any
-//! number of stations may read at once. The plans share [`ITEMS_MAX`] items.
+//! An upload replaces the plan only once it is complete and every item is valid. A download has no state, so any number
+//! of stations may read at once. The plans share room for [`ITEMS_MAX`] items.
 
 mod jumps;
 mod plans;
@@ -22,19 +22,19 @@ use nalgebra::{Vector2, Vector3};
 use plans::PlanItems;
 use upload::Upload;
 
-/// Most messages that wait to be sent; the protocol repeats what is lost.
+/// Most queued messages. The protocol repeats lost messages.
 const OUT_MAX: usize = 8;
 
-/// What plans are checked against.
+/// Position data with which plans are checked.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Surroundings {
-    /// Where the local frame is, if that is known.
+    /// Origin of the local frame, if known.
     pub origin: Option<EarthOrigin>,
-    /// Where the vehicle is, if that is known \[m\].
+    /// Position of the vehicle, if known \[m\].
     pub here_m: Option<Vector2<f32>>,
-    /// Home, if there is one \[m\].
+    /// Home position, if set \[m\].
     pub home_m: Option<Vector3<f32>>,
-    /// Radius and height of the cylinder around home; 0 for none \[m\].
+    /// Radius and height of the cylindrical geofence around home \[m\]; 0 for none.
     pub cylinder_m: [f32; 2],
 }
 
@@ -42,30 +42,30 @@ pub struct Surroundings {
 #[derive(Clone, Debug, Default)]
 pub struct Missions {
     plans: PlanItems,
-    /// Which upload of the mission it is.
+    /// Number of the mission's upload.
     number: u16,
-    /// The item that ends the mission before its end.
+    /// Item at which the mission ends early.
     last: Option<u16>,
     jumps: Jumps,
     upload: Option<Upload>,
-    /// Station, plan and last item of the last upload, in case its answer is lost.
+    /// Station, plan and last item of the last upload, in case its acknowledgement is lost.
     done: Option<(Address, Plan, u16)>,
     out: Deque<(Mission, Address), OUT_MAX>,
 }
 
-/// What a message of a station leads to, besides answers.
+/// Results of a station's message, besides answers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Heard {
-    /// A text for everyone.
+    /// Text for all stations.
     pub text: Option<Words>,
-    /// The item to go on with.
+    /// Mission item to continue with.
     pub resume: Option<u16>,
-    /// True if there is another geofence.
+    /// True if the geofence has changed.
     pub fence: bool,
 }
 
 impl Missions {
-    /// Handles a message of `from`, which is `in_control` or not.
+    /// Handles a message of `from`. `in_control` is true if that station is in control.
     pub fn hear(
         &mut self,
         message: Mission,
@@ -76,7 +76,7 @@ impl Missions {
     ) -> Heard {
         let mut heard = Heard::default();
         if self.out.is_full() {
-            // As if it had not arrived: nothing is done that nobody is told of.
+            // The message is ignored as if lost: no request is carried out that cannot be answered.
             return heard;
         }
         match message {
@@ -90,7 +90,7 @@ impl Missions {
             }
             Mission::Count(count, plan) => (heard.text, heard.fence) = self.begin(count, plan, from, now_us),
             Mission::Item(item, plan) => (heard.text, heard.fence) = self.take(item, plan, from, now_us, around),
-            // A part of a list, which hardly any station wants any more.
+            // Partial lists are refused; hardly any station uses them.
             Mission::Part(_, plan) => self.acknowledge(MissionResult::UNSUPPORTED, plan, from),
             Mission::Clear(plan) => {
                 for each in [Plan::MISSION, Plan::FENCE, Plan::RALLY] {
@@ -110,14 +110,14 @@ impl Missions {
                     heard.text = Some(Words::of("no mission item ").number(number.into()));
                 }
             }
-            // The station gives its upload up.
+            // The station aborts its upload.
             Mission::Ack(..) if self.upload.as_ref().is_some_and(|upload| upload.from == from) => self.upload = None,
             Mission::SetCurrent(_) | Mission::Ack(..) | Mission::Current(_) | Mission::Reached(_) => (),
         }
         heard
     }
 
-    /// Repeats what is unanswered for too long at `now_us`; returns a text if an upload is given up.
+    /// Repeats an unanswered request at `now_us`. Returns a text if an upload is given up.
     pub fn tick(&mut self, now_us: u64) -> Option<Words> {
         let upload = self.upload.as_mut()?;
         let (from, plan) = (upload.from, upload.plan);
@@ -140,7 +140,7 @@ impl Missions {
         self.out.pop_front()
     }
 
-    /// Returns the item that the guidance wants, in the local frame.
+    /// Returns a mission item for the guidance, in the local frame.
     pub fn leg(&self, number: u16, origin: Option<&EarthOrigin>, home_m: f32) -> Option<Leg> {
         let items = self.items();
         let of_station = items.get(usize::from(number))?;
@@ -153,24 +153,24 @@ impl Missions {
         Some(Leg { number, upload: self.number, item, is_last })
     }
 
-    /// Notes that the guidance has done an item.
+    /// Notes that the guidance has completed an item.
     pub fn reached(&mut self, number: u16) {
         if let Some(item) = self.plans.of(Plan::MISSION).get(usize::from(number)) {
             self.jumps.made(item);
         }
     }
 
-    /// Notes that the mission begins anew.
+    /// Notes that the mission starts again.
     pub fn restart(&mut self) {
         self.jumps.clear();
     }
 
-    /// Ends the mission with this item from now on, or with its last one; returns whether that is another one.
+    /// Sets the item at which the mission ends; none for its last item. Returns true if this is a change.
     pub fn set_last(&mut self, last: Option<u16>) -> bool {
         core::mem::replace(&mut self.last, last) != last
     }
 
-    /// Returns what is wrong with the first item of the mission that cannot be flown now.
+    /// Returns a text about the first mission item that cannot be flown now.
     pub fn problem(&self, around: &Surroundings) -> Option<Words> {
         let (number, invalid) = check_places(self.items(), self.fence(), around).err()?;
         let command = self.items().get(usize::from(number)).map_or(0, |item| item.command);
@@ -192,12 +192,12 @@ impl Missions {
         self.plans.of(Plan::RALLY)
     }
 
-    /// Returns which upload of the mission it is.
+    /// Returns the number of the mission's upload.
     pub fn number(&self) -> u16 {
         self.number
     }
 
-    /// Returns MISSION_CURRENT, when the guidance flies, or flew last, `item`, in mission mode or not.
+    /// Returns MISSION_CURRENT. `item` is the item flown now or last. `flies` is true while the mission is flown.
     pub fn current(&self, item: Option<u16>, reached: Option<u16>, flies: bool) -> MissionCurrent {
         let total = self.items().len() as u16;
         let last = total.checked_sub(1);
@@ -219,7 +219,7 @@ impl Missions {
         self.plans.of(plan).get(usize::from(number)).copied()
     }
 
-    /// Begins an upload; returns a text, and true if there is another fence.
+    /// Begins an upload. Returns a text, and true if the fence has changed.
     fn begin(&mut self, count: u16, plan: Plan, from: Address, now_us: u64) -> (Option<Words>, bool) {
         let known = [Plan::MISSION, Plan::FENCE, Plan::RALLY].contains(&plan);
         let room = self.plans.room(plan);
@@ -243,7 +243,7 @@ impl Missions {
         ((result == MissionResult::NO_SPACE).then_some(text), cleared)
     }
 
-    /// Takes an item of an upload; returns a text, and true if there is another fence.
+    /// Takes an item of an upload. Returns a text, and true if the fence has changed.
     fn take(
         &mut self,
         item: MissionItem,
@@ -254,14 +254,14 @@ impl Missions {
     ) -> (Option<Words>, bool) {
         let uploads = self.upload.as_mut().filter(|upload| upload.from == from && upload.plan == plan);
         let Some(upload) = uploads else {
-            // The last item again: the answer to it was lost.
+            // The last item was sent again because its acknowledgement was lost.
             let is_done = self.done == Some((from, plan, item.number));
             let result = if is_done { MissionResult::ACCEPTED } else { MissionResult::INVALID_SEQUENCE };
             self.acknowledge(result, plan, from);
             return (None, false);
         };
         if item.number != upload.wanted() {
-            // An item twice, or one too early. The one that is wanted was asked for, and will be again.
+            // The item is repeated or too early. The expected item was requested, and will be again.
             return (None, false);
         }
         let mut checked = match plan {
@@ -291,7 +291,7 @@ impl Missions {
             self.acknowledge(invalid.result, plan, from);
             return (Some(invalid.text(name(plan), number, item.command)), false);
         }
-        // In place: a copy would take much of the stack.
+        // The items are replaced in place: a copy would need much stack.
         let fits = self.plans.replace(plan, &upload.items);
         self.upload = None;
         if plan == Plan::MISSION && fits {
@@ -302,7 +302,7 @@ impl Missions {
         (None, fits && plan == Plan::FENCE)
     }
 
-    /// Removes the items of a plan, and ends an upload.
+    /// Removes the items of a plan, and ends any upload.
     fn clear(&mut self, plan: Plan) {
         self.plans.replace(plan, &[]);
         (self.upload, self.done) = (None, None);
@@ -311,7 +311,7 @@ impl Missions {
         }
     }
 
-    /// Notes that there is another mission.
+    /// Notes that the mission has changed.
     fn renew(&mut self) {
         self.number = self.number.wrapping_add(1);
         self.last = None;
@@ -327,7 +327,7 @@ impl Missions {
     }
 }
 
-/// Checks that the guidance would fly each item of a mission, and that its place is inside the fence, as far as that is
+/// Checks that the guidance accepts each item of a mission, and that its place is inside the fence, if the place is
 /// known.
 fn check_places(items: &[MissionItem], fence: &[MissionItem], around: &Surroundings) -> Result<(), (u16, Invalid)> {
     let [fence_radius_m, fence_height_m] = around.cylinder_m;

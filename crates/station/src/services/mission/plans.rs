@@ -1,4 +1,4 @@
-//! Room for the items of all plans together: mission, fence and rally points, one after the other.
+//! Storage for the items of all plans: mission, fence and rally points, one after the other.
 
 use crate::services::items::ITEMS_MAX;
 use afbc_link::{MissionItem, Plan};
@@ -8,13 +8,13 @@ use heapless::Vec;
 #[derive(Clone, Debug, Default)]
 pub(super) struct PlanItems {
     items: Vec<MissionItem, ITEMS_MAX>,
-    /// Number of items of the fence, and of rally points; the rest is the mission's.
+    /// Number of the fence's items and of rally points. All other items are the mission's.
     fence: u8,
     rally: u8,
 }
 
 impl PlanItems {
-    /// Returns where the items of a plan begin, and their number; none if there is no such plan.
+    /// Returns the index of a plan's first item, and the number of items. Returns none for an unknown plan.
     fn place(&self, plan: Plan) -> Option<(usize, usize)> {
         let (fence, rally) = (usize::from(self.fence), usize::from(self.rally));
         let mission = self.items.len().saturating_sub(fence + rally);
@@ -31,15 +31,16 @@ impl PlanItems {
         self.place(plan).and_then(|(begin, count)| self.items.get(begin..begin + count)).unwrap_or_default()
     }
 
-    /// Returns how many items of a plan there is room for beside those of the other plans.
+    /// Returns the number of items that a plan can have, given the items of the other plans.
     pub(super) fn room(&self, plan: Plan) -> usize {
         ITEMS_MAX - (self.items.len() - self.of(plan).len())
     }
 
-    /// Replaces the items of a plan; false, and nothing changes, if there is no room for them.
+    /// Replaces the items of a plan. Returns false and changes nothing if there is no room.
     pub(super) fn replace(&mut self, plan: Plan, items: &[MissionItem]) -> bool {
         let Some((begin, count)) = self.place(plan).filter(|_| items.len() <= self.room(plan)) else { return false };
-        // By way of the list's end, where it can shrink and grow: a second list would take much of the stack.
+        // The plan's items are rotated to the end of the list, replaced there, and rotated back. A second list would
+        // need much stack.
         let (mission, others) = (plan == Plan::MISSION, self.items.len() - count);
         if let Some(rest) = self.items.get_mut(begin..) {
             rest.rotate_left(count.min(rest.len()));

@@ -1,4 +1,4 @@
-//! The mission protocol, message by message.
+//! Tests the mission protocol message by message.
 #![allow(
     clippy::expect_used,
     clippy::indexing_slicing,
@@ -38,7 +38,7 @@ fn said(missions: &mut Missions) -> List<(Mission, Address)> {
     core::iter::from_fn(|| missions.next_message()).collect()
 }
 
-/// Uploads items without a loss; returns what was said last.
+/// Uploads items without loss. Returns the last messages.
 fn upload(missions: &mut Missions, items: &[MissionItem]) -> List<(Mission, Address)> {
     missions.hear(Mission::Count(items.len() as u16, PLAN), A, true, 0, &NOWHERE);
     for item in items {
@@ -58,14 +58,14 @@ fn what_was_uploaded_can_be_downloaded() {
     for item in &items {
         missions.hear(Mission::Request(item.number, PLAN), B, false, 0, &NOWHERE);
         let reported = said(&mut missions);
-        // A heading that is not given is NaN, which differs from itself.
+        // An omitted heading is NaN, which is not equal to itself, so texts are compared.
         assert_eq!(std::format!("{reported:?}"), std::format!("{:?}", [(Mission::Item(*item, PLAN), B)]));
     }
     missions.hear(Mission::Request(64, PLAN), B, false, 0, &NOWHERE);
     assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::INVALID_SEQUENCE, PLAN), B)]);
 }
 
-/// Rally points, which are kept beside the mission, and what is none.
+/// Rally points are stored in addition to the mission. Invalid ones are refused.
 #[test]
 fn rally_points_are_kept() {
     let mut missions = Missions::default();
@@ -91,7 +91,7 @@ fn rally_points_are_kept() {
     assert_eq!((missions.count(plan), missions.items().len()), (0, 1));
 }
 
-/// The mission stays as it was until the last item is there.
+/// The mission does not change until the last item has arrived.
 #[test]
 fn a_broken_upload_changes_nothing() {
     let mut missions = Missions::default();
@@ -124,7 +124,7 @@ fn lost_messages_are_repeated_and_a_silent_station_is_given_up() {
     }
     assert_eq!(asked, TRIES - 1);
     assert!(missions.upload.is_none());
-    // Another one works, and its last item may come twice.
+    // A further upload works, and its last item may be repeated.
     upload(&mut missions, &[waypoint(0)]);
     missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0, &NOWHERE);
     assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::ACCEPTED, PLAN), A)]);
@@ -139,7 +139,7 @@ fn only_the_station_in_control_changes_it() {
     assert_eq!(missions.hear(Mission::SetCurrent(0), B, false, 0, &NOWHERE), Heard::default());
     let denied = |plan| (Mission::Ack(MissionResult::DENIED, plan), B);
     assert_eq!(said(&mut missions), [denied(PLAN), denied(Plan::ALL)]);
-    // Nor does another one put items into its upload.
+    // Nor can another station add items to the upload.
     missions.hear(Mission::Count(2, PLAN), A, true, 0, &NOWHERE);
     said(&mut missions);
     missions.hear(Mission::Item(waypoint(0), PLAN), B, false, 0, &NOWHERE);
@@ -187,7 +187,7 @@ fn the_guidance_gets_items_in_the_local_frame() {
     let mut missions = Missions::default();
     let [latitude, longitude] = Global { altitude_m: 0.0, ..at }.e7();
     let take_off = MissionItem { command: 22, x: 0, y: 0, ..waypoint(0) };
-    // 10 m above the sea's level of the origin, to the north.
+    // The waypoint is 10 m above the altitude of the origin, to the north.
     let north = MissionItem { frame: 0, x: latitude + 1000, y: longitude, z: 498.0, ..waypoint(1) };
     let local = MissionItem { frame: 1, x: 20_000, y: 30_000, z: -4.0, ..waypoint(2) };
     let land = MissionItem { command: 21, x: 0, y: 0, z: 0.0, ..waypoint(3) };
@@ -205,7 +205,7 @@ fn the_guidance_gets_items_in_the_local_frame() {
     assert_eq!((leg(1, None), leg(4, Some(&origin))), (None, None));
 }
 
-/// What is just within each limit is taken, and what is just beyond it is not, with the number that is wrong.
+/// Values just inside each limit are accepted. Values just outside are refused, and the result names the parameter.
 #[test]
 fn items_reach_up_to_their_limits() {
     const OK: Option<MissionResult> = None;
@@ -232,11 +232,12 @@ fn items_reach_up_to_their_limits() {
         (with(0.0, -0.5, 0.0), second),
         (with(0.0, 0.0, 3600.5), fourth),
         (with(0.0, 0.0, -3600.5), fourth),
-        // The second one of a stay is no radius; its time and heading count.
+        // A loiter has no radius in its second parameter, but a time and a heading.
         (MissionItem { command: loiter, ..with(0.0, -7.0, 0.0) }, second),
         (MissionItem { command: loiter, ..with(3601.0, 0.0, 0.0) }, first),
         (MissionItem { command: loiter, ..with(0.0, 0.0, 1e9) }, fourth),
-        // A landing is where the vehicle is, or somewhere; its height does not matter, and it has no numbers.
+        // A landing is at the vehicle's place or elsewhere. Its height is not used, and its first four parameters must
+        // be 0 or omitted.
         (MissionItem { command: land, x: 0, y: 0, z: f32::NAN, ..good }, OK),
         (MissionItem { command: land, x: i32::MAX, y: i32::MAX, z: f32::NAN, ..good }, OK),
         (MissionItem { command: land, ..with(-1.0, -1.0, 1e9) }, first),
@@ -247,7 +248,7 @@ fn items_reach_up_to_their_limits() {
         (MissionItem { command: land, x: i32::MAX, ..good }, x),
         (MissionItem { command: land, x: 0, y: i32::MAX, ..good }, y),
         (MissionItem { command: land, x: i32::MAX, y: 0, ..good }, x),
-        // A take-off is here, or leads somewhere.
+        // A take-off is at the vehicle's place or leads elsewhere.
         (MissionItem { command: take_off, x: i32::MAX, y: i32::MAX, ..good }, OK),
         (MissionItem { command: take_off, x: 0, y: 0, ..good }, OK),
         (MissionItem { command: take_off, x: i32::MAX, ..good }, x),
@@ -325,7 +326,7 @@ fn items_reach_up_to_their_limits() {
     }
 }
 
-/// Each command is an item of the guidance, with its numbers; what is not given is zero, a heading is to the right.
+/// Each command becomes an item of the guidance. Omitted numbers become 0; MAVLink's headings are clockwise.
 #[test]
 fn each_item_is_one_of_the_guidance() {
     let origin = EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible");
@@ -367,7 +368,7 @@ fn each_item_is_one_of_the_guidance() {
         panic!("no take-off")
     };
     near(position_m, 30.0, -20.0, 9.0);
-    // Here, above the sea: the origin is at 488 m.
+    // The take-off is here, at an altitude above sea level. The origin is at 488 m.
     for nowhere in [0, i32::MAX] {
         let above = MissionItem { command: 22, frame: 5, x: nowhere, y: nowhere, z: 500.0, ..full };
         assert_eq!(there(&above), Some(Item::TakeOff { height_m: 12.0 }));
@@ -375,7 +376,7 @@ fn each_item_is_one_of_the_guidance() {
     assert_eq!(there(&MissionItem { command: 20, ..full }), Some(Item::Return));
     let speed = MissionItem { command: 178, parameters: [1.0, 4.5, 0.0, 0.0], ..full };
     assert_eq!(there(&speed), Some(Item::Speed(4.5)));
-    // No change, and as usual.
+    // -1 keeps the speed; -2 restores the default.
     let speed = |speed| there(&MissionItem { command: 178, parameters: [1.0, speed, 0.0, 0.0], ..full });
     assert_eq!([-1.0, -2.0].map(speed), [Some(Item::Wait(0.0)), Some(Item::Speed(f32::INFINITY))]);
     let item = |command, parameters| there(&MissionItem { command, parameters, ..place(30.0, -20.0) });
@@ -400,13 +401,13 @@ fn each_item_is_one_of_the_guidance() {
     }
     assert_eq!(there(&MissionItem { command: 205, ..full }), None);
     assert_eq!(there(&MissionItem { frame: 99, ..full }), None);
-    // Without an origin there are no places on the earth, but a landing here, a return and a speed.
+    // Without an origin there are no global places. A return and a change of speed need none.
     for (command, known) in [(16, false), (19, false), (21, false), (22, false), (20, true), (178, true)] {
         assert_eq!(to_guidance(&MissionItem { command, ..full }, None, 0.0).is_some(), known, "{command}");
     }
 }
 
-/// A mission whose places are outside the fence is refused, if both are known.
+/// A mission with places outside the fence is refused, if fence and places are known.
 #[test]
 fn a_mission_outside_the_fence_is_refused() {
     let origin = EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible");
@@ -428,7 +429,7 @@ fn a_mission_outside_the_fence_is_refused() {
     }
 }
 
-/// MISSION_STATE: 1 no mission, 2 not begun, 3 flies, 4 paused, 5 done.
+/// MISSION_STATE: 1 no mission, 2 not started, 3 active, 4 paused, 5 complete.
 #[test]
 fn the_state_of_a_mission_is_reported() {
     let mut missions = Missions::default();
@@ -444,7 +445,7 @@ fn the_state_of_a_mission_is_reported() {
     assert_eq!(state(&missions, Some(1), Some(0), false), (1, 3, 4, 2));
     assert_eq!(state(&missions, Some(2), Some(2), false), (2, 3, 5, 2));
     assert_eq!(state(&missions, Some(2), Some(2), true), (2, 3, 3, 1));
-    // Each upload has a number of its own, and so has each item: the guidance takes a new one for another.
+    // The guidance tells items apart by the number of the upload and the number of the item.
     let leg = missions.leg(1, None, 0.0);
     assert_eq!(leg, None, "its place is not known");
     let local = MissionItem { frame: 1, x: 10_000, y: 20_000, z: -3.0, ..waypoint(0) };
@@ -453,7 +454,7 @@ fn the_state_of_a_mission_is_reported() {
     assert_eq!(legs, [Some((0, 2, false)), Some((1, 2, true)), None]);
 }
 
-/// Each kind of plan, from who may and who may not: what is asked, begun, cleared and chosen.
+/// Each message is answered for each type of plan, with and without control.
 #[test]
 fn every_message_is_answered_by_what_it_is_about() {
     for plan in [0, 1, 2, 3, 99, 255].map(Plan) {
@@ -512,7 +513,7 @@ fn an_item_is_chosen_that_there_is() {
     }
 }
 
-/// The station that uploads may give up, and no other; while it does not, no other may upload.
+/// Only the uploading station may abort its upload. Until it does, no other station may upload.
 #[test]
 fn an_upload_is_its_stations_own() {
     let mut missions = Missions::default();
@@ -522,7 +523,7 @@ fn an_upload_is_its_stations_own() {
     assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::DENIED, PLAN), B)]);
     missions.hear(Mission::Ack(MissionResult::CANCELLED, PLAN), B, true, 0, &NOWHERE);
     assert!(missions.upload.is_some());
-    // Items too early, twice or of another plan are not taken.
+    // Items that are early, repeated or of another plan are not accepted.
     for item in [waypoint(1), waypoint(5)] {
         missions.hear(Mission::Item(item, PLAN), A, true, 0, &NOWHERE);
         assert_eq!(said(&mut missions), []);
@@ -535,7 +536,7 @@ fn an_upload_is_its_stations_own() {
     assert_eq!(said(&mut missions), []);
     missions.hear(Mission::Ack(MissionResult::CANCELLED, PLAN), A, true, 0, &NOWHERE);
     assert!(missions.upload.is_none());
-    // It may begin anew, and only its last item may come twice.
+    // The station may start again, and only the last item may be repeated.
     upload(&mut missions, &[waypoint(0), waypoint(1)]);
     for (item, from, plan, result) in [
         (waypoint(1), A, PLAN, MissionResult::ACCEPTED),
@@ -548,7 +549,7 @@ fn an_upload_is_its_stations_own() {
     }
 }
 
-/// A parameter that is not used is named by its number.
+/// The text names an unused parameter by its number.
 #[test]
 fn what_is_not_used_is_named() {
     let mut missions = Missions::default();
@@ -562,7 +563,7 @@ fn what_is_not_used_is_named() {
     }
 }
 
-/// More messages in a tick than can be answered: what is not answered is not done.
+/// If a tick brings more messages than can be answered, the unanswered ones are not carried out.
 #[test]
 fn nothing_is_cleared_without_an_answer() {
     let mut missions = Missions::default();

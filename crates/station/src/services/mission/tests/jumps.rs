@@ -1,8 +1,8 @@
-//! Jumps of a mission: how often they are made, and which are refused.
+//! Tests the repetitions of jumps, and the refusal of invalid ones.
 
 use super::*;
 
-/// Items flown, one by one, as a guidance does that does each at once.
+/// Flies the mission as a guidance that completes each item at once. Returns the items' numbers in order.
 fn flown(missions: &mut Missions, most: usize) -> List<u16> {
     let (mut wanted, mut done) = (0, List::new());
     let origin = EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible");
@@ -21,7 +21,7 @@ fn jump(number: u16, to: u16, repeats: f32) -> MissionItem {
     MissionItem { command: 177, parameters: [f32::from(to), repeats, 0.0, 0.0], x: 0, y: 0, z: 0.0, ..waypoint(number) }
 }
 
-/// Each jump is made as often as it says, again in each round of an outer one, and from the start once disarmed.
+/// Each jump is repeated as often as it says, again in each round of an outer jump, and anew after a restart.
 #[test]
 fn jumps_are_repeated() {
     let mut missions = Missions::default();
@@ -40,7 +40,7 @@ fn jumps_are_repeated() {
     assert_eq!(flown(&mut missions, 99), [0, 1], "never");
 }
 
-/// A mission that would jump to nowhere, or go around without a flight, is refused as a whole.
+/// A mission with a jump to a missing item or an endless loop without a flight is refused as a whole.
 #[test]
 fn jumps_without_an_end_are_refused() {
     let speed =
@@ -65,7 +65,7 @@ fn jumps_without_an_end_are_refused() {
         assert_eq!(heard.expect("an item").text, Some(text));
         assert!(missions.items().is_empty());
     }
-    // Which end, or take time.
+    // These loops end or take time.
     for items in [
         &[waypoint(0), speed(1), jump(2, 1, 1000.0)][..],
         &[waypoint(0), jump(1, 0, -1.0)],
