@@ -1,4 +1,4 @@
-//! Commands in text, one a line, that change weather and faults while vehicles fly.
+//! Text commands, one per line, that change weather and faults while vehicles fly.
 
 use crate::hand::{Grip, SIDES};
 use afbc_files::read::words::{nearest, out_of_range};
@@ -11,48 +11,48 @@ use afbc_types::Range;
 use nalgebra::Vector3;
 use std::str::SplitWhitespace;
 
-/// A line, understood.
+/// A parsed line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
-    /// When it is carried out, by the vehicles' clock \[s\]; none: at once.
+    /// Time at which the command is carried out, by the vehicles' clock \[s\]; `None`: at once.
     pub at_s: Option<f64>,
-    /// System id of the vehicle that it is for; none: all.
+    /// System id of the vehicle that the command is for; `None`: all.
     pub vehicle: Option<u8>,
-    /// What is to be done.
+    /// The command.
     pub command: ServerCommand,
 }
 
-/// What is to be done.
+/// A command to the server.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ServerCommand {
-    /// Change weather or faults.
+    /// Changes weather or faults.
     WorldChange(WorldChange),
-    /// Say how it is.
+    /// Reports the state of the vehicles.
     Status,
-    /// Go on by so many milliseconds, where time stands still otherwise.
+    /// Runs this many milliseconds, in lockstep.
     Step(u32),
-    /// Run at so many times real time; 0: as fast as possible.
+    /// Runs at this multiple of real time; 0: as fast as possible.
     Speed(f64),
-    /// Let time stand still, or go on.
+    /// Pauses (true) or resumes (false).
     Pause(bool),
-    /// Fly on under this law.
+    /// Switches to this control law.
     Law(ControllerKind),
-    /// Say what commands there are.
+    /// Lists the commands.
     Help,
-    /// End.
+    /// Ends the server.
     Quit,
 }
 
-/// A change of weather or faults, from now on. Axes are those of the earth frame: north, west, up.
+/// A change of weather or faults that takes effect at once. Axes are those of the earth frame: north, west, up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum WorldChange {
     /// Steady wind \[m/s\].
     Wind(Vector3<f64>),
-    /// Turbulence, or none.
+    /// Turbulence; `None` for calm air.
     Turbulence(Option<Turbulence>),
     /// A gust that rises, holds and falls.
     Gust {
-        /// Peak \[m/s\].
+        /// Velocity at the peak \[m/s\].
         velocity_m_s: Vector3<f64>,
         /// Time to the peak \[s\].
         rise_s: f64,
@@ -63,48 +63,48 @@ pub enum WorldChange {
     Push {
         /// Force \[N\].
         force_n: Vector3<f64>,
-        /// For how long; none: it stays \[s\].
+        /// Duration \[s\]; `None`: permanent.
         seconds: Option<f64>,
     },
-    /// A parameter of the vehicle changes.
+    /// A change of a vehicle parameter.
     Change {
-        /// The parameter.
+        /// The parameter that changes.
         quantity: PlantParameter,
-        /// Factor on what it was.
+        /// Factor on the parameter's original value.
         factor: f64,
-        /// For how long; none: it stays \[s\].
+        /// Duration \[s\]; `None`: permanent.
         seconds: Option<f64>,
     },
-    /// What it carries now; a mass of 0 drops it.
+    /// The payload that the vehicle carries; a mass of 0 drops it.
     Payload {
         /// Mass \[kg\].
         mass_kg: f64,
         /// Distance below the centre of mass \[m\].
         below_m: f64,
     },
-    /// An instrument fails.
+    /// A failure of an instrument.
     Fault {
-        /// How.
+        /// Kind of failure.
         failure: Failure,
-        /// For how long; none: it stays \[s\].
+        /// Duration \[s\]; `None`: permanent.
         seconds: Option<f64>,
     },
-    /// A rotor has this share of its thrust left.
+    /// A rotor that keeps only a part of its thrust.
     Rotor {
-        /// Its number, from 1.
+        /// Number of the rotor, from 1.
         rotor: u8,
-        /// Share of the thrust; 1 repairs it.
+        /// Remaining share of the thrust; 1 repairs the rotor.
         efficiency: f64,
     },
-    /// The battery has this share of its charge.
+    /// Charge of the battery, 0 to 1.
     Battery(f64),
-    /// A hand holds the vehicle, or puts it down.
+    /// A hand takes hold of the vehicle, or puts it down.
     Hold(Grip),
-    /// No faults; weather and load are the scenario's.
+    /// Removes all faults; weather and payload are the scenario's again.
     Clear,
 }
 
-/// What each command is called, what follows it, and what it does.
+/// Name, arguments and meaning of each command.
 pub const COMMANDS: [[&str; 3]; 20] = [
     ["wind", "X Y Z", "steady wind [m/s], towards north, west, up"],
     ["turbulence", "none|light|moderate|severe", "turbulence of the wind"],
@@ -136,19 +136,19 @@ pub const COMMANDS: [[&str; 3]; 20] = [
     ["at", "SECONDS COMMAND", "a command later, by the vehicles' clock; `vehicle N COMMAND`: for one of them"],
 ];
 
-/// Accepted times \[s\].
+/// Accepted range of times \[s\].
 const AT: Range = Range::new("at", 0.0, 1e6);
 const SECONDS: Range = Range::new("seconds", 0.0, 1e6);
-/// Accepted factor on time.
+/// Accepted range of the speed factor.
 const SPEED: Range = Range::new("speed", 0.0, 1000.0);
-/// Accepted factors on a parameter and on a moment.
+/// Accepted factors on a parameter, and on a moment.
 const FACTOR: Range = Range::new("factor", 0.01, 100.0);
 const MOMENT_FACTOR: Range = Range::new("factor", -10.0, 10.0);
-/// Accepted turn of a held vehicle about the vertical, positive to the left \[deg/s\].
+/// Accepted turn rate of a held vehicle about the vertical, positive to the left \[deg/s\].
 const TURN: Range = Range::new("turn", -180.0, 180.0);
-/// Most milliseconds of one command: an hour.
+/// Most milliseconds of one `step` command: an hour.
 const STEP_MAX: u32 = 3_600_000;
-/// A gust, unless said otherwise \[s\].
+/// Default rise and hold time of a gust \[s\].
 const RISE_S: f64 = 1.0;
 const HOLD_S: f64 = 2.0;
 
@@ -169,10 +169,10 @@ const TURBULENCE: [(&str, Option<Turbulence>); 4] = [
     ("severe", Some(Turbulence::SEVERE)),
 ];
 
-/// Reads a line; none if it is empty or a comment.
+/// Parses a line; returns `None` for an empty line or a comment.
 ///
 /// # Errors
-/// One line on what is wrong with it.
+/// Fails with one line that says what is wrong with the text.
 pub fn parse(text: &str) -> Result<Option<Line>, String> {
     let text = text.split('#').next().unwrap_or_default();
     let mut words = Words { command: "", rest: text.split_whitespace() };
@@ -254,14 +254,14 @@ fn change(word: &str, words: &mut Words<'_>) -> Result<WorldChange, String> {
     })
 }
 
-/// Reads the name of a law.
+/// Parses the name of a control law.
 fn law(words: &mut Words<'_>) -> Result<ControllerKind, String> {
     let name = words.word(&format!("one of {}", ControllerKind::names()))?;
     ControllerKind::named(name)
         .ok_or_else(|| format!("law: {}: no such law; {}", shown(name), ControllerKind::cure(name)))
 }
 
-/// Reads how a hand holds the vehicle, as `left 60`.
+/// Parses how a hand holds the vehicle, such as `left 60`.
 fn grip(words: &mut Words<'_>) -> Result<Grip, String> {
     let sides = SIDES.map(|(name, level_rad)| (name, Some(level_rad)));
     let options: Vec<_> = sides.into_iter().chain([("none", None)]).collect();
@@ -270,7 +270,7 @@ fn grip(words: &mut Words<'_>) -> Result<Grip, String> {
     Ok(Grip::Held { level_rad, turn_rad_s })
 }
 
-/// Reads how an instrument fails, as `gnss jumped 5 0 0`.
+/// Parses how an instrument fails, such as `gnss jumped 5 0 0`.
 fn fault(words: &mut Words<'_>) -> Result<Failure, String> {
     let instrument = words.word("an instrument, as in: fault gnss lost")?;
     let of = |failure: &&Failure| failure.name().split_once('-').is_some_and(|(of, _)| of == instrument);
@@ -313,7 +313,7 @@ fn fault(words: &mut Words<'_>) -> Result<Failure, String> {
     })
 }
 
-/// What follows the name of a command.
+/// The name of a command, and the words after it.
 struct Words<'a> {
     command: &'a str,
     rest: SplitWhitespace<'a>,
@@ -367,14 +367,14 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// Returns the command as it is to be written.
+    /// Returns the command's syntax.
     fn usage(&self) -> String {
         let known = COMMANDS.iter().find(|[name, ..]| *name == self.command);
         known.map_or(self.command.into(), |[name, arguments, _]| format!("{name} {arguments}").trim_end().into())
     }
 }
 
-/// Returns a word as an error shows it: short, without control characters.
+/// Returns a word for an error message: shortened, with control characters escaped.
 fn shown(word: &str) -> String {
     const LONGEST: usize = 40;
     let start: String = word.chars().take(LONGEST).flat_map(char::escape_default).collect();

@@ -1,37 +1,37 @@
-//! Another way to the vehicles than their ports and lines.
+//! The interface through which something other than ports and text lines reaches the vehicles.
 
 use crate::server::{Server, Then};
 use std::time::Duration;
 
-/// How time goes on.
+/// Speed of the simulated time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TimeRate {
-    /// At so many times real time; 0: as fast as possible.
+    /// This multiple of real time; 0: as fast as possible.
     Times(f64),
-    /// By the command `step` alone.
+    /// Time advances only by the command `step`.
     Lockstep,
 }
 
-/// How time goes on, and whether it stands still for now.
+/// Speed of the simulated time, and whether it is paused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimeFlow {
-    /// How it goes on.
+    /// Speed of the simulated time.
     pub rate: TimeRate,
-    /// True if it stands still until somebody says otherwise.
+    /// True while the simulation is paused.
     pub paused: bool,
 }
 
-/// Another way to the vehicles than their ports and lines, such as a page. It never waits.
+/// Access to the vehicles other than by ports and text lines, such as by a web page. It must never block.
 pub trait Door {
-    /// Takes what has come, and sends what is due, at `now` since the start; returns what is left to do. Called between
-    /// any two steps, and several times a second while time stands still.
+    /// Handles what has arrived and sends what is due. `now` is the time since the start. Returns what the caller must
+    /// do. Called between any two steps, and several times a second during a pause.
     fn turn(&mut self, server: &mut Server, flow: TimeFlow, now: Duration, log: &mut dyn FnMut(&str)) -> Then;
 
-    /// Takes what the vehicle at this place has sent in a step.
+    /// Takes the bytes that the vehicle with this index sent in a step.
     fn sent(&mut self, vehicle: usize, bytes: &[u8]);
 }
 
-/// No such way.
+/// A door that does nothing.
 impl Door for () {
     fn turn(&mut self, _: &mut Server, _: TimeFlow, _: Duration, _: &mut dyn FnMut(&str)) -> Then {
         Then::Nothing

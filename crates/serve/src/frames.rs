@@ -1,23 +1,23 @@
-//! Frames among the bytes that a vehicle has sent.
+//! MAVLink frames within the bytes that a vehicle has sent.
 
-/// Bytes of a MAVLink 2 frame besides its payload: header and checksum.
+/// Size of a MAVLink 2 frame without its payload \[bytes\]: header and checksum.
 const OVERHEAD: usize = 12;
-/// Bytes of a signature, and the incompatibility flag that tells of it.
+/// Size of a signature \[bytes\], and the incompatibility flag of signed frames.
 const SIGNATURE: usize = 13;
 const SIGNED: u8 = 1;
-/// Length of the header \[bytes\].
+/// Size of the header \[bytes\].
 const HEADER: usize = 10;
-/// Number of HEARTBEAT.
+/// Message id of HEARTBEAT.
 const HEARTBEAT: u32 = 0;
-/// Number of STATUSTEXT, and the longest text.
+/// Message id of STATUSTEXT, and its longest text.
 const STATUSTEXT: u32 = 253;
 const TEXT_MAX: usize = 50;
 
-/// A frame as sent.
+/// The bytes of one frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Frame<'a>(&'a [u8]);
 
-/// Returns the frames of `bytes`, which are whole frames one after the other.
+/// Splits `bytes` into frames; `bytes` must consist of complete frames.
 pub(crate) fn frames(mut bytes: &[u8]) -> impl Iterator<Item = Frame<'_>> {
     core::iter::from_fn(move || {
         let [_, payload, flags, ..] = bytes else { return None };
@@ -44,11 +44,11 @@ impl<'a> Frame<'a> {
         self.id() == HEARTBEAT
     }
 
-    /// Returns the text of a STATUSTEXT.
+    /// Returns the text if the frame is a STATUSTEXT.
     pub(crate) fn text(self) -> Option<String> {
         let end = HEADER + usize::from(*self.0.get(1)?);
         let payload = self.0.get(HEADER..end).filter(|_| self.id() == STATUSTEXT)?;
-        // Behind the severity. MAVLink 2 cuts zeros off the end of a payload.
+        // The text follows the severity byte. MAVLink 2 removes zeros at the end of a payload.
         let text = payload.get(1..)?;
         let end = text.iter().take(TEXT_MAX).take_while(|&&byte| byte != 0).count();
         Some(String::from_utf8_lossy(text.get(..end)?).into_owned())

@@ -1,10 +1,11 @@
-//! What a newcomer needs to know: how to connect.
+//! Help for newcomers: how to connect to the vehicles.
 
 use crate::ports::Addresses;
 use crate::systems::listed;
 use std::net::SocketAddr;
 
-/// Returns how to connect each client to the first of the vehicles with these system ids, whose ports are `open`.
+/// Returns how each client connects to the first vehicle. `systems` are the vehicles' system ids, `open` their UDP and
+/// TCP addresses.
 pub fn guide(addresses: &Addresses, open: &[(SocketAddr, Option<SocketAddr>)], systems: &[u8]) -> String {
     let count = systems.len();
     let what = if count > 1 { "vehicles, system ids" } else { "vehicle, system id" };

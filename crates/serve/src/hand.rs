@@ -1,29 +1,29 @@
-//! A vehicle that is turned by hand.
+//! A hand that holds and turns a vehicle.
 
 use afbc_plant::Motion;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Time in which a hand brings the vehicle to another attitude \[s\].
+/// Time for moving the vehicle to another attitude \[s\].
 const TURN_S: f64 = 1.0;
-/// Height at which it holds the vehicle, above where it stood \[m\].
+/// Height at which the hand holds the vehicle, above where it stood \[m\].
 const HEIGHT_M: f64 = 0.8;
 
-/// Where a hand holds a vehicle.
+/// State of a vehicle in a person's hand: held, or put down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Grip {
-    /// Put down where it was taken up, and left there.
+    /// Put down where the vehicle stood, and released.
     Down,
-    /// Held in the air, level but for these angles of roll and pitch \[rad\], and turned about the vertical \[rad/s\].
+    /// Held in the air at this roll and pitch, and turned about the vertical.
     Held {
-        /// Roll and pitch.
+        /// Roll and pitch \[rad\].
         level_rad: [f64; 2],
-        /// Positive to the left.
+        /// Turn rate about the vertical, positive to the left \[rad/s\].
         turn_rad_s: f64,
     },
 }
 
-/// Names of the sides that a grip may turn to the ground, with the roll and pitch that do.
+/// Names of the vehicle's sides, with the roll and pitch that turn each side down.
 pub(crate) const SIDES: [(&str, [f64; 2]); 6] = [
     ("down", [0.0, 0.0]),
     ("up", [PI, 0.0]),
@@ -36,16 +36,16 @@ pub(crate) const SIDES: [(&str, [f64; 2]); 6] = [
 /// A hand that moves a vehicle from one grip to the next.
 #[derive(Clone, Debug)]
 pub(crate) struct Hand {
-    /// Where the vehicle stood.
+    /// Motion of the vehicle when it was picked up.
     stood: Motion,
     grip: Grip,
-    /// Attitude and height when the grip changed, and when that was \[s\].
+    /// Attitude and height \[m\] when the grip changed, and the time of that change \[s\].
     from: (UnitQuaternion<f64>, f64),
     since_s: f64,
 }
 
 impl Hand {
-    /// Takes up a vehicle that stands with this motion, at `now_s`.
+    /// Picks up a vehicle that stands with this motion, at `now_s`.
     pub(crate) fn new(stood: &Motion, now_s: f64) -> Self {
         let from = (attitude(&stood.attitude_rad), stood.position_m.z);
         Hand { stood: *stood, grip: Grip::Down, from, since_s: now_s }
@@ -58,7 +58,7 @@ impl Hand {
         self.grip = grip;
     }
 
-    /// True if the vehicle has been put down.
+    /// Returns true if the vehicle has been put down.
     pub(crate) fn has_left(&self, now_s: f64) -> bool {
         self.grip == Grip::Down && now_s - self.since_s >= TURN_S
     }

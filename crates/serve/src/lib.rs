@@ -1,16 +1,16 @@
-//! The vehicle as a server: the firmware's code on the simulated plant and its instruments, for the ground stations and
-//! companion computers of other projects.
+//! Simulated vehicles as a server: the firmware's code flies a simulated plant with its instruments, and ground
+//! stations and companion computers of other projects connect to it.
 //!
 //! # Reading order
 //!
-//! 1. [`ServedVehicle`]: one vehicle in its world, which stands on the ground until somebody flies it by MAVLink. Bytes
-//!    in, bytes out, a millisecond at a time.
+//! 1. [`ServedVehicle`]: one vehicle in its world. It stands on the ground until somebody flies it by MAVLink. It takes
+//!    and returns bytes, one millisecond at a time.
 //! 2. [`Server`]: several vehicles, and [commands](command) that change weather and faults while they fly. Neither has
 //!    a clock or a socket: the same lines and bytes at the same milliseconds give the same bytes.
-//! 3. [`QgcPlan`]: a file of QGroundControl, and [`fly_plan`], a station that flies it.
-//! 4. [`Ports`]: their UDP and TCP ports. [`Door`]: another way to them, such as a page. [`Pace`]: real time. [`run`]:
-//!    all of it together. [`LineOutput`]: lines to whoever reads them, or does not.
-//! 5. [`page`]: what a page in a browser sees and may do. `web`, a feature: the server that carries it to browsers.
+//! 3. [`QgcPlan`]: a QGroundControl plan, and [`fly_plan`], a ground station that flies it.
+//! 4. [`Ports`]: the vehicles' UDP and TCP ports. [`Door`]: other access to the vehicles, such as a web page. [`Pace`]:
+//!    real time. [`run`]: all of these together. [`LineOutput`]: output lines that never block.
+//! 5. [`page`]: what a web page shows and may command. `web` (a feature): the HTTP server that brings it to browsers.
 #![forbid(unsafe_code)]
 
 pub mod command;

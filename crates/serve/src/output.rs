@@ -1,17 +1,17 @@
-//! Where a run's lines go.
+//! Output of a run's lines.
 
 use afbc_files::BackgroundWriter;
 use std::io::{self, Write};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Most bytes that wait for whoever reads them: some ten thousand lines.
+/// Most bytes that wait to be read: some ten thousand lines.
 const ROOM: usize = 1 << 20;
-/// Time that is left at the end for lines that wait.
+/// Longest wait for the last lines to be read, at the end.
 const END_MAX: Duration = Duration::from_secs(2);
 
-/// Lines for a person or a program. Whoever does not read them stops nobody: when too many wait, further ones are lost,
-/// and a line says how many.
+/// Output lines for a person or a program. A slow reader blocks nobody: when too many lines wait, further ones are
+/// dropped, and a later line gives their number.
 #[derive(Clone, Debug)]
 pub struct LineOutput {
     out: Arc<BackgroundWriter>,
@@ -19,15 +19,15 @@ pub struct LineOutput {
 }
 
 impl LineOutput {
-    /// Writes the lines to `out`.
+    /// Creates an output that writes its lines to `out`.
     ///
     /// # Errors
-    /// If the system has no thread for it.
+    /// Fails if the system cannot start a thread.
     pub fn to(out: impl Write + Send + 'static) -> io::Result<Self> {
         Ok(LineOutput { out: Arc::new(BackgroundWriter::new(out, ROOM)?), lost: 0 })
     }
 
-    /// Takes a line; never waits.
+    /// Writes a line; never blocks.
     pub fn line(&mut self, line: &str) {
         let lost = match self.lost {
             0 => String::new(),
@@ -36,14 +36,14 @@ impl LineOutput {
         self.lost = if self.out.offer(format!("{lost}{line}\n").as_bytes()) { 0 } else { self.lost + 1 };
     }
 
-    /// Waits until half of the room is free, or whoever reads is gone.
+    /// Waits until half of the buffer is free, or the reader is gone.
     pub fn wait_for_room(&self) {
         self.out.wait_for_room(ROOM / 2);
     }
 
-    /// Gives whoever reads a little time for the last lines.
+    /// Waits a short time until the last lines are read.
     pub fn finish(self) {
-        // Whoever has closed the pipe, or does not read in time, does not want them.
+        // A reader who has closed the pipe, or is too slow, does not get the last lines.
         let _ = self.out.finish(Some(END_MAX));
     }
 }

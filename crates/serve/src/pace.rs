@@ -1,45 +1,45 @@
-//! Real time, or a multiple of it.
+//! Pacing of steps to real time, or to a multiple of it.
 
 use std::time::Duration;
 
-/// Delay behind the pace from which on it is not caught up with.
+/// A delay above this is not caught up.
 pub const BEHIND_MAX: Duration = Duration::from_millis(500);
-/// Time ahead of the pace that is worth a sleep.
+/// Shortest time ahead of the pace for which sleeping is worth it.
 const AHEAD_MIN: Duration = Duration::from_micros(200);
 
-/// Tells when the next step is due. Without drift: each deadline follows from the start, not from the last step.
+/// Tells when the next step is due. Deadlines count from the start, not from the last step, so the pace does not drift.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
-    /// Time between two steps; none: as fast as possible.
+    /// Time between two steps; `None`: as fast as possible.
     period: Option<Duration>,
-    /// When it began, and steps since.
+    /// Start of counting, and steps since then.
     start: Duration,
     steps: u32,
 }
 
-/// What to do before the next step.
+/// Action before the next step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wait {
     /// Go on at once.
     Not,
-    /// Sleep for so long.
+    /// Sleep for this time.
     For(Duration),
-    /// Go on at once; so much time was lost, and is not caught up with.
+    /// Go on at once. This much time was lost and is not caught up.
     Lost(Duration),
 }
 
 impl Pace {
-    /// Begins at `now` with `speed` times real time; 0: as fast as possible.
+    /// Starts at `now` with `speed` times real time; 0: as fast as possible.
     pub fn new(speed: f64, now: Duration) -> Self {
         let period = (speed > 0.0).then(|| Duration::from_secs_f64(1e-3 / speed));
         Pace { period, start: now, steps: 0 }
     }
 
-    /// Counts a step that has ended at `now`.
+    /// Counts a step that ended at `now`.
     pub fn step(&mut self, now: Duration) -> Wait {
         let Some(period) = self.period else { return Wait::Not };
         self.steps += 1;
-        // Before the product loses precision, a thousand seconds on.
+        // Restart the count before the product loses precision, after a million steps.
         if self.steps == 1_000_000 {
             (self.start, self.steps) = (self.start + period * self.steps, 0);
         }
@@ -62,13 +62,13 @@ mod tests {
 
     const MS: Duration = Duration::from_millis(1);
 
-    /// However long each step and sleep take, after n steps it is n periods later, as long as it keeps up.
+    /// After n steps, n periods have passed, however long the single steps and sleeps take.
     #[test]
     fn the_pace_does_not_drift() {
         for speed in [1.0, 5.0, 0.3, 3.0] {
             let (mut now, mut pace) = (Duration::ZERO, Pace::new(speed, Duration::ZERO));
             for step in 1..=2_500_000_u32 {
-                // Work and sleeps of changing lengths, the latter never exact.
+                // Steps of varying length, and sleeps that are never exact.
                 now += Duration::from_nanos(u64::from(step % 97) * 1000);
                 if let Wait::For(ahead) = pace.step(now) {
                     now += ahead + Duration::from_nanos(u64::from(step % 13) * 9000);
@@ -84,7 +84,7 @@ mod tests {
     fn what_is_lost_is_reported_and_not_caught_up_with() {
         let mut pace = Pace::new(1.0, Duration::ZERO);
         assert_eq!(pace.step(MS / 2), Wait::For(MS / 2));
-        // A little is caught up with.
+        // A short delay is caught up.
         assert_eq!(pace.step(100 * MS), Wait::Not);
         // A suspended machine.
         assert_eq!(pace.step(3_600_003 * MS), Wait::Lost(3_600_000 * MS));

@@ -1,4 +1,4 @@
-//! The parameters of a vehicle in a file, by the firmware's code.
+//! A vehicle's parameters in a file, stored by the firmware's code.
 
 use afbc_files::{Flash, FlashError, FlashFailure};
 use afbc_hil::Host;
@@ -11,17 +11,17 @@ use afbc_types::OutOfRange;
 use std::io::ErrorKind;
 use std::path::Path;
 
-/// Vehicle of a scenario without a vehicle file.
+/// Vehicle name for a scenario without a vehicle file.
 const PAPER: &str = "paper";
 
-/// A store of parameters in a file, which is written in the background: no tick waits for a disk.
+/// A parameter store in a file. The file is written in the background, so that no tick waits for the disk.
 pub struct ParameterFile(Store<Flash>, FlashFailure);
 
 impl ParameterFile {
-    /// Opens the file at `path` for the vehicle of `scenario`, or makes it.
+    /// Opens or creates the file at `path` for the vehicle of `scenario`.
     ///
     /// # Errors
-    /// One line that names the file.
+    /// Fails with one line that names the file.
     pub fn open(path: &Path, scenario: &Scenario) -> Result<Self, String> {
         let name = scenario.vehicle_file.as_ref().map_or(PAPER, |vehicle| &vehicle.name);
         let flash = Flash::open(path).map_err(|error| match error.kind() {
@@ -33,32 +33,32 @@ impl ParameterFile {
         Ok(ParameterFile(store.map_err(|error| format!("{}: {error}", path.display()))?, failure))
     }
 
-    /// Powers up the firmware of `scenario`'s vehicle with these parameters, by default these of the link; calls
-    /// `notice` with a line on each that is not used.
+    /// Powers up the firmware of `scenario`'s vehicle with the stored parameters. Link parameters that are not stored
+    /// have the values of `link`. Calls `notice` with one line per stored parameter that is not used.
     pub(crate) fn power_up(
         &mut self,
         scenario: &Scenario,
         link: Link,
         mut notice: impl FnMut(&str),
     ) -> Result<Host, OutOfRange> {
-        // As on the board: erased at the start.
+        // Erase at the start, as the board does.
         if let Err(error) = self.0.make_room() {
             notice(error.reason());
         }
         Host::stored(scenario.vehicle_file.as_ref(), link, &mut self.0, &mut notice)
     }
 
-    /// Returns why something that was written has not got to the disk, once.
+    /// Returns why writing to the disk failed; a failure is returned once.
     pub(crate) fn take_failure(&self) -> Option<Error<FlashError>> {
         self.1.take().map(Error::Flash)
     }
 
-    /// Writes a change.
+    /// Stores a change of a parameter.
     pub(crate) fn keep(&mut self, change: RecordChange) -> Result<(), Error<FlashError>> {
         self.write(|store| Kept::NOW.keep(store, change))
     }
 
-    /// Writes a part of the key of signatures.
+    /// Stores a part of the signing key.
     pub(crate) fn keep_signing(&mut self, record: SigningRecord) -> Result<(), Error<FlashError>> {
         self.write(|store| store.set(record.name, 0, record.bits))
     }
@@ -68,7 +68,7 @@ impl ParameterFile {
         write: impl Fn(&mut Store<Flash>) -> Result<(), Error<FlashError>>,
     ) -> Result<(), Error<FlashError>> {
         match write(&mut self.0) {
-            // Nothing stands still meanwhile, as it would on the board.
+            // Erase at once; the board would have to wait until it may stand still.
             Err(Error::NeedsErase) => {
                 self.0.make_room()?;
                 write(&mut self.0)

@@ -1,26 +1,26 @@
-//! What happens to the peers of a vehicle.
+//! Events of a vehicle's peers: the clients on its ports.
 
 use std::net::SocketAddr;
 
-/// First byte of a frame of MAVLink 2, and of MAVLink 1, which old stations begin with.
+/// First byte of a MAVLink 2 frame, and of a MAVLink 1 frame, which old stations send first.
 const STARTS: [u8; 2] = [0xFD, 0xFE];
 
-/// What has happened to a peer.
+/// An event of a peer.
 pub(crate) enum Event<'a> {
-    /// It is new.
+    /// A new peer.
     New(SocketAddr),
-    /// The one of this number has sent this. The answer is whether that contains a frame that the vehicle takes.
+    /// The peer with this number has sent these bytes. The handler returns whether they complete a valid frame.
     Sent(u32, &'a [u8]),
-    /// What the one of this number has sent came to nothing.
+    /// The sender with this number has sent nothing valid, and does not become a peer.
     Nobody(u32),
-    /// It has begun with another protocol, and is let go.
+    /// A peer began with another protocol and is disconnected.
     Foreign(SocketAddr),
-    /// It is gone: its stream has ended, it has been silent for too long, or others have taken its place.
+    /// The peer is gone: its stream has ended, it was silent for too long, or a new peer has taken its place.
     Gone(SocketAddr, u32),
 }
 
-/// True if what a peer sends first may be MAVLink. A browser that is made to send frames sends the head of a request
-/// before them.
+/// Returns true if the first bytes of a peer may be MAVLink. A browser that is tricked into sending frames sends an
+/// HTTP header first.
 pub(crate) fn speaks_mavlink(first: &[u8]) -> bool {
     first.first().is_some_and(|byte| STARTS.contains(byte))
 }

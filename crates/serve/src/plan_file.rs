@@ -1,24 +1,24 @@
-//! Plans of QGroundControl: `.plan` files, with mission, geofence and rally points.
+//! Reads QGroundControl plans: `.plan` files with a mission, a geofence and rally points.
 //!
-//! Nothing in a file is left out in silence: a version or a name that is not known here is refused. What describes a
-//! plan, and flies nothing, is known by name.
+//! Nothing in a file is ignored silently: unknown versions and names are refused. Known names include those that only
+//! describe the plan.
 
 use crate::waypoint_file;
 use afbc_files::read::FileError;
 use afbc_link::{MissionItem, Place};
 use serde_json::Value;
 
-/// MAV_FRAME_GLOBAL and MAV_FRAME_LOCAL_NED.
+/// MAVLink frames MAV_FRAME_GLOBAL and MAV_FRAME_LOCAL_NED.
 const GLOBAL: u8 = 0;
 const LOCAL_NED: u8 = 1;
-/// MAV_CMD_DO_JUMP, whose first parameter is not a number of an item in these files, but its `doJumpId`.
+/// MAV_CMD_DO_JUMP. In these files its first parameter is the target's `doJumpId`, not an item number.
 const JUMP: u16 = 177;
-/// Commands of the geofence, of inclusion; those of exclusion follow each.
+/// Inclusion commands of the geofence; the exclusion command is each number plus 1.
 const VERTEX: u16 = 5001;
 const CIRCLE: u16 = 5003;
 const RALLY_POINT: u16 = 5100;
 
-/// Names in each part of a file, those that describe it among them.
+/// Known names in each part of a file.
 const PLAN: &[&str] = &["fileType", "version", "groundStation", "mission", "geoFence", "rallyPoints"];
 const MISSION: &[&str] = &[
     "version",
@@ -48,7 +48,7 @@ const CIRCLE_AREA: &[&str] = &["version", "inclusion", "circle"];
 const CIRCLE_SHAPE: &[&str] = &["center", "radius"];
 const RALLY: &[&str] = &["version", "points"];
 
-/// A plan.
+/// A plan: mission, geofence and rally points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct QgcPlan {
     /// Items of the mission.
@@ -57,11 +57,11 @@ pub struct QgcPlan {
     pub fence: Vec<MissionItem>,
     /// Rally points.
     pub rally: Vec<MissionItem>,
-    /// Where it begins: latitude, longitude \[deg\], and the altitude above the sea, if it is known \[m\].
+    /// Planned home: latitude and longitude \[deg\], and the altitude above the sea \[m\] if known.
     pub home: Option<([f64; 2], Option<f64>)>,
 }
 
-/// A part of the file, and where it is.
+/// A part of the file, with its place for error messages.
 struct Part<'a> {
     file: &'a str,
     place: String,
@@ -82,7 +82,7 @@ impl<'a> Part<'a> {
         self.at(key).ok_or_else(|| self.wrong(&format!("{key} is missing; save the plan again in QGroundControl")))
     }
 
-    /// Checks that it has this version, and nothing but these names.
+    /// Checks the part's version, and that it has no unknown names.
     fn known(&self, version: Option<u64>, names: &[&str]) -> Result<(), FileError> {
         let object = self.value.as_object().ok_or_else(|| self.wrong("it must be an object"))?;
         if let Some(known) = version {
@@ -117,7 +117,7 @@ impl<'a> Part<'a> {
         self.value.as_bool().ok_or_else(|| self.wrong("it must be true or false"))
     }
 
-    /// Returns latitude and longitude \[deg\], and what follows them.
+    /// Returns latitude and longitude \[deg\], and the altitude if there is one.
     fn coordinates(&self) -> Result<([f64; 2], Option<f64>), FileError> {
         let list = self.list()?;
         let [latitude, longitude, rest @ ..] = list.as_slice() else {
@@ -137,7 +137,7 @@ impl<'a> Part<'a> {
         Ok((place, altitude))
     }
 
-    /// Returns latitude and longitude \[deg\], which nothing follows.
+    /// Returns latitude and longitude \[deg\]; refuses an altitude.
     fn flat(&self) -> Result<[f64; 2], FileError> {
         match self.coordinates()? {
             (place, None) => Ok(place),
@@ -147,10 +147,10 @@ impl<'a> Part<'a> {
 }
 
 impl QgcPlan {
-    /// Reads a plan from the `text` of `file`.
+    /// Reads a plan from the `text` of `file`: a QGroundControl plan or a waypoint file.
     ///
     /// # Errors
-    /// One line that names the file, the item, what is wrong and what helps.
+    /// Fails with one line that names the file, the item, the problem and the remedy.
     pub fn read(file: &str, text: &str) -> Result<Self, FileError> {
         if waypoint_file::is_waypoint_file(text.as_bytes()) {
             let (mission, home) = waypoint_file::read(file, text)?;
@@ -174,7 +174,7 @@ impl QgcPlan {
     }
 }
 
-/// Returns the items of the mission, those of complex ones as they were worked out.
+/// Returns the items of the mission. Complex items are replaced by the simple items that QGroundControl computed.
 fn read_mission(mission: &Part<'_>) -> Result<Vec<MissionItem>, FileError> {
     mission.known(Some(2), MISSION)?;
     let items = Part { place: "mission item".into(), ..mission.get("items")? };
@@ -219,7 +219,7 @@ fn simple_item(item: &Part<'_>, number: u16, names: &[Option<u64>]) -> Result<Mi
         *target = place as f32;
     }
     let units = if frame == LOCAL_NED { 1e4 } else { 1e7 };
-    // What is out of range remains so; one that is left out is no place at 0.
+    // Values out of range stay out of range. A missing coordinate must not become a place at 0.
     let in_units = |coordinate: f64| match coordinate {
         left_out if left_out.is_nan() => Place::AS_IT_IS,
         coordinate => (coordinate * units).clamp(-2e9, 2e9).round() as i32,
@@ -273,7 +273,7 @@ fn read_rally(rally: &Part<'_>) -> Result<Vec<MissionItem>, FileError> {
     let points = points.list()?;
     let items = points.iter().map(|part| {
         let (place, height) = part.coordinates()?;
-        // Heights are above home.
+        // MAV_FRAME_GLOBAL_RELATIVE_ALT: heights of rally points are above home.
         Ok(MissionItem { z: height.unwrap_or(0.0) as f32, frame: 3, ..point(RALLY_POINT, 0.0, place) })
     });
     Ok(numbered(items.collect::<Result<_, _>>()?))

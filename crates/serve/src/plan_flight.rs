@@ -1,4 +1,4 @@
-//! A plan flown by a served vehicle, in lockstep: uploaded, started and watched by messages, as a station does.
+//! Flies a plan with a served vehicle in lockstep: uploads, starts and watches it by MAVLink, as a ground station does.
 
 use crate::plan_file::QgcPlan;
 use crate::vehicle::ServedVehicle;
@@ -7,42 +7,42 @@ use afbc_guidance::FlightMode;
 use afbc_link::{Answer, Command, Downlink, Mission, MissionItem, Plan};
 use afbc_station::services::modes::custom;
 
-/// Number of its peer.
+/// Peer number of the station.
 const PEER: u32 = 0;
-/// Time within which the vehicle is ready, and in which a text follows a refusal \[ms\].
+/// Longest wait until the vehicle is ready to arm, and wait for the text that explains a refusal \[ms\].
 const READY_MS: u64 = 60_000;
 const TEXT_MS: u64 = 100;
-/// Time between heartbeats, and between two attempts to arm \[ms\].
+/// Heartbeat period, and time between two arming checks \[ms\].
 const HEARTBEAT_MS: u64 = 1_000;
-/// Time in hold after which a mission that is not complete has been stopped: MISSION_CURRENT comes every second \[ms\].
+/// Time in hold after which an incomplete mission counts as stopped \[ms\]. MISSION_CURRENT comes every second.
 const STOPPED_MS: u64 = 2_500;
-/// Time in which a vehicle whose motors have stopped in the air comes to the ground \[ms\].
+/// Longest fall of a vehicle whose motors have stopped in the air \[ms\].
 const FALL_MS: u64 = 60_000;
-/// Speed at which a vehicle that comes to the ground has fallen, twice that of the fastest descent, and the tilt of one
-/// that lies there \[m/s, rad\].
+/// Touchdown speed above which the vehicle counts as fallen, twice the fastest descent \[m/s\], and tilt above which it
+/// counts as lying on the ground \[rad\].
 const FALLS_M_S: f64 = 3.0;
 const LIES_RAD: f64 = 1.0;
-/// `MISSION_STATE`: complete.
+/// `MISSION_STATE` value for a completed mission.
 const COMPLETE: u8 = 5;
 
-/// How a plan has ended.
+/// Result of a flown plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanEnd {
-    /// Items that were reached.
+    /// Numbers of the items that were reached.
     pub reached: Vec<u16>,
-    /// True if the mission is complete.
+    /// True if the mission was completed.
     pub complete: bool,
-    /// True if the vehicle has left the mission for hold before that, where it stays.
+    /// True if the vehicle left the mission for hold before it was complete.
     pub stopped: bool,
     /// True if the motors have stopped.
     pub disarmed: bool,
-    /// True if it has come to the ground faster than it lands, or lies there.
+    /// True if the vehicle hit the ground faster than it lands, or lies on the ground.
     pub fell: bool,
     /// Duration of the flight \[s\].
     pub flight_s: f64,
 }
 
-/// A station and what it has heard.
+/// A ground station, and what it has observed.
 struct Station<'a> {
     vehicle: &'a mut ServedVehicle,
     log: &'a mut dyn FnMut(&str),
@@ -50,18 +50,19 @@ struct Station<'a> {
     now_ms: u64,
     reached: Vec<u16>,
     complete: bool,
-    /// Since when it has been in hold \[ms\].
+    /// Start of the current time in hold \[ms\]; `None` in other modes.
     hold_ms: Option<u64>,
-    /// Its speed downwards in the last step, and the largest at which it has come to the ground \[m/s\].
+    /// Sink rate in the last step, and largest sink rate at a touchdown \[m/s\].
     sinks_m_s: f64,
     struck_m_s: f64,
     on_ground: bool,
 }
 
-/// Flies `plan` with a vehicle that stands at its start, for at most `limit_s`; what is worth a line goes to `log`.
+/// Flies `plan` with a vehicle that stands at its start, for at most `limit_s`. Passes lines about the progress to
+/// `log`.
 ///
 /// # Errors
-/// A line on what the vehicle refuses.
+/// Fails with one line if the vehicle refuses the plan or a command.
 pub fn fly_plan(
     vehicle: &mut ServedVehicle,
     plan: &QgcPlan,
@@ -91,7 +92,7 @@ impl Station<'_> {
             return Err("the mission has no items; add some".into());
         }
         self.get_ready()?;
-        // The mission is checked against the fence.
+        // The fence comes first: the vehicle checks the mission against it.
         self.upload(&plan.fence, Plan::FENCE, "geoFence")?;
         self.upload(&plan.rally, Plan::RALLY, "rallyPoints")?;
         self.upload(&plan.mission, Plan::MISSION, "mission")?;
@@ -103,7 +104,7 @@ impl Station<'_> {
             self.step();
         }
         let flight_s = (self.now_ms - begun_ms) as f64 * 1e-3;
-        // Motors that were stopped in the air: how it ends is seen on the ground.
+        // If the motors stopped in the air, wait for the impact.
         let fallen_ms = self.now_ms + FALL_MS;
         while !self.armed() && !self.on_ground && self.now_ms < fallen_ms {
             self.step();
@@ -124,17 +125,17 @@ impl Station<'_> {
         self.client.vehicle().armed
     }
 
-    /// True if the vehicle has left the mission for hold, and does not say that it is complete.
+    /// Returns true if the vehicle has changed from the mission to hold without completing it.
     fn is_stopped(&self) -> bool {
         self.hold_ms.is_some_and(|hold_ms| self.now_ms - hold_ms > STOPPED_MS)
     }
 
-    /// Returns the texts that have come since this was last called.
+    /// Returns the texts since the last call.
     fn take_texts(&mut self) -> Vec<String> {
         self.client.take_texts().into_iter().map(|text| text.text).collect()
     }
 
-    /// Waits until the vehicle would arm.
+    /// Waits until the vehicle is ready to arm.
     fn get_ready(&mut self) -> Result<(), String> {
         let mut texts = Vec::new();
         while self.now_ms < READY_MS {
@@ -174,7 +175,7 @@ impl Station<'_> {
         }
         match self.client.answer(command) {
             Some(Answer::Accepted) => {
-                // Until its heartbeat says so.
+                // Wait until the heartbeat shows the new state.
                 self.wait(HEARTBEAT_MS);
                 Ok(())
             }

@@ -8,26 +8,26 @@ use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::time::Duration;
 
-/// Distance between the TCP ports of two vehicles, as ArduPilot's.
+/// Difference between the TCP ports of consecutive vehicles, as in ArduPilot.
 const TCP_STEP: u16 = 10;
 
-/// Where vehicles are found. Ports are those of the first vehicle.
+/// Addresses of the vehicles and their clients. Ports are those of the first vehicle.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Addresses {
-    /// Address of this machine that the ports belong to.
+    /// Local address on which the ports are opened.
     pub bind: IpAddr,
-    /// UDP port of the vehicle, counted up; 0: any free one.
+    /// UDP port of the first vehicle; each further vehicle has the next port. 0: any free port.
     pub udp: u16,
-    /// Where stations listen, the same for all vehicles.
+    /// Addresses of ground stations, the same for all vehicles.
     pub stations: Vec<SocketAddr>,
-    /// Where companion computers listen, ports counted up.
+    /// Addresses of companion computers; each further vehicle uses the next port.
     pub companions: Vec<SocketAddr>,
-    /// TCP port of the vehicle, if any, counted up by 10; 0: any free one.
+    /// TCP port of the first vehicle, if any; each further vehicle is 10 higher. 0: any free port.
     pub tcp: Option<u16>,
 }
 
 impl Default for Addresses {
-    /// Loopback, at the ports of PX4's simulation.
+    /// Returns loopback addresses with the ports of PX4's simulation.
     fn default() -> Self {
         let loopback = IpAddr::V4(Ipv4Addr::LOCALHOST);
         Addresses {
@@ -40,18 +40,18 @@ impl Default for Addresses {
     }
 }
 
-/// The ports of all vehicles.
+/// Open ports of all vehicles.
 pub struct Ports {
     vehicles: Vec<(Udp, Option<Tcp>)>,
-    /// Number of the next peer.
+    /// Number of the last peer.
     next: u32,
 }
 
 impl Ports {
-    /// Opens the ports of so many vehicles.
+    /// Opens the ports for this number of vehicles.
     ///
     /// # Errors
-    /// One line that names the port and the cure.
+    /// Fails with one line that names the port and the remedy.
     pub fn open(addresses: &Addresses, vehicles: usize) -> Result<Self, String> {
         let Addresses { bind, stations, companions, .. } = addresses;
         let open = |place: usize| {
@@ -74,16 +74,16 @@ impl Ports {
         Ok(Ports { vehicles: (0..vehicles).map(open).collect::<Result<_, String>>()?, next: 0 })
     }
 
-    /// Returns the UDP address of each vehicle, and the TCP address if it has one.
+    /// Returns each vehicle's UDP address, and its TCP address if it has one.
     ///
     /// # Errors
-    /// The system's; none in fact.
+    /// Fails if the system does not know a socket's address; this does not happen in practice.
     pub fn addresses(&self) -> io::Result<Vec<(SocketAddr, Option<SocketAddr>)>> {
         let of = |(udp, tcp): &(Udp, Option<Tcp>)| Ok((udp.address()?, tcp.as_ref().map(Tcp::address).transpose()?));
         self.vehicles.iter().map(of).collect()
     }
 
-    /// Hands to `server` what has arrived by `now`, and logs peers that come and go.
+    /// Passes the bytes that have arrived by `now` to `server`, and logs new and lost peers.
     pub fn receive(&mut self, server: &mut Server, now: Duration, mut log: impl FnMut(&str)) {
         let Ports { vehicles, next } = self;
         let mut number = || {
@@ -121,7 +121,7 @@ impl Ports {
         }
     }
 
-    /// Sends `bytes` of the vehicle at this place to all its peers.
+    /// Sends `bytes` of the vehicle with this index to all its peers.
     pub fn send(&mut self, vehicle: usize, bytes: &[u8]) {
         if let Some((udp, tcp)) = self.vehicles.get_mut(vehicle) {
             udp.send(bytes);
@@ -130,7 +130,7 @@ impl Ports {
     }
 }
 
-/// Returns the port of the vehicle at this place; any free one stays so.
+/// Returns the port of the vehicle with this index; 0 (any free port) stays 0.
 fn counted(first: u16, place: usize, step: u16) -> Result<u16, String> {
     let port = u16::try_from(place).ok().and_then(|place| place.checked_mul(step)?.checked_add(first));
     match port {
@@ -140,7 +140,7 @@ fn counted(first: u16, place: usize, step: u16) -> Result<u16, String> {
     }
 }
 
-/// Tells why a port cannot be opened.
+/// Returns why a port cannot be opened.
 fn taken(protocol: &str, address: IpAddr, port: u16, option: &str, error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::AddrInUse => format!(

@@ -1,5 +1,5 @@
-//! What a vehicle's shell reports to its services beside the control tick: receiver, battery, further sensors, and
-//! where on the earth it is.
+//! Sensor data that a vehicle's services get outside the control tick: GNSS receiver, battery, barometer and
+//! magnetometer state, and the local frame's place on the earth.
 
 use afbc_estimator::Measurement;
 use afbc_link::telemetry::BatteryStatus;
@@ -14,14 +14,14 @@ use afbc_station::services::status::{GnssReceiver, SensorBits};
 
 /// Silence after which a sensor counts as failed \[ms\].
 const SILENT_MS: u32 = 1000;
-/// Satellites of a simulated receiver.
+/// Number of satellites that the simulated receiver reports.
 const SATELLITES: u8 = 14;
 
 /// Watches the sensors of one vehicle.
 pub(crate) struct ReportedSensors {
     suite: InstrumentSuite,
     origin: Option<EarthOrigin>,
-    /// Time since the last reading of receiver, barometer and magnetometer \[ms\].
+    /// Time since the last reading of GNSS receiver, barometer and magnetometer \[ms\].
     silent_ms: [u32; 3],
     sigma_mm: [u32; 2],
 }
@@ -29,23 +29,23 @@ pub(crate) struct ReportedSensors {
 impl ReportedSensors {
     pub(crate) fn new(scenario: &Scenario) -> Self {
         let suite = scenario.instruments;
-        // Indoors nobody knows where on the earth the frame is.
+        // Without a GNSS receiver, the frame's place on the earth is unknown.
         let origin = suite.gnss.and_then(|_| EarthOrigin::new(EarthOrigin::SIMULATED));
-        // A sensor counts as failed until it has been heard.
+        // A sensor counts as failed until its first reading.
         ReportedSensors { suite, origin, silent_ms: [SILENT_MS; 3], sigma_mm: [0; 2] }
     }
 
-    /// Returns where the local frame's origin is on the earth, if that is known.
+    /// Returns the place of the local frame's origin on the earth, if known.
     pub(crate) fn origin(&self) -> Option<EarthOrigin> {
         self.origin
     }
 
-    /// Puts the local frame's origin elsewhere, where the vehicle knows where on the earth it is.
+    /// Moves the local frame's origin, if its place on the earth is known.
     pub(crate) fn move_origin(&mut self, origin: EarthOrigin) {
         self.origin = self.origin.map(|_| origin);
     }
 
-    /// Returns what is known after these readings.
+    /// Returns the state of the sensors after these readings.
     pub(crate) fn look(&mut self, world: &World, readings: &Readings) -> AuxSensors {
         for silent_ms in &mut self.silent_ms {
             *silent_ms = silent_ms.saturating_add(1);

@@ -1,4 +1,4 @@
-//! Vehicles, ports, time and lines together.
+//! Runs the server: vehicles, ports, time and text lines together.
 
 use crate::door::{Door, TimeFlow, TimeRate};
 use crate::pace::{Pace, Wait};
@@ -10,41 +10,41 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, sync_channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Why a run has ended.
+/// Reason why a run has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunEnd {
-    /// Somebody has said so.
+    /// Somebody has sent `quit`.
     Quit,
     /// The stop flag was set.
     Stopped,
-    /// There are no more lines, without which time does not go on.
+    /// In lockstep, the input has ended, so time cannot advance any more.
     Silent,
 }
 
-/// Lines from somebody, as they come.
+/// Text lines from an input, read in the background.
 pub struct Lines {
     lines: Receiver<String>,
     over: bool,
 }
 
-/// Longest wait for a line between two looks at the stop flag.
+/// Longest wait for a line before the stop flag is checked again.
 const NAP: Duration = Duration::from_millis(50);
-/// Most lines that wait, and most that are carried out before time goes on.
+/// Most lines that are queued, and most that are carried out between two steps.
 const LINES_MAX: usize = 16;
-/// Least time between two lines about lost time.
+/// Least time between two reports of lost time.
 const REPORTED_EVERY: Duration = Duration::from_secs(5);
 
 impl Lines {
-    /// Reads lines in a thread of their own.
+    /// Reads lines of `source` in a separate thread.
     pub fn of(source: impl BufRead + Send + 'static) -> Self {
         Self::paced(source, || ())
     }
 
-    /// The same, and calls `wait` before each line.
+    /// Reads lines of `source` in a separate thread, which calls `wait` before it passes on each line.
     pub fn paced(mut source: impl BufRead + Send + 'static, wait: impl Fn() + Send + 'static) -> Self {
         let (sender, lines) = sync_channel(LINES_MAX);
         thread::spawn(move || {
-            // What is not text is a line as well, which is refused.
+            // Invalid UTF-8 is passed on, too, and refused later.
             while let Ok(Some(line)) = read_line(&mut source) {
                 wait();
                 if sender.send(String::from_utf8_lossy(&line).into_owned()).is_err() {
@@ -62,10 +62,10 @@ impl Lines {
         line.ok()
     }
 
-    /// Waits a little for the next line.
+    /// Waits a short time for the next line.
     fn wait(&mut self) -> Option<String> {
         if self.over {
-            // Nobody sends any more, so that waiting would return at once and the loop spin.
+            // After the end of the input, waiting would return at once and the loop would spin.
             thread::sleep(NAP);
             return None;
         }
@@ -75,9 +75,10 @@ impl Lines {
     }
 }
 
-/// Returns the next line, or of one that is too long the beginning, which is refused; none at the end.
+/// Returns the next line; `None` at the end. Of a line that is too long it returns the beginning, which is then
+/// refused.
 fn read_line(source: &mut impl BufRead) -> io::Result<Option<Vec<u8>>> {
-    // One byte too many, and the end of the line.
+    // One byte more than allowed, and the line ending.
     let most = LINE_MAX as u64 + 3;
     let mut line = Vec::new();
     if source.take(most).read_until(b'\n', &mut line)? == 0 {
@@ -95,7 +96,7 @@ fn read_line(source: &mut impl BufRead) -> io::Result<Option<Vec<u8>>> {
     Ok(Some(line))
 }
 
-/// Runs `server` until somebody says `quit` or `stop` is set; passes answers and events to `log`, a line each.
+/// Runs `server` until somebody sends `quit` or `stop` is set. Passes answers and events to `log`, one line each.
 pub fn run(
     server: &mut Server,
     (ports, door): (&mut Ports, &mut dyn Door),
@@ -109,7 +110,7 @@ pub fn run(
         RunningTime { flow: TimeFlow { rate, paused: false }, pace: Pace::new(factor(rate), Duration::ZERO) };
     let mut reported = None;
     loop {
-        // Lines first: where time stands still there is nothing else to do.
+        // Handle lines first: during a pause there is nothing else to do.
         for _ in 0..LINES_MAX {
             let stands = time.stands();
             let line = if stands { lines.wait() } else { lines.next() };
@@ -173,19 +174,19 @@ pub fn run(
     }
 }
 
-/// Time as it goes on in a run.
+/// Speed of the simulated time, and its pace.
 struct RunningTime {
     flow: TimeFlow,
     pace: Pace,
 }
 
 impl RunningTime {
-    /// True if it goes on by nothing but what somebody says.
+    /// Returns true if time does not advance by itself.
     fn stands(&self) -> bool {
         self.flow.paused || self.flow.rate == TimeRate::Lockstep
     }
 
-    /// Goes on otherwise, from `now` on.
+    /// Changes speed or pause from `now` on.
     fn change(&mut self, then: Then, now: Duration) {
         match then {
             Then::Nothing | Then::Step(_) | Then::Quit => return,
@@ -193,12 +194,12 @@ impl RunningTime {
             Then::Speed(_) => return,
             Then::Pause(stands) => self.flow.paused = stands,
         }
-        // From now on: what passed while time stood still is not caught up with.
+        // Restart the pace: time that passed during a pause is not caught up.
         self.pace = Pace::new(factor(self.flow.rate), now);
     }
 }
 
-/// Runs a millisecond.
+/// Runs one millisecond.
 fn step(
     server: &mut Server,
     ports: &mut Ports,

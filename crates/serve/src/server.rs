@@ -1,4 +1,4 @@
-//! Several vehicles, and commands for them.
+//! Several vehicles on a common clock, and text commands for them.
 
 use crate::ParameterFile;
 use crate::command::{COMMANDS, Line, ServerCommand, WorldChange, parse};
@@ -8,78 +8,78 @@ use afbc_hil::{LogFile, UlogFiles};
 use afbc_scenario::Scenario;
 use afbc_types::OutOfRange;
 
-/// Longest line \[bytes\], and most lines to come.
+/// Longest line \[bytes\], and most lines that wait for their time.
 pub(crate) const LINE_MAX: usize = 512;
 const AGENDA_MAX: usize = 1000;
 
-/// The vehicles, on one clock, which begins when they are powered up.
+/// Several vehicles on one clock, which starts at their power-up.
 pub struct Server {
     vehicles: Vec<ServedVehicle>,
     /// Milliseconds since the start.
     now_ms: u64,
-    /// Lines to come, in the order of their times, then of their arrival.
+    /// Lines that wait for their time, sorted by time, then by arrival.
     agenda: Vec<(u64, Line, String)>,
 }
 
 /// Answer to a line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reply {
-    /// Lines; the last one begins with `ok` or `error`. None for an empty line.
+    /// Lines of the answer; the last one begins with `ok` or `error`. Empty for an empty line.
     pub lines: Vec<String>,
-    /// What is left to do by whoever runs the server.
+    /// Action that the server's caller must carry out.
     pub then: Then,
 }
 
-/// What is left to do by whoever runs the server.
+/// Action that the server's caller must carry out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Then {
     /// Nothing.
     #[default]
     Nothing,
-    /// So many steps, and then the answer.
+    /// Run this many steps, then send the answer.
     Step(u32),
-    /// To run at this speed.
+    /// Run at this multiple of real time.
     Speed(f64),
-    /// To let time stand still, or go on.
+    /// Pause (true) or resume (false).
     Pause(bool),
-    /// To end.
+    /// End the run.
     Quit,
 }
 
 impl Server {
-    /// Powers up a vehicle for each of `scenarios`, with system ids counted up from `first`, unless parameters say
-    /// others.
+    /// Powers up a vehicle for each scenario. System ids count up from `first`, unless a vehicle's parameters set
+    /// another.
     ///
     /// # Errors
-    /// The first setting out of range.
+    /// Fails with the first setting out of range.
     pub fn new(scenarios: &[Scenario], first: u8) -> Result<Self, OutOfRange> {
         let vehicles =
             scenarios.iter().zip(first..).map(|(scenario, system)| ServedVehicle::new(scenario, system, None));
         Ok(Server { vehicles: vehicles.collect::<Result<_, _>>()?, now_ms: 0, agenda: Vec::new() })
     }
 
-    /// As [`new`](Self::new), with a store for the parameters of each vehicle.
+    /// As [`new`](Self::new), with a store for each vehicle's parameters.
     ///
     /// # Errors
-    /// The first setting out of range.
+    /// Fails with the first setting out of range.
     pub fn kept(scenarios: &[Scenario], first: u8, keepers: Vec<ParameterFile>) -> Result<Self, OutOfRange> {
         let vehicles = scenarios.iter().zip(first..).zip(keepers);
         let vehicles = vehicles.map(|((scenario, system), keeper)| ServedVehicle::new(scenario, system, Some(keeper)));
         Ok(Server { vehicles: vehicles.collect::<Result<_, _>>()?, now_ms: 0, agenda: Vec::new() })
     }
 
-    /// Keeps the exact log of each vehicle in one of `files`, in order, from now on, before the first step. No step
-    /// waits for a disk.
+    /// Records each vehicle's exact log to one of `files`, in order. Call this before the first step. No step waits for
+    /// the disk.
     pub fn record(&mut self, files: Vec<LogFile>) {
         self.vehicles.iter_mut().zip(files).for_each(|(vehicle, file)| vehicle.record(file.live()));
     }
 
-    /// Keeps the black box of each vehicle in one of `logs`, likewise.
+    /// Records each vehicle's black box to one of `logs`, in order. Call this before the first step.
     pub fn log(&mut self, logs: Vec<UlogFiles>) {
         self.vehicles.iter_mut().zip(logs).for_each(|(vehicle, files)| vehicle.log(files.live()));
     }
 
-    /// Ends the black boxes; returns a line on each that has ended early and was not reported.
+    /// Closes the black boxes; returns one line for each that ended early, unless that was already reported.
     pub fn end_logs(&mut self) -> Vec<String> {
         self.vehicles.iter_mut().filter_map(ServedVehicle::close_log).collect()
     }
@@ -94,7 +94,7 @@ impl Server {
         self.vehicles.iter().map(ServedVehicle::system).collect()
     }
 
-    /// Returns a system id that several vehicles have: no station can distinguish them.
+    /// Returns a system id that several vehicles share; stations cannot tell these vehicles apart.
     pub fn ambiguous(&self) -> Option<u8> {
         let mut systems = self.systems();
         systems.sort_unstable();
@@ -106,24 +106,24 @@ impl Server {
         &self.vehicles
     }
 
-    /// Sets whether those that connect from now on count as holding the vehicles: they may set the key of signatures.
+    /// Sets whether peers that connect from now on count as wired to the vehicles: they may set the signing key.
     pub fn set_wired(&mut self, wired: bool) {
         self.vehicles.iter_mut().for_each(|vehicle| vehicle.set_wired(wired));
     }
 
-    /// Receives, for the next step, what `peer` of the vehicle at this place has sent; returns whether that completes a
-    /// frame that counts ([`ServedVehicle::hear`]).
+    /// Queues bytes of `peer` for the vehicle with this index, for the next step. Returns whether they complete a valid
+    /// frame; see [`ServedVehicle::hear`].
     pub fn hear(&mut self, vehicle: usize, peer: u32, bytes: &[u8]) -> bool {
         self.vehicles.get_mut(vehicle).is_some_and(|it| it.hear(peer, bytes))
     }
 
-    /// Forgets what is left of a peer that is gone.
+    /// Forgets an unfinished frame of a peer that is gone.
     pub fn forget(&mut self, vehicle: usize, peer: u32) {
         self.vehicles.get_mut(vehicle).into_iter().for_each(|it| it.forget(peer));
     }
 
-    /// Runs a millisecond. Passes to `send` what each vehicle has sent, whole frames, by its place, and to `log` what
-    /// is worth a line, one each.
+    /// Runs one millisecond. Passes to `send` the index of each vehicle and the complete frames that it has sent, and
+    /// to `log` lines about events.
     pub fn step(&mut self, mut send: impl FnMut(usize, &[u8]), mut log: impl FnMut(&str)) -> Then {
         let then = self.turn_to_agenda(&mut log);
         let (now_s, mut changed) = (self.now_s(), false);
@@ -140,7 +140,7 @@ impl Server {
         then
     }
 
-    /// Carries out what is due.
+    /// Carries out the lines that are due.
     fn turn_to_agenda(&mut self, log: &mut impl FnMut(&str)) -> Then {
         let mut then = Then::Nothing;
         let due = self.agenda.partition_point(|(at_ms, ..)| *at_ms <= self.now_ms);
@@ -155,7 +155,7 @@ impl Server {
         then
     }
 
-    /// Takes a line of the [text protocol](crate::command); returns its answer.
+    /// Handles a line of the [text protocol](crate::command); returns its answer.
     pub fn line(&mut self, text: &str) -> Reply {
         if text.len() > LINE_MAX {
             return Reply::refused(&format!("a line has at most {LINE_MAX} characters"));
@@ -228,7 +228,7 @@ impl Server {
         self.wanted(system).try_for_each(|vehicle| vehicle.apply(change))
     }
 
-    /// Returns the vehicle of this system id, or all.
+    /// Returns the vehicle with this system id, or all vehicles for `None`.
     fn wanted(&mut self, system: Option<u8>) -> impl Iterator<Item = &mut ServedVehicle> {
         self.vehicles.iter_mut().filter(move |vehicle| system.is_none_or(|it| vehicle.system() == it))
     }

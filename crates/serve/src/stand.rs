@@ -1,4 +1,4 @@
-//! Scenarios made fit for a vehicle that stands on the ground until it is flown.
+//! Scenarios adapted for vehicles that stand on the ground until they are flown.
 
 use afbc_files::read::FileError;
 use afbc_files::read::words::out_of_range;
@@ -6,18 +6,18 @@ use afbc_plant::{Motion, Realism, Rotors, Start};
 use afbc_scenario::Scenario;
 use nalgebra::Vector3;
 
-/// Largest number of vehicles: MAVLink has 255 system ids, of which stations take those at the end.
+/// Largest number of vehicles. MAVLink has 255 system ids, and ground stations use the highest.
 pub const VEHICLES_MAX: u8 = 100;
-/// Distance between two vehicles at the start, to the east \[m\].
+/// Distance between neighbouring vehicles at the start, to the east \[m\].
 const APART_M: f64 = 3.0;
-/// Name of the vehicle whose ground, air and battery fill what a scenario leaves out.
+/// Vehicle whose drag, ground contact and battery are used where a scenario has none.
 const PAPER: &str = "paper";
 
-/// Returns the scenarios of so many vehicles, side by side on the ground. Trajectory, duration and initial motion of
-/// `scenario` have no effect, except place and heading.
+/// Returns the scenarios of `vehicles` vehicles, side by side on the ground. Place and heading come from `scenario`;
+/// its trajectory, its duration and the rest of its initial motion have no effect.
 ///
 /// # Errors
-/// One line on what the firmware cannot fly, or what is out of range.
+/// Fails with one line if the firmware cannot fly the scenario, or a setting is out of range.
 pub fn fleet(scenario: &Scenario, vehicles: u8) -> Result<Vec<Scenario>, FileError> {
     let refused = |problem: String| FileError::whole(&scenario.name, problem);
     afbc_hil::check(scenario).map_err(|error| refused(error.to_string()))?;
@@ -37,7 +37,7 @@ pub fn fleet(scenario: &Scenario, vehicles: u8) -> Result<Vec<Scenario>, FileErr
     Ok(all)
 }
 
-/// Puts the vehicle of `scenario` on the ground, with air and a battery.
+/// Puts the vehicle of `scenario` on the ground, and adds drag and a battery if they are missing.
 fn standing(scenario: &Scenario) -> Result<Scenario, FileError> {
     let mut scenario = scenario.clone();
     let paper = match afbc_vehicles::built_in(PAPER) {
@@ -45,7 +45,7 @@ fn standing(scenario: &Scenario) -> Result<Scenario, FileError> {
         None => Realism::default(),
     };
     let Realism { rotors, drag, contact, ground_effect, .. } = scenario.realism;
-    // Motors that are off stand still, also those that idle quicker in flight.
+    // Disarmed motors stand still, even if the motors idle at some speed in flight.
     let rotors =
         Rotors { start: Start::Idle, min_rad_s: 0.0, battery: rotors.battery.or(paper.rotors.battery), ..rotors };
     let contact = contact.or(paper.contact);

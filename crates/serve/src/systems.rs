@@ -1,6 +1,6 @@
 //! System ids in words.
 
-/// Returns system ids in words: the first and the last if they are counted up.
+/// Lists system ids; consecutive ones as "first to last".
 pub(crate) fn listed(systems: &[u8]) -> String {
     match systems {
         [first, .., last] if systems.is_sorted_by(|one, next| u16::from(*one) + 1 == u16::from(*next)) => {

@@ -1,4 +1,4 @@
-//! A vehicle's TCP port.
+//! TCP port of a vehicle.
 
 use crate::frames::frames;
 use crate::peer::{Event, speaks_mavlink};
@@ -7,23 +7,23 @@ use std::io::{self, Read, Write};
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
 use std::time::Duration;
 
-/// Bytes that wait for a slow reader before it is let go: a minute or more of telemetry.
+/// Most bytes that wait for a slow reader before it is disconnected: a minute or more of telemetry.
 const WAITING_MAX: usize = 1 << 20;
-/// Most connections, and most that are accepted in one step.
+/// Most connections, and most connections that are accepted in one step.
 pub(crate) const STREAMS_MAX: usize = 32;
 const ACCEPTED_MAX: usize = 2;
-/// Most bytes taken in one step from all streams together, and from one of them.
+/// Most bytes read in one step from all streams together, and from one stream.
 const TAKEN_MAX: usize = 16_384;
 const PART_MAX: usize = 2048;
-/// Most bytes written to a stream in one step: much more than a step's telemetry.
+/// Most bytes written to a stream in one step; much more than one step's telemetry.
 const WRITTEN_MAX: usize = 4096;
 
-/// A listener and its streams.
+/// A listener and its connections.
 pub(crate) struct Tcp {
     listener: TcpListener,
-    /// Whoever is read first changes from step to step.
+    /// Connections, rotated when a step's bytes are used up, so that each gets its turn.
     streams: VecDeque<Connection>,
-    /// True while frames need a signature.
+    /// True if frames need a signature.
     signed: bool,
 }
 
@@ -31,20 +31,20 @@ struct Connection {
     number: u32,
     stream: TcpStream,
     address: SocketAddr,
-    /// When it was accepted, and when it last sent a frame that the vehicle takes, if it has.
+    /// Time when the connection was accepted, and time of the last frame that counts, if any.
     since: Duration,
     heard: Option<Duration>,
     has_begun: bool,
-    /// Bytes that the system has not taken yet.
+    /// Bytes that the system has not accepted yet.
     waiting: VecDeque<u8>,
     open: bool,
 }
 
 impl Tcp {
-    /// Opens the port `port` of this address.
+    /// Opens port `port` of this address.
     ///
     /// # Errors
-    /// The system's.
+    /// Fails with the system's error.
     pub(crate) fn open(address: IpAddr, port: u16) -> io::Result<Self> {
         let listener = TcpListener::bind((address, port))?;
         listener.set_nonblocking(true)?;
@@ -55,8 +55,9 @@ impl Tcp {
         self.listener.local_addr()
     }
 
-    /// Accepts and receives what has arrived by `now`. Frames need a signature if `signed`. `number` gives a new peer
-    /// its number; `on` tells of what was [sent](Event::Sent) whether the vehicle takes a frame of it.
+    /// Accepts connections and reads the bytes that have arrived by `now`. If `signed`, frames need a signature.
+    /// `number` returns the number of a new peer. `on` handles events; for [`Event::Sent`] it returns whether the bytes
+    /// complete a valid frame.
     pub(crate) fn receive(
         &mut self,
         (now, signed): (Duration, bool),
@@ -64,7 +65,7 @@ impl Tcp {
         mut on: impl FnMut(Event<'_>) -> bool,
     ) {
         if signed && !self.signed {
-            // Nobody has signed yet.
+            // A signature is needed from now on, and nobody has sent one yet.
             self.streams.iter_mut().for_each(|connection| connection.heard = None);
         }
         self.signed = signed;
@@ -73,7 +74,7 @@ impl Tcp {
             if stream.set_nonblocking(true).is_err() {
                 continue;
             }
-            // Small frames leave at once; without it they only come later.
+            // Send small frames at once. If this fails, they only arrive later.
             let _ = stream.set_nodelay(true);
             if self.streams.len() >= STREAMS_MAX
                 && let Some(gone) = self.give_up()
@@ -96,14 +97,14 @@ impl Tcp {
         }
     }
 
-    /// Takes out the stream that has been silent for longest, one that has never sent a frame before all others.
+    /// Removes the connection that has been silent for longest; connections without any valid frame go first.
     fn give_up(&mut self) -> Option<Connection> {
         let streams = self.streams.iter().enumerate();
         let longest = streams.min_by_key(|(_, it)| (it.heard.is_some(), it.heard.unwrap_or(it.since), it.number));
         longest.map(|(place, _)| place).and_then(|place| self.streams.remove(place))
     }
 
-    /// Sends whole frames to everyone. Where frames need a signature, whoever has not sent one gets heartbeats alone.
+    /// Sends complete frames to everyone. If frames need a signature, peers that have not signed get heartbeats only.
     pub(crate) fn send(&mut self, bytes: &[u8]) {
         for connection in &mut self.streams {
             if !self.signed || connection.heard.is_some() {
@@ -122,7 +123,7 @@ impl Connection {
         Connection { number, stream, address, since, heard, has_begun, waiting, open: true }
     }
 
-    /// Receives at most as many bytes as are `left`, one read's.
+    /// Reads once, at most `left` bytes.
     fn receive(&mut self, now: Duration, left: &mut usize, on: &mut impl FnMut(Event<'_>) -> bool) {
         let mut buffer = [0; PART_MAX];
         let Some(room) = buffer.get_mut(..PART_MAX.min(*left)).filter(|room| !room.is_empty()) else { return };
@@ -145,7 +146,7 @@ impl Connection {
         }
     }
 
-    /// Hands over as much as the system takes, of one step's share.
+    /// Writes as many bytes as the system accepts, up to the limit per step.
     fn flush(&mut self) {
         let mut left = WRITTEN_MAX;
         while self.open && left > 0 {

@@ -1,4 +1,4 @@
-//! A vehicle's UDP port.
+//! UDP port of a vehicle.
 
 use crate::frames::frames;
 use crate::peer::{Event, speaks_mavlink};
@@ -9,22 +9,22 @@ use std::time::Duration;
 
 /// Silence after which a peer is forgotten.
 pub(crate) const SILENCE_MAX: Duration = Duration::from_secs(60);
-/// Time that is left to peers who have not signed, once there is a key.
+/// Time after which unsigned peers are forgotten once a signing key is set.
 const UNSIGNED_MAX: Duration = Duration::from_secs(5);
 /// Most peers of a vehicle.
 pub(crate) const PEERS_MAX: usize = 32;
-/// Most datagrams taken in one step, and bytes after which no further one is, so that a flood does not stop the clock.
+/// Most datagrams read in one step, and number of bytes after which reading stops, so that a flood does not stop time.
 const DATAGRAMS_MAX: usize = 128;
 const TAKEN_MAX: usize = 16_384;
-/// Longest datagram, below what Ethernet carries in one piece.
+/// Longest datagram \[bytes\], small enough for one Ethernet packet.
 const DATAGRAM_MAX: usize = 1400;
 
-/// A socket, the addresses that get heartbeats unasked, and whoever has sent a frame that the vehicle takes.
+/// A socket, the standing addresses that always get heartbeats, and the peers: clients that have sent a valid frame.
 pub(crate) struct Udp {
     socket: UdpSocket,
     standing: Vec<SocketAddr>,
     peers: BTreeMap<SocketAddr, Known>,
-    /// True while frames need a signature.
+    /// True if frames need a signature.
     signed: bool,
     buffer: Vec<u8>,
 }
@@ -32,15 +32,15 @@ pub(crate) struct Udp {
 /// A peer.
 struct Known {
     number: u32,
-    /// When it is forgotten, unless it sends such a frame before.
+    /// Time when the peer is forgotten, unless it sends a valid frame before.
     until: Duration,
 }
 
 impl Udp {
-    /// Opens the port `port` of this address.
+    /// Opens port `port` of this address.
     ///
     /// # Errors
-    /// The system's.
+    /// Fails with the system's error.
     pub(crate) fn open(address: IpAddr, port: u16, standing: Vec<SocketAddr>) -> io::Result<Self> {
         let socket = UdpSocket::bind((address, port))?;
         socket.set_nonblocking(true)?;
@@ -51,8 +51,9 @@ impl Udp {
         self.socket.local_addr()
     }
 
-    /// Receives what has arrived by `now`. Frames need a signature if `signed`. `number` gives a new peer its number;
-    /// `on` tells of what was [sent](Event::Sent) whether the vehicle takes a frame of it.
+    /// Reads the datagrams that have arrived by `now`. If `signed`, frames need a signature. `number` returns the
+    /// number of a new peer. `on` handles events; for [`Event::Sent`] it returns whether the bytes complete a valid
+    /// frame.
     pub(crate) fn receive(
         &mut self,
         (now, signed): (Duration, bool),
@@ -60,13 +61,13 @@ impl Udp {
         mut on: impl FnMut(Event<'_>) -> bool,
     ) {
         if signed && !self.signed {
-            // Whoever does not sign is not heard any more, and gets nothing for long.
+            // Peers that do not sign are no longer heard, and soon get no telemetry.
             self.peers.values_mut().for_each(|known| known.until = known.until.min(now + UNSIGNED_MAX));
         }
         self.signed = signed;
         let (mut buffer, mut taken) = (std::mem::take(&mut self.buffer), 0);
         for _ in 0..DATAGRAMS_MAX {
-            // Errors are reports that a peer of an earlier datagram does not listen, or that nothing has arrived.
+            // An error means that a peer of an earlier datagram does not listen, or that nothing has arrived.
             let (length, from) = match self.socket.recv_from(&mut buffer) {
                 Ok(received) => received,
                 Err(error) if error.kind() == io::ErrorKind::ConnectionReset => continue,
@@ -88,8 +89,8 @@ impl Udp {
         });
     }
 
-    /// Takes a datagram. Who is no peer yet becomes one by a frame that the vehicle takes, instead of the peer that has
-    /// been silent for longest if there are too many.
+    /// Handles a datagram. An unknown sender becomes a peer when it sends a valid frame. If there are too many peers,
+    /// it replaces the one that has been silent for longest.
     fn take(
         &mut self,
         (from, bytes): (SocketAddr, &[u8]),
@@ -121,20 +122,20 @@ impl Udp {
         on(Event::New(from));
     }
 
-    /// Sends whole frames: all of them to the peers, heartbeats to the standing addresses too. A
-    /// datagram holds as many as fit.
+    /// Sends complete frames: all frames to the peers, and heartbeats to the standing addresses. A datagram holds as
+    /// many frames as fit.
     pub(crate) fn send(&self, bytes: &[u8]) {
         if bytes.is_empty() {
             return;
         }
         for datagram in datagrams(bytes) {
             for peer in self.peers.keys() {
-                // Nobody may be there; telemetry is not repeated.
+                // Errors are ignored: nobody may be listening, and telemetry is not repeated.
                 let _ = self.socket.send_to(datagram, peer);
             }
         }
         for frame in frames(bytes).filter(|frame| frame.is_heartbeat()) {
-            // A peer has had them already, with everything else.
+            // Peers have already got the heartbeats with all other frames.
             for address in self.standing.iter().filter(|address| !self.peers.contains_key(*address)) {
                 let _ = self.socket.send_to(frame.bytes(), address);
             }
@@ -142,7 +143,7 @@ impl Udp {
     }
 }
 
-/// Cuts `bytes` between frames.
+/// Splits `bytes` into datagrams of complete frames.
 fn datagrams(bytes: &[u8]) -> Vec<&[u8]> {
     let (mut all, mut rest, mut length) = (Vec::new(), bytes, 0);
     for frame in frames(bytes) {

@@ -1,4 +1,4 @@
-//! One vehicle in its world.
+//! One simulated vehicle in its world.
 
 use crate::ParameterFile;
 use crate::command::WorldChange;
@@ -24,26 +24,26 @@ use afbc_types::{OutOfRange, ROTORS_MAX};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// Component of the vehicle: autopilot.
+/// Component id of an autopilot.
 const AUTOPILOT: u8 = 1;
-/// What its link carries: loopback has no limit, clients have.
+/// Data rate of the link \[bytes/s\]. Loopback has no limit, but clients do.
 const BYTES_PER_S: u32 = 100_000;
-/// Time of a step \[s\].
+/// Duration of a step \[s\].
 const STEP_S: f64 = 0.001;
 
-/// The firmware's code on the plant, with its instruments.
+/// The firmware's code on a simulated plant with its instruments.
 pub struct ServedVehicle {
-    /// Defaults of the link's parameters.
+    /// Default values of the link's parameters.
     link: Link,
     address: Address,
     host: Host,
     world: World,
     changes: WorldChanges,
-    /// Who holds it, if anybody does.
+    /// Hand that holds the vehicle, if any.
     hand: Option<Hand>,
-    /// A decoder for each peer: no stream's bytes complete a frame of another's.
+    /// One decoder per peer, so that bytes of different peers never mix into one frame.
     peers: BTreeMap<u32, Decoder<Uplink>>,
-    /// True if new peers count as holding the vehicle.
+    /// True if new peers count as wired to the vehicle.
     wired: bool,
     mode: Mode,
     /// Report of the last tick.
@@ -55,16 +55,16 @@ pub struct ServedVehicle {
     keeper: Option<ParameterFile>,
     exact_log: Option<LogFile>,
     black_box: Option<UlogFiles>,
-    /// What is to be reported of the parameters that were stored.
+    /// Lines about the stored parameters and restarts, to be logged in the next step.
     notices: Vec<String>,
 }
 
 impl ServedVehicle {
-    /// Creates the vehicle of `scenario`, powered up where it starts, with parameters that `keeper` keeps, if there is
-    /// one. Its system id is `system`, unless they say another (MAV_SYS_ID).
+    /// Creates and powers up the vehicle of `scenario` at its start. Its parameters are stored in `keeper`, if there is
+    /// one. Its system id is `system`, unless the parameter MAV_SYS_ID says otherwise.
     ///
     /// # Errors
-    /// The first setting out of range.
+    /// Fails with the first setting out of range.
     pub fn new(scenario: &Scenario, system: u8, mut keeper: Option<ParameterFile>) -> Result<Self, OutOfRange> {
         let link = Link { system: system.into(), ..Link::DEFAULT };
         let mut notices = Vec::new();
@@ -91,61 +91,61 @@ impl ServedVehicle {
         })
     }
 
-    /// Returns its MAVLink system id.
+    /// Returns the MAVLink system id.
     pub fn system(&self) -> u8 {
         self.address.system
     }
 
-    /// Keeps an exact log in this file, from now on, before the first step.
+    /// Records an exact log to this file. Call this before the first step.
     pub fn record(&mut self, file: LogFile) {
         self.host.record(file.sink());
         self.exact_log = Some(file);
     }
 
-    /// Keeps the black box in these files, from now on, before the first step, and lets stations download them.
+    /// Records the black box to these files, and lets stations download them. Call this before the first step.
     pub fn log(&mut self, files: UlogFiles) {
         self.host.log(place(&self.scenario), files.sink());
         self.host.serve_files(place(&self.scenario), Some(files.stored()));
         self.black_box = Some(files);
     }
 
-    /// Ends the black box.
+    /// Closes the black box.
     ///
     /// # Errors
-    /// A line on why it has ended early, reported or not.
+    /// Fails with one line if the black box ended early, whether this was reported or not.
     pub fn end_log(&mut self) -> Result<(), String> {
         self.black_box.take().map_or(Ok(()), UlogFiles::finish)
     }
 
-    /// Ends the black box; returns a line on why it has ended early, unless that was reported.
+    /// Closes the black box; returns one line if it ended early, unless that was already reported.
     pub fn close_log(&mut self) -> Option<String> {
         self.black_box.take().and_then(|mut files| files.end())
     }
 
-    /// Returns its world.
+    /// Returns the vehicle's simulated world.
     pub fn world(&self) -> &World {
         &self.world
     }
 
-    /// Puts the local frame's origin at this latitude and longitude \[deg\], and altitude above the sea \[m\]; false
-    /// within a kilometre of a pole.
+    /// Moves the local frame's origin to this latitude and longitude \[deg\] and altitude above the sea \[m\]. Returns
+    /// false within a kilometre of a pole, where there is no such frame.
     pub fn move_origin(&mut self, [latitude_deg, longitude_deg]: [f64; 2], altitude_m: f64) -> bool {
         let origin = EarthOrigin::new(Global { latitude_deg, longitude_deg, altitude_m });
         origin.map(|origin| self.reported.move_origin(origin)).is_some()
     }
 
-    /// Sets whether those that connect from now on count as holding the vehicle: they may set the key of signatures.
+    /// Sets whether peers that connect from now on count as wired to the vehicle: they may set the signing key.
     pub fn set_wired(&mut self, wired: bool) {
         self.wired = wired;
     }
 
-    /// True if frames need a signature.
+    /// Returns true if frames need a signature.
     pub fn needs_signatures(&self) -> bool {
         self.host.needs_signatures()
     }
 
-    /// Receives, for the next step, what `peer` has sent. Returns whether that completes a frame that shows who it is:
-    /// any that is intact or, where frames need a signature, one that is accepted.
+    /// Queues bytes of `peer` for the next step. Returns whether they complete a valid frame: any intact frame or, if
+    /// frames need a signature, an accepted one.
     pub fn hear(&mut self, peer: u32, bytes: &[u8]) -> bool {
         let (address, wired, signed) = (self.address, self.wired, self.host.needs_signatures());
         let decoder = self.peers.entry(peer).or_insert_with(|| decoder(address, wired));
@@ -155,12 +155,12 @@ impl ServedVehicle {
         after.received != before.received || (!signed && intact(&after) != intact(&before))
     }
 
-    /// Forgets what is left of a peer that is gone.
+    /// Forgets an unfinished frame of a peer that is gone.
     pub fn forget(&mut self, peer: u32) {
         self.peers.remove(&peer);
     }
 
-    /// Runs a millisecond; returns the bytes that it has sent, whole frames. What is worth a line goes to `log`.
+    /// Runs one millisecond; returns the complete frames that the vehicle has sent. Passes lines about events to `log`.
     pub fn step(&mut self, mut log: impl FnMut(&str)) -> Vec<u8> {
         self.notices.drain(..).for_each(|notice| log(&notice));
         match &self.hand {
@@ -179,7 +179,7 @@ impl ServedVehicle {
         self.host.hear_simulated_escs(self.world.plant());
         let HostTick { report, bytes, change, signing, .. } = self.host.next_tick(&[]);
         self.world.advance(&report.motors);
-        // After the plant's own step, which the hand overrules.
+        // The hand overrides the plant's own step.
         self.hold();
         if report.mode.armed() != self.mode.armed() {
             log(if report.mode.armed() { "armed" } else { "disarmed" });
@@ -190,10 +190,10 @@ impl ServedVehicle {
         if let Some(keeper) = &mut self.keeper {
             let change = change.map_or(Ok(()), |change| keeper.keep(change));
             let signing = signing.map_or(Ok(()), |record| keeper.keep_signing(record));
-            // Both have been written by now, or tried: one failure does not keep the other back.
+            // Both writes have been attempted by now: if one fails, the other is still done.
             let later = keeper.take_failure().map_or(Ok(()), Err);
             if let Err(error) = change.and(signing).and(later) {
-                // The reason is a text to the stations, and reported with it.
+                // The warning is sent as a status text, and thereby logged, too.
                 self.host.comms().warn(error.reason());
             }
         }
@@ -203,14 +203,14 @@ impl ServedVehicle {
         if let Some(failure) = self.black_box.as_mut().and_then(UlogFiles::take_failure) {
             log(&failure);
         }
-        // What was sent before has left.
+        // The frames of this step have been sent, so the firmware may restart.
         if self.host.comms().wants_reboot().is_some() {
             self.restart();
         }
         bytes
     }
 
-    /// Tells the results of the sensors' own tests, which sensors pass that read something.
+    /// Reports the sensors' self-tests: a sensor passes if it has readings.
     fn test_sensors(&mut self, aux: &AuxSensors, readings: &Readings) {
         let SensorBits { present, healthy } = aux.sensors;
         let imu = sensor::GYROSCOPE | sensor::ACCELEROMETER;
@@ -226,14 +226,14 @@ impl ServedVehicle {
         }
     }
 
-    /// Powers the firmware down and up again; the world goes on.
+    /// Restarts the firmware; the world goes on.
     fn restart(&mut self) {
         self.notices.push("restarted".into());
         let host = power_up(&self.scenario, self.link, self.keeper.as_mut(), &mut self.notices);
         match host {
             Ok(host) => {
                 self.address = address(&host);
-                // Firmware starts with its own law: one that a line has chosen is gone, like all else that it knew.
+                // The firmware restarts with its own law; a law chosen by a command is lost with the rest of its state.
                 (self.host, self.law) = (host, ControllerKind::Afbc);
                 if let Some(file) = &self.exact_log {
                     self.host.record(file.sink());
@@ -243,14 +243,14 @@ impl ServedVehicle {
                     self.host.log(place(&self.scenario), files.sink());
                 }
                 self.host.serve_files(place(&self.scenario), self.black_box.as_ref().map(UlogFiles::stored));
-                // Nothing of a frame outlasts it.
+                // Unfinished frames are lost in a restart.
                 self.peers.values_mut().for_each(|peer| *peer = decoder(self.address, self.wired));
             }
             Err(error) => self.notices.push(out_of_range(&error)),
         }
     }
 
-    /// Moves the vehicle where a hand holds it.
+    /// Moves the vehicle to where the hand holds it.
     fn hold(&mut self) {
         let Some(hand) = &self.hand else { return };
         let plant = self.world.plant_mut();
@@ -261,10 +261,10 @@ impl ServedVehicle {
         }
     }
 
-    /// Changes weather or faults.
+    /// Changes weather or faults, or takes the vehicle by hand.
     ///
     /// # Errors
-    /// One line on why it does not.
+    /// Fails with one line that says why the change is impossible.
     pub fn apply(&mut self, change: &WorldChange) -> Result<(), String> {
         if let WorldChange::Hold(grip) = change {
             if self.mode.armed() {
@@ -277,11 +277,11 @@ impl ServedVehicle {
         self.changes.apply(change, &mut self.world)
     }
 
-    /// Flies on under this law, from the next tick on, armed or not: it begins afresh, as after arming. AFBC is the
-    /// firmware's own, with its monitor.
+    /// Switches to another law at the next tick, armed or not. The law starts from its initial state, as after arming.
+    /// AFBC is the firmware's own law, with its monitor.
     ///
     /// # Errors
-    /// One line on why it does not.
+    /// Fails with one line that says why the law cannot be used.
     pub fn change_law(&mut self, kind: ControllerKind) -> Result<(), String> {
         if self.exact_log.is_some() {
             return Err("law: an exact log is of one law; serve without --exact-log".into());
@@ -301,37 +301,37 @@ impl ServedVehicle {
         self.law
     }
 
-    /// Returns the firmware's code that flies it, to look at.
+    /// Returns the firmware's code that flies the vehicle.
     pub fn host(&self) -> &Host {
         &self.host
     }
 
-    /// Returns the report of the last tick; none before the first.
+    /// Returns the report of the last tick; `None` before the first.
     pub fn report(&self) -> Option<&Report<ROTORS_MAX>> {
         self.report.as_ref()
     }
 
-    /// Returns the scenario that it was made of.
+    /// Returns the scenario of this vehicle.
     pub fn scenario(&self) -> &Scenario {
         &self.scenario
     }
 
-    /// Returns where on the earth the origin of its local frame is, if that is known.
+    /// Returns the place of the local frame's origin on the earth, if known.
     pub fn origin(&self) -> Option<EarthOrigin> {
         self.reported.origin()
     }
 
-    /// Returns what it suffers now, in words.
+    /// Returns the faults that act now, in words.
     pub fn faults(&self) -> Vec<String> {
         self.changes.active_faults(self.world.plant().time_s())
     }
 
-    /// Returns the share of its thrust that each rotor has now.
+    /// Returns the remaining share of each rotor's thrust.
     pub fn rotor_shares(&self) -> Vec<f64> {
         self.changes.rotor_shares(self.scenario.rotors.len(), self.world.plant().time_s())
     }
 
-    /// Returns its state in one line.
+    /// Returns the vehicle's state in one line.
     pub fn status(&self) -> String {
         let (plant, mode) = (self.world.plant(), self.mode);
         let motion = plant.motion();
@@ -366,7 +366,7 @@ impl ServedVehicle {
     }
 }
 
-/// Powers up the firmware of a scenario's vehicle.
+/// Powers up the firmware of the scenario's vehicle.
 fn power_up(
     scenario: &Scenario,
     link: Link,
@@ -381,13 +381,13 @@ fn power_up(
     Ok(host.with(setup))
 }
 
-/// Returns the decoder of a new peer.
+/// Returns a decoder for a new peer.
 fn decoder(receiver: Address, wired: bool) -> Decoder<Uplink> {
     let decoder = Decoder::new(receiver);
     if wired { decoder.wired() } else { decoder }
 }
 
-/// Returns the number of frames with the right checksum that were not delivered.
+/// Returns the number of frames with a valid checksum that were not delivered.
 fn intact(counters: &Counters) -> u32 {
     let Counters { malformed, implausible, unsupported, elsewhere, .. } = *counters;
     [malformed, implausible, unsupported, elsewhere].into_iter().fold(0, u32::wrapping_add)

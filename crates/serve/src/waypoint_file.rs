@@ -1,33 +1,33 @@
-//! Missions as text, `QGC WPL 110`: those of MAVProxy, Mission Planner and older QGroundControl.
+//! Reads missions in the text format `QGC WPL 110` of MAVProxy, Mission Planner and older QGroundControl.
 //!
-//! A line for each item, its twelve columns separated by tabs or blanks: number, whether it is the current one, frame,
-//! command, four parameters, latitude or x, longitude or y, altitude or z, whether the mission goes on by itself. In
-//! version 110 the first line is the home position, unless it is no waypoint; version 120 has none.
+//! Each line is an item with twelve columns, separated by tabs or blanks: number, whether it is the current item,
+//! frame, command, four parameters, latitude or x, longitude or y, altitude or z, autocontinue. In version 110 the
+//! first line is the home position if it is a waypoint; version 120 has no home.
 
 use afbc_files::read::{FileError, Source};
 use afbc_link::MissionItem;
 
-/// First words of every file, before its version.
+/// Beginning of every file, before the version.
 const MAGIC: &str = "QGC WPL";
-/// MAV_CMD_NAV_WAYPOINT, and MAV_CMD_DO_JUMP, whose first parameter is a number of a line.
+/// MAV_CMD_NAV_WAYPOINT, and MAV_CMD_DO_JUMP, whose first parameter is a line's number.
 const WAYPOINT: u16 = 16;
 const JUMP: u16 = 177;
-/// MAV_FRAME_MISSION, of items without a place; and the frames in metres from where the vehicle or its origin is.
+/// MAV_FRAME_MISSION, for items without a place, and the frames whose coordinates are in metres.
 const MISSION: u8 = 2;
 const LOCAL: [u8; 8] = [1, 4, 7, 8, 9, 12, 20, 21];
 
-/// True if the bytes of a file begin as such a mission does; a dozen are enough.
+/// Returns true if a file begins like a waypoint file; its first dozen bytes are enough to tell.
 pub fn is_waypoint_file(bytes: &[u8]) -> bool {
     bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).starts_with(MAGIC.as_bytes())
 }
 
-/// Latitude and longitude \[deg\], and the altitude above the sea, if it is known \[m\].
+/// Home: latitude and longitude \[deg\], and the altitude above the sea \[m\] if known.
 pub(crate) type Home = ([f64; 2], Option<f64>);
 
-/// Reads a mission from the `text` of `file`, and its home, if it is known.
+/// Reads the mission and, if known, its home from the `text` of `file`.
 ///
 /// # Errors
-/// One line that names the file, the line, what is wrong and what helps.
+/// Fails with one line that names the file, the line, the problem and the remedy.
 pub(crate) fn read(file: &str, text: &str) -> Result<(Vec<MissionItem>, Option<Home>), FileError> {
     let source = Source { file, text };
     let head = text.lines().next().unwrap_or_default();
@@ -54,7 +54,7 @@ pub(crate) fn read(file: &str, text: &str) -> Result<(Vec<MissionItem>, Option<H
         let mut item = MissionItem { number, is_current: number == 0, ..item };
         let [target, ..] = &mut item.parameters;
         if item.command == JUMP {
-            // To one of the lines, of which home is none of the mission's.
+            // The target must be a line of the mission; the home line is not part of it.
             if !(skipped as f32..count as f32).contains(target) || target.fract() != 0.0 {
                 let problem = format!("item {}: it jumps to {target}, which is no item; correct it", item.number);
                 return Err(FileError::whole(file, problem));
@@ -63,12 +63,12 @@ pub(crate) fn read(file: &str, text: &str) -> Result<(Vec<MissionItem>, Option<H
         }
         Ok(item)
     });
-    // Zeros: whoever wrote the file did not know it.
+    // Zeros mean that the writer did not know the home position.
     let home = home.map(|(item, place)| (place, Some(f64::from(item.z)))).filter(|(place, _)| *place != [0.0, 0.0]);
     Ok((items.collect::<Result<_, _>>()?, home))
 }
 
-/// Reads the line of the item with this number; returns it with its coordinates as they are written.
+/// Reads the line of item `number`; returns the item and its coordinates as written.
 fn item(line: &str, number: usize) -> Result<(MissionItem, [f64; 2]), String> {
     let columns: Vec<&str> = line.split_whitespace().collect();
     let Ok::<[&str; 12], _>([index, _, frame, command, a, b, c, d, x, y, z, goes_on]) = columns.as_slice().try_into()
@@ -88,7 +88,7 @@ fn item(line: &str, number: usize) -> Result<(MissionItem, [f64; 2]), String> {
         return Err(format!("there is no place {latitude} {longitude}; latitude and longitude are in degrees"));
     }
     let units = if is_local { 1e4 } else { 1e7 };
-    // Saturates, so that what is out of range remains so.
+    // The conversion saturates, so values out of range stay out of range.
     let [x, y] = place.map(|coordinate| (coordinate * units).round() as i32);
     let goes_on = match goes_on {
         "1" => true,
@@ -103,7 +103,7 @@ fn whole<T: std::str::FromStr>(name: &str, text: &str) -> Result<T, String> {
     text.parse().map_err(|_| format!("{name} is {text:?}; it must be a whole number"))
 }
 
-/// Parameters may be not a number: then the vehicle chooses.
+/// Parses a parameter; NaN is allowed and lets the vehicle choose.
 fn decimal(name: &str, text: &str) -> Result<f64, String> {
     text.parse().map_err(|_| format!("{name} is {text:?}; it must be a number"))
 }

@@ -1,4 +1,4 @@
-//! Weather and faults of one vehicle, as changed while it flies.
+//! Weather and faults of one vehicle, changed during the flight.
 
 use crate::command::WorldChange;
 use afbc_files::read::words::out_of_range;
@@ -10,17 +10,17 @@ use afbc_scenario::Scenario;
 use afbc_sim::flight::World;
 use afbc_types::{Axis, OutOfRange};
 
-/// Most changes of a kind that act at a time: each costs every step a little.
+/// Most changes of one kind that act at the same time; each one costs every step a little.
 const ACTIVE_MAX: usize = 256;
 
-/// What a vehicle suffers now, and what its scenario has in store.
+/// Weather and faults that act on a vehicle now, and those of its scenario.
 pub(crate) struct WorldChanges {
     suite: InstrumentSuite,
     scenario_wind: Wind,
     scenario_environment: Environment,
     wind: Wind,
     rotors: Vec<RotorFault>,
-    /// Failures of instruments, by command.
+    /// Instrument failures, by command or by the scenario.
     failures: Vec<InstrumentFault>,
 }
 
@@ -36,10 +36,10 @@ impl WorldChanges {
         }
     }
 
-    /// Changes `world` as `change` says, from now on.
+    /// Applies `change` to `world` from now on.
     ///
     /// # Errors
-    /// One line; nothing has changed then.
+    /// Fails with one line; nothing has changed then.
     pub(crate) fn apply(&mut self, change: &WorldChange, world: &mut World) -> Result<(), String> {
         let now_s = world.plant().time_s();
         let until = |seconds: Option<f64>| seconds.map_or(f64::INFINITY, |seconds| now_s + seconds);
@@ -53,13 +53,13 @@ impl WorldChanges {
                 Ok(())
             }),
             WorldChange::Gust { velocity_m_s, rise_s, hold_s } => self.set_wind(world, |wind| {
-                // Gusts that are over would add up over a long session.
+                // Remove gusts that are over: they would pile up in a long session.
                 wind.gusts.retain(|gust| gust.start_s + 2.0 * gust.rise_s + gust.hold_s > now_s);
                 wind.gusts.push(CosineGust { velocity_m_s, start_s: now_s, rise_s, hold_s });
                 bounded(wind.gusts.len())
             }),
             WorldChange::Push { force_n, seconds } => {
-                // A positive gust of the paper pushes in the negative direction.
+                // In the paper a positive gust pushes in the negative direction.
                 let sizes = [(Axis::X, -force_n.x), (Axis::Y, -force_n.y), (Axis::Z, -force_n.z)];
                 let [start_s, end_s] = [now_s, until(seconds)];
                 let gusts = sizes.map(|(axis, size)| Gust { axis, kind: GustKind::Force, size, start_s, end_s });
@@ -69,7 +69,7 @@ impl WorldChanges {
                 changes.push(ParameterChange { quantity, factor, start_s: now_s, end_s: until(seconds) });
             }),
             WorldChange::Payload { mass_kg, below_m } => load(world, |_, _, payloads| {
-                // What the scenario has in store for later stays.
+                // Keep payloads that the scenario adds later.
                 payloads.retain(|payload| payload.start_s > now_s);
                 let [ahead_m, left_m] = [0.0; 2];
                 let end_s = f64::INFINITY;
@@ -100,7 +100,7 @@ impl WorldChanges {
                 true => Ok(()),
                 false => Err("this vehicle has no battery".into()),
             },
-            // The hand is the vehicle's own.
+            // The vehicle handles the hand itself.
             WorldChange::Hold(_) => Ok(()),
             WorldChange::Clear => {
                 let wind = self.scenario_wind.clone();
@@ -131,7 +131,7 @@ impl WorldChanges {
         Ok(())
     }
 
-    /// Returns the share of its thrust that each of so many rotors has at `now_s`.
+    /// Returns the remaining share of each rotor's thrust at `now_s`.
     pub(crate) fn rotor_shares(&self, rotors: usize, now_s: f64) -> Vec<f64> {
         let of = |rotor: usize| {
             let faults = self.rotors.iter().filter(|fault| usize::from(fault.rotor) == rotor && fault.start_s <= now_s);
@@ -140,7 +140,7 @@ impl WorldChanges {
         (1..=rotors).map(of).collect()
     }
 
-    /// Returns the faults at `now_s` in words.
+    /// Returns the faults that act at `now_s`, in words.
     pub(crate) fn active_faults(&self, now_s: f64) -> Vec<String> {
         let failures = self.failures.iter().filter(|fault| (fault.start_s..fault.end_s).contains(&now_s));
         let rotors = self.rotors.iter().filter(|fault| fault.start_s <= now_s && fault.efficiency < 1.0);
@@ -151,7 +151,7 @@ impl WorldChanges {
     }
 }
 
-/// Changes gusts, parameters and payloads.
+/// Changes gusts, parameter changes and payloads; removes those that are over.
 fn load(
     world: &mut World,
     change: impl FnOnce(&mut Vec<Gust>, &mut Vec<ParameterChange>, &mut Vec<Payload>),
@@ -168,7 +168,7 @@ fn load(
     Ok(())
 }
 
-/// Refuses more changes of a kind than act at a time.
+/// Refuses more changes of one kind than may act at the same time.
 fn bounded(count: usize) -> Result<(), String> {
     let most = format!("{ACTIVE_MAX} of its kind act already; clear ends them");
     if count <= ACTIVE_MAX { Ok(()) } else { Err(most) }

@@ -1,4 +1,4 @@
-//! Targets of attitude and thrust in closed loop, without clock and sockets.
+//! Offboard targets of attitude and thrust in closed loop, without clock and sockets.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc::Trip;
@@ -34,7 +34,7 @@ impl Flown {
         self.server.vehicles().first().unwrap().world().plant().motion()
     }
 
-    /// In hold, some metres above the ground.
+    /// Takes off and holds some metres above the ground.
     fn hovering(scenario: &str) -> Self {
         let scenario = built_in(scenario).unwrap().read().unwrap();
         let mut flown = Flown { server: Server::new(&fleet(&scenario, 1).unwrap(), 1).unwrap(), lines: Vec::new() };
@@ -46,7 +46,7 @@ impl Flown {
         flown
     }
 
-    /// Follows a velocity for so long.
+    /// Follows a velocity for this time.
     fn fly(&mut self, [x, y, z]: [f32; 3], milliseconds: u32) {
         let velocity_m_s = Vector3::new(x, y, z);
         for time_ms in 0..milliseconds {
@@ -63,7 +63,7 @@ impl Flown {
         }
     }
 
-    /// Follows an attitude and a thrust for so long; returns the motion at every tenth of a second.
+    /// Follows an attitude and a thrust for this time; returns the motion every tenth of a second.
     fn lean(&mut self, roll_rad: f32, pitch_rad: f32, thrust: f32, milliseconds: u32) -> Vec<Motion> {
         let yaw_rad = self.motion().attitude_rad.z as f32;
         let q = UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, yaw_rad);
@@ -84,7 +84,7 @@ impl Flown {
         motions
     }
 
-    /// Checks that the monitor has not taken AFBC away.
+    /// Checks that the monitor has not switched AFBC off.
     fn has_not_tripped(&self, what: &str) {
         let tripped = |line: &&String| {
             Axis::ALL.iter().any(|axis| {
@@ -97,14 +97,14 @@ impl Flown {
     }
 }
 
-/// Whatever the law has learnt before, of wind or of a manoeuvre.
+/// An attitude is held, whatever the law has adapted to before: wind, or a manoeuvre.
 #[test]
 fn an_attitude_is_held() {
     for name in ["mocap", "outdoor"] {
         for (roll_rad, pitch_rad) in [(-0.1_f32, 0.0_f32), (0.06, 0.12)] {
             let mut flown = Flown::hovering(name);
             if roll_rad < 0.0 {
-                // Begins while the vehicle is fast.
+                // Start at high speed.
                 flown.fly([3.0, -2.0, 0.3], 2500);
             }
             let motions = flown.lean(roll_rad, pitch_rad, 0.4, 3000);
@@ -117,7 +117,7 @@ fn an_attitude_is_held() {
     }
 }
 
-/// More thrust than the weight climbs, no faster than the limit, and less sinks.
+/// With more thrust than the weight the vehicle climbs, at most at the limit; with less it sinks.
 #[test]
 fn thrust_climbs_and_sinks_within_limits() {
     for name in ["mocap", "outdoor"] {

@@ -1,5 +1,5 @@
-//! The battery's failsafe with its defaults, in closed loop: it warns, brings the vehicle back, and lands it where it
-//! is before nothing is left to land with.
+//! The battery failsafe with its default parameters, in closed loop: it warns, returns, and lands in place before the
+//! battery is empty.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs, reason = "tests")]
 
 use afbc_guidance::FlightMode;
@@ -12,16 +12,16 @@ use afbc_station::services::origin::EarthOrigin;
 use nalgebra::Vector3;
 
 const STATION: Address = Address { system: 255, component: 190 };
-/// Times of the orders \[ms\].
+/// Times of the commands \[ms\].
 const ARM: u64 = 6_000;
 const TAKE_OFF: u64 = 6_300;
 const GO: u64 = 12_000;
 /// Longest flight \[ms\].
 const END: u64 = 400_000;
-/// Where it is sent \[m\]: so far that the way back takes longer than from critical to almost empty.
+/// Target \[m\], so far away that the return takes longer than the time from battery critical to almost empty.
 const FAR: [f32; 3] = [200.0, 0.0, 10.0];
 
-/// What is seen in a step.
+/// State in one step.
 #[derive(Clone, Copy, Debug)]
 struct Moment {
     charge: f64,
@@ -40,7 +40,7 @@ fn an_empty_battery_warns_returns_and_lands() {
     let place = Place { latitude_e7, longitude_e7, height: Height { metres: FAR[2], above: Datum::Home } };
     let go = Command::Reposition { place, yaw_rad: f32::NAN, speed_m_s: Some(10.0), changes_mode: true };
 
-    // Every mode with the moment at which it is first told; every line on the battery.
+    // Collect every change of mode with its state, and every line about the battery.
     let (mut modes, mut lines) = (Vec::<(u32, Moment)>::new(), Vec::<(String, Moment)>::new());
     let mut has_landed = false;
     for ms in 0..END {
@@ -79,7 +79,7 @@ fn an_empty_battery_warns_returns_and_lands() {
     assert!(has_landed, "{modes:?} {lines:?}");
 
     let told = |what: &str| lines.iter().find(|(line, _)| line.contains(what)).map(|(_, moment)| *moment).unwrap();
-    // A simulated battery's monitor tells whole percents, rounded down.
+    // The simulated battery monitor reports whole percents, rounded down.
     for (what, threshold) in [("battery low", 0.15), ("battery critical", 0.07), ("battery almost empty", 0.05)] {
         let charge = told(what).charge;
         assert!((threshold - 0.002..=threshold).contains(&charge), "{what}: {charge} {lines:?}");
@@ -88,11 +88,11 @@ fn an_empty_battery_warns_returns_and_lands() {
         let first = modes.iter().find(|(told, _)| *told == custom(mode));
         first.map(|(_, moment)| *moment).unwrap_or_else(|| panic!("{modes:?}"))
     });
-    // A heartbeat a second tells the mode.
+    // Heartbeats report the mode once per second.
     for (moment, cause) in [(returns, "battery critical"), (lands, "battery almost empty")] {
         assert!(moment.charge <= told(cause).charge && told(cause).charge - moment.charge < 0.01, "{modes:?}");
     }
-    // Low is only told; it came back a good way, landed where it was then, and had something left.
+    // A low battery only warns. The vehicle returned a good part of the way, landed in place, and had charge left.
     assert_eq!(modes.iter().filter(|(_, moment)| (0.07..0.15).contains(&moment.charge)).count(), 0, "{modes:?}");
     let from_home = |moment: &Moment| moment.place_m.xy().norm();
     let end = server.vehicles().first().unwrap().world().plant();

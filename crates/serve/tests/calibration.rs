@@ -1,5 +1,5 @@
-//! Calibration of a served vehicle by a station, while a hand turns it: the texts as MAVSDK and QGroundControl read
-//! them, the parameters, and the sensors' true errors.
+//! A station calibrates a served vehicle while a hand turns it. Checked are the texts as MAVSDK and QGroundControl
+//! parse them, the parameters, and the sensors' true errors.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
 use afbc_link::{Address, Answer, CalibrationRequest, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 const STATION: Address = Address { system: 255, component: 190 };
 const CALIBRATE: u16 = 241;
 
-/// What MAVSDK's parser of texts makes of one: `CalibrationStatustextParser`, by the formats of its `sscanf`.
+/// Result of MAVSDK's parser, `CalibrationStatustextParser`, for one text; by the formats of its `sscanf`.
 #[derive(Clone, Debug, PartialEq)]
 enum Status {
     Started(String),
@@ -32,7 +32,7 @@ fn parse(text: &str) -> Option<Status> {
         return Some(Status::Progress(percent));
     }
     if let Some(started) = rest.strip_prefix("calibration started: ") {
-        // QGroundControl wants the version and one word, as MAVSDK does.
+        // QGroundControl expects the version and one word, as MAVSDK does.
         let words: Vec<_> = started.split(' ').collect();
         assert_eq!((words.len(), words[0]), (2, "2"), "{text}");
         return Some(Status::Started(words[1].into()));
@@ -130,8 +130,8 @@ fn instruction(text: &str) -> Status {
     Status::Instruction(text.into())
 }
 
-/// All four, one after the other, as a new vehicle is set up. What is found is that of the sensors, to a tenth of what
-/// an MPU-6000 of this kind has; it is sent to the station, and the vehicle can be armed then.
+/// Runs all four calibrations in a row, as for a new vehicle. The results match the sensors' true errors to a tenth of
+/// an MPU-6000's usual errors and are sent to the station. The vehicle can be armed afterwards.
 #[test]
 fn a_new_vehicle_is_set_up() {
     let mut served = Served::new(cheap, 11);
@@ -190,16 +190,17 @@ fn a_new_vehicle_is_set_up() {
         served.statuses(),
         [Status::Started("level".into()), Status::Progress(50), Status::Done("level".into())]
     );
-    // It stands level, and what is left is the accelerometer's misalignment: 2 % at most.
+    // The vehicle stands level; the accelerometer's misalignment remains, at most 2 %.
     assert!(served.vector("IMU_ATT").xy().norm() < 0.02);
 
-    // Aligned again, the heading that of the world.
+    // After a new alignment, the heading is the true one.
     served.run(15_000);
     served.ask(Command::Arm);
     assert_eq!(served.answers, [Answer::Accepted], "{:?}", served.texts);
 }
 
-/// Refused while armed, not armed while calibrated; cancelled; and one at a time.
+/// Calibration is refused while armed, and arming while calibrating. Calibrations can be cancelled, and only one runs
+/// at a time.
 #[test]
 fn calibration_and_flight_exclude_each_other() {
     let mut served = Served::new(cheap, 12);
@@ -213,7 +214,7 @@ fn calibration_and_flight_exclude_each_other() {
     served.ask(Command::Calibrate(CalibrationRequest::Cancel));
     assert_eq!(served.answers, [Answer::Accepted]);
     assert_eq!(served.statuses().last(), Some(&Status::Cancelled));
-    // MAVSDK sends it twice.
+    // MAVSDK sends the cancellation twice.
     let told = served.statuses();
     served.ask(Command::Calibrate(CalibrationRequest::Cancel));
     assert_eq!((served.answers.as_slice(), served.statuses()), ([Answer::Accepted].as_slice(), told));
@@ -232,7 +233,8 @@ fn calibration_and_flight_exclude_each_other() {
     assert!(served.parameters.is_empty());
 }
 
-/// A dead sensor, a vehicle that is turned, one that is not level, and a command of what there is not.
+/// Reasons of failures: a dead sensor, a vehicle that is tilted, missing magnetometer readings, and a calibration that
+/// does not exist.
 #[test]
 fn reasons_are_told() {
     let mut served = Served::new(cheap, 13);

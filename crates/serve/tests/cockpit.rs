@@ -1,4 +1,4 @@
-//! A page at a vehicle: what it sees, what it may do, and what it is refused.
+//! Tests of a page at a vehicle: the state it gets, its commands, and refusals.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_scenario::built_in;
@@ -30,7 +30,7 @@ impl Page {
         }
     }
 
-    /// Flies until the frame says so, for at most so many seconds.
+    /// Flies until `done` is true for the frame, at most `most_s`.
     fn fly_until(&mut self, most_s: f64, what: &str, done: impl Fn(&Value) -> bool) {
         let end_s = self.server.now_s() + most_s;
         while !done(&self.frame()) {
@@ -47,12 +47,12 @@ impl Page {
         self.cockpit.command(&mut self.server, &command.to_string())
     }
 
-    /// Gives a command that is not answered.
+    /// Sends a command that must have no answer.
     fn order(&mut self, command: &Value) {
         assert_eq!(self.command(command), PageReply::default(), "{command}");
     }
 
-    /// Returns the distance of the true position, or of a place, from `place_m` \[m\].
+    /// Returns the distance between two places \[m\].
     fn off_m(place: &Value, place_m: [f64; 3]) -> f64 {
         let off_m = (0..3).map(|axis| (place[axis].as_f64().unwrap() - place_m[axis]).powi(2));
         off_m.sum::<f64>().sqrt()
@@ -84,7 +84,8 @@ fn a_page_flies_a_vehicle() {
     }
 }
 
-/// What a plan says is uploaded, drawn where it was clicked but for what the estimate has moved since, and flown.
+/// A plan is uploaded, drawn within 0.1 m of where it was clicked, and flown. The estimate may move a little in
+/// between.
 #[test]
 fn a_plan_is_drawn_where_it_was_clicked() {
     let mut page = Page::of("outdoor");
@@ -122,7 +123,7 @@ fn parameters_are_set_by_name() {
     assert_eq!(values["values"]["MIS_TAKEOFF_ALT"], 4.5);
 }
 
-/// One line with the cause, and nothing is done.
+/// Bad commands get one line with the cause, and change nothing.
 #[test]
 fn nonsense_is_refused() {
     let mut page = Page::of("mocap");
@@ -159,7 +160,7 @@ fn nonsense_is_refused() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Whatever a page sends, the vehicle flies on, and what is shown is JSON.
+    /// Whatever a page sends, the vehicle flies on, and its frames are valid JSON.
     #[test]
     fn no_input_stops_it(text in ".{0,60}", lines in prop::collection::vec("[a-z]{1,9} [0-9a-z. -]{0,12}", 3)) {
         let mut page = Page::of("mocap");
@@ -173,13 +174,13 @@ proptest! {
     }
 }
 
-/// How grave a text is comes from the vehicle, or from its refusal: the page has no list of words.
+/// The severity of a text comes from the vehicle, or from its refusal; the page does not guess it from words.
 #[test]
 fn texts_say_how_grave_they_are() {
     let mut page = Page::of("mocap");
     page.fly_until(20.0, "ready", |frame| !frame["estimate"].is_null());
     page.fly(8.0);
-    // On the ground there is nothing to be returned from.
+    // A vehicle on the ground refuses to return.
     page.order(&json!({ "do": "return" }));
     page.fly(0.5);
     let refused = page.frame()["texts"].clone();

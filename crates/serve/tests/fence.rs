@@ -1,4 +1,4 @@
-//! Geofences in closed loop, uploaded as stations do: whatever is ordered, the vehicle stays inside.
+//! Geofences in closed loop, uploaded as stations do: the vehicle stays inside, whatever it is commanded.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc_guidance::FlightMode;
@@ -15,7 +15,7 @@ use std::f32::consts::TAU;
 
 const STATION: Address = Address { system: 255, component: 190 };
 
-/// SplitMix64.
+/// Random numbers by SplitMix64.
 struct Random(u64);
 
 impl Random {
@@ -35,7 +35,7 @@ impl Random {
     }
 }
 
-/// An area of the test's own: corners, or centre and radius, in the local frame.
+/// A fence area, computed independently of the firmware: corners, or centre and radius, in the local frame.
 #[derive(Clone, Debug)]
 enum Shape {
     Polygon(Vec<Vector2<f32>>),
@@ -52,7 +52,7 @@ impl Shape {
         Shape::Polygon((0..count).map(|place| corner(place, random.within(least, most))).collect())
     }
 
-    /// Distance to its boundary, positive inside \[m\].
+    /// Returns the distance to the boundary, positive inside \[m\].
     fn depth(&self, place: Vector2<f32>) -> f32 {
         match self {
             Shape::Circle(centre, radius) => radius - (place - centre).norm(),
@@ -92,7 +92,7 @@ struct Flown {
     estimate: Vector2<f32>,
     acks: Vec<MissionResult>,
     areas: Vec<(Shape, bool)>,
-    /// Least distance to a boundary, of the estimate and of the truth \[m\].
+    /// Least distance to a boundary so far, of the estimated and of the true position \[m\].
     least: [f32; 2],
 }
 
@@ -155,7 +155,7 @@ impl Flown {
         self.areas = areas;
     }
 
-    /// In hold, some metres above the ground.
+    /// Takes off and holds some metres above the ground.
     fn take_off(&mut self, rest_ms: u32) {
         self.run(rest_ms);
         self.command(Command::Arm);
@@ -164,7 +164,7 @@ impl Flown {
         self.run(6_000);
     }
 
-    /// Whatever stations, companions and pilots may ask for.
+    /// Gives a random command of a station, companion computer or pilot.
     fn ask_for_anything(&mut self, random: &mut Random) {
         let origin = EarthOrigin::new(EarthOrigin::SIMULATED).unwrap();
         let to = Vector3::new(random.within(-60.0, 60.0), random.within(-60.0, 60.0), random.within(3.0, 12.0));
@@ -213,7 +213,7 @@ impl Flown {
         }
     }
 
-    /// Sends a target or sticks 20 times per second, and selects the mode once a second.
+    /// Sends a target or sticks 20 times per second, and selects the mode once per second.
     fn stream(&mut self, target: ExternalTarget, mode: FlightMode, milliseconds: u32) {
         for time_ms in 0..milliseconds {
             if time_ms % 50 == 0 {
@@ -257,7 +257,7 @@ fn whatever_is_ordered_the_vehicle_stays_inside() {
         let [estimate, truth] = flown.least;
         holds += flown.lines.iter().filter(|line| line.contains("geofence")).count();
         println!("seed {seed}: {estimate:.2} m, in truth {truth:.2} m");
-        // The margin is for wind and for what the law does not follow; what is left of it is the estimate's error.
+        // The fence's margin covers wind and tracking errors. Beyond it, only the estimate's error can lead outside.
         assert!(estimate > 0.0 && truth > -2.0, "seed {seed}: {estimate} m, in truth {truth} m, {:#?}", flown.lines);
     }
     assert!(holds > 60, "{holds}");

@@ -1,4 +1,4 @@
-//! Parameters in a file: over restarts of the server and of a vehicle.
+//! Stored parameters survive restarts of the server and of a vehicle.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc_link::{
@@ -15,7 +15,7 @@ fn name(text: &str) -> ParameterName {
     std::array::from_fn(|i| text.as_bytes().get(i).copied().unwrap_or(0))
 }
 
-/// A file that there is not.
+/// Returns the path of a file that does not exist yet.
 fn fresh(test: &str) -> PathBuf {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{test}.store"));
     let _ = std::fs::remove_file(&path);
@@ -28,7 +28,7 @@ fn served(file: &Path) -> Server {
     Server::kept(&scenarios, 1, vec![keeper]).unwrap()
 }
 
-/// Sends a message and returns what is heard in a tenth of a second, and the lines.
+/// Sends a message; returns the messages and lines of the next tenth of a second.
 fn exchange(server: &mut Server, message: Uplink) -> (Vec<Downlink>, Vec<String>) {
     server.hear(0, 1, Sender::new(STATION).send(&message, &mut [0; FRAME_MAX]));
     let (mut messages, mut lines) = (Vec::new(), Vec::new());
@@ -58,7 +58,7 @@ fn get(server: &mut Server, text: &str) -> f32 {
     f32::from_le_bytes(bytes(server, text))
 }
 
-/// A whole number, which crosses the link as one.
+/// Returns an integer parameter, which MAVLink carries as an integer.
 fn whole(server: &mut Server, text: &str) -> i32 {
     i32::from_le_bytes(bytes(server, text))
 }
@@ -71,7 +71,7 @@ fn what_is_set_is_there_after_a_restart() {
     set(&mut server, "MIS_TAKEOFF_ALT", 4.0);
     set(&mut server, "RTL_RETURN_ALT", 20.0);
     set(&mut server, "RTL_RETURN_ALT", 22.0);
-    // Only one program at a time writes it.
+    // The file is locked: only one program at a time may write it.
     let scenario = built_in("outdoor").unwrap().read().unwrap();
     assert!(ParameterFile::open(&file, &scenario).err().unwrap().contains("in use"));
     drop(server);
@@ -83,7 +83,7 @@ fn what_is_set_is_there_after_a_restart() {
     assert_eq!(get(&mut served(&file), "MIS_TAKEOFF_ALT"), default);
 }
 
-/// A reboot powers the vehicle up again, with what was set, and answers before.
+/// A reboot is acknowledged first, and then restarts the vehicle with its stored parameters.
 #[test]
 fn a_reboot_restarts_the_vehicle() {
     let mut server = served(&fresh("reboot"));
@@ -92,11 +92,11 @@ fn a_reboot_restarts_the_vehicle() {
     assert!(messages.iter().any(|message| matches!(message, Downlink::Answer { command: 246, .. })));
     assert!(lines.iter().any(|line| line.ends_with("vehicle 1: restarted")), "{lines:?}");
     assert_eq!(get(&mut server, "MIS_TAKEOFF_ALT"), 4.0);
-    // Once, and not again and again.
+    // It restarts only once.
     let (_, lines) = exchange(&mut server, Uplink::Heartbeat);
     assert!(!lines.iter().any(|line| line.contains("restarted")), "{lines:?}");
 
-    // Without a file, it comes back as it was made.
+    // Without a file, the vehicle restarts with default parameters.
     let scenarios = fleet(&built_in("outdoor").unwrap().read().unwrap(), 1).unwrap();
     let mut server = Server::new(&scenarios, 1).unwrap();
     let default = get(&mut server, "MIS_TAKEOFF_ALT");
@@ -106,7 +106,7 @@ fn a_reboot_restarts_the_vehicle() {
     assert_eq!(get(&mut server, "MIS_TAKEOFF_ALT"), default);
 }
 
-/// The system id that the vehicle's heartbeats carry.
+/// Returns the system id of the vehicle's heartbeats.
 fn heartbeat_of(server: &mut Server, vehicle: usize) -> u8 {
     let mut decoder = Decoder::<Downlink>::new(STATION);
     let mut system = None;
@@ -123,8 +123,8 @@ fn heartbeat_of(server: &mut Server, vehicle: usize) -> u8 {
     system.unwrap()
 }
 
-/// A vehicle has another system id from the restart on after it was set, with a file and without; it counts up from the
-/// first one's. Two with the same id are told of.
+/// A new MAV_SYS_ID takes effect at the next restart, with a parameter file and without. Default ids count up from the
+/// first one. A shared id is reported.
 #[test]
 fn the_system_id_is_a_parameter() {
     let mut server = served(&fresh("system"));
@@ -136,7 +136,7 @@ fn the_system_id_is_a_parameter() {
     assert_eq!((heartbeat_of(&mut server, 0), server.systems()), (1, vec![1]));
     exchange(&mut server, Uplink::Command(Command::Reboot(Reboot::Program)));
     assert_eq!((heartbeat_of(&mut server, 0), server.systems()), (42, vec![42]));
-    // It answers to its new name, and is known by it.
+    // The vehicle answers to its new id, and commands know it by that id.
     assert_eq!(whole(&mut server, "MAV_SYS_ID"), 42);
     assert!(server.line("vehicle 1 status").lines.join("").contains("no vehicle 1"));
     assert!(server.line("vehicle 42 status").lines.join("").contains("ok"));
@@ -157,7 +157,7 @@ fn the_system_id_is_a_parameter() {
     assert_eq!(Server::kept(&scenarios, 5, keepers()).unwrap().systems(), [7, 6, 7]);
 }
 
-/// Returns how many messages come in a tenth of a second, and how many of them are signed with this key.
+/// Returns the number of messages in a tenth of a second, and how many of them are signed with this key.
 fn signed(server: &mut Server, key: &Key) -> [usize; 2] {
     let (mut count, mut genuine) = (0, 0);
     let mut decoder = Decoder::<Downlink>::new(STATION);
@@ -174,7 +174,7 @@ fn signed(server: &mut Server, key: &Key) -> [usize; 2] {
     [count, genuine]
 }
 
-/// Over a restart of the server, and of the vehicle, which a signed command asks for.
+/// The signing key survives a restart of the server, and a restart of the vehicle by a signed command.
 #[test]
 fn a_key_of_signatures_is_kept() {
     let (file, key) = (fresh("signing"), Key([7; 32]));

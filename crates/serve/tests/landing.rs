@@ -1,4 +1,4 @@
-//! Landings in weather: what the ground does to a vehicle is not taken for a failing law.
+//! Landings in weather: contact with the ground must not be mistaken for a failing law.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc_link::{Address, Command, Datum, FRAME_MAX, Height, Sender, Uplink};
@@ -6,12 +6,12 @@ use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
 
 const STATION: Address = Address { system: 255, component: 190 };
-/// Times of the orders \[ms\].
+/// Times of the commands \[ms\].
 const ARM: u64 = 6_000;
 const TAKE_OFF: u64 = 6_300;
 const LAND: u64 = 16_000;
 
-/// Takes off, hovers and lands; returns the lines.
+/// Takes off, hovers and lands; returns the logged lines.
 fn land(number: u8) -> Vec<String> {
     let outdoor = built_in("outdoor").unwrap().read().unwrap();
     let scenario = fleet(&outdoor, number + 1).unwrap().swap_remove(usize::from(number));
@@ -33,8 +33,8 @@ fn land(number: u8) -> Vec<String> {
     lines
 }
 
-/// Of these 13, three once ended under the fallback law: the vehicle stood on an edge, held there by what the law had
-/// learnt of the wind, until the monitor took its rocking for a limit cycle.
+/// Three of these 13 landings once ended under the fallback law. The vehicle stood on an edge, held there by the law's
+/// adaptation to the wind, until the monitor took its rocking for a limit cycle.
 #[test]
 fn landings_end_under_the_law_that_flew() {
     for number in 0..13 {

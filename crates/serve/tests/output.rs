@@ -1,4 +1,4 @@
-//! Lines that nobody reads.
+//! Output lines that nobody reads.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_scenario::built_in;
@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 
-/// A reader who begins to read when somebody says so.
+/// A reader that starts to read when it is told to.
 #[derive(Clone)]
 struct Reader {
     begin: Arc<Mutex<Option<Receiver<()>>>>,
@@ -40,7 +40,7 @@ impl Write for Reader {
     }
 }
 
-/// However many lines nobody reads, none of them waits; once somebody reads, what is missing is told.
+/// Writing never blocks, however many lines nobody reads. Once somebody reads, the number of lost lines is reported.
 #[test]
 fn lines_that_nobody_reads_are_counted() {
     let (reader, begin) = Reader::new();
@@ -55,13 +55,13 @@ fn lines_that_nobody_reads_are_counted() {
     let [.., lost, last] = lines.as_slice() else { unreachable!() };
     assert_eq!(last, "the last one");
     let lost: usize = lost.strip_prefix("lost ").unwrap().split(' ').next().unwrap().parse().unwrap();
-    // Whole lines, in order, and each is there or counted.
+    // All lines are complete and in order, and each is either there or counted as lost.
     let kept = &lines[..lines.len() - 2];
     assert!(kept.iter().enumerate().all(|(place, line)| line.starts_with(&format!("{place} of "))));
     assert!(lost > 0 && kept.len() + lost == all, "{} and {lost}", kept.len());
 }
 
-/// A flight goes on to its end while nobody reads what it says.
+/// A flight continues to its end while nobody reads its output.
 #[test]
 fn a_flight_waits_for_no_reader() {
     let mut server = Server::new(&fleet(&built_in("mocap").unwrap().read().unwrap(), 1).unwrap(), 1).unwrap();
@@ -86,7 +86,7 @@ fn a_flight_waits_for_no_reader() {
     assert!(!reader.lines().is_empty());
 }
 
-/// Lines that come without an end let time go on between them, and one without an end is refused, all of it.
+/// Time advances between lines of an endless input. A line that is too long is refused as a whole.
 #[test]
 fn endless_lines_do_not_stop_time() {
     let mut server = Server::new(&fleet(&built_in("mocap").unwrap().read().unwrap(), 1).unwrap(), 1).unwrap();
@@ -106,7 +106,7 @@ fn endless_lines_do_not_stop_time() {
     assert_eq!(said[..3], [too_long, too_long, "ok wind 3 0 0"]);
 }
 
-/// What `yes` writes.
+/// An endless input of "y" lines, like that of the program `yes`.
 struct Endless;
 
 impl io::Read for Endless {

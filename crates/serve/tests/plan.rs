@@ -1,14 +1,14 @@
-//! Plans of QGroundControl: what is read, what is refused, and a flight.
+//! Plans of QGroundControl: reading, refusals, and a flight.
 #![allow(clippy::indexing_slicing, clippy::type_complexity, clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc_scenario::built_in;
 use afbc_serve::{PlanEnd, QgcPlan, ServedVehicle, fleet, fly_plan};
 use serde_json::{Value, json};
 
-/// Where it is planned: not where served vehicles usually are.
+/// Home of the plan, other than the usual place of served vehicles.
 const HOME: [f64; 2] = [-33.9, 18.4];
 
-/// A place so many metres to the north and to the east of home.
+/// Returns the place at these distances north and east of home \[m\].
 fn at(north: f64, east: f64) -> [f64; 2] {
     [HOME[0] + north / 110_923.0, HOME[1] + east / 92_469.0]
 }
@@ -24,7 +24,7 @@ fn zeros() -> [Value; 4] {
     [json!(0), json!(0), json!(0), json!(null)]
 }
 
-/// A mission with a loop, a fence with an area to stay out of, and rally points.
+/// Returns a plan with a jump in the mission, an inclusion and an exclusion area, and a rally point.
 fn plan() -> Value {
     let square = [at(-60.0, -60.0), at(60.0, -60.0), at(60.0, 60.0), at(-60.0, 60.0)];
     json!({
@@ -78,14 +78,14 @@ fn a_plan_is_read() {
     let waypoint = plan.mission[2];
     assert_eq!((waypoint.frame, waypoint.x, waypoint.z), (3, (at(25.0, 0.0)[0] * 1e7).round() as i32, 8.0));
     assert!(waypoint.parameters[3].is_nan());
-    // The item called 3 is the third.
+    // The item with `doJumpId` 3 has the index 2.
     assert_eq!(plan.mission[5].parameters, [2.0, 1.0, 0.0, 0.0]);
     let fence: Vec<_> = plan.fence.iter().map(|item| (item.command, item.parameters[0])).collect();
     assert_eq!(fence, [(5001, 4.0), (5001, 4.0), (5001, 4.0), (5001, 4.0), (5004, 10.0)]);
     assert_eq!((plan.rally[0].command, plan.rally[0].frame, plan.rally[0].z), (5100, 3, 20.0));
 }
 
-/// Each error names the file, the item, what is wrong and what helps.
+/// Each error names the file, the item, the problem and the remedy.
 #[test]
 fn what_is_wrong_is_named() {
     let changed = |change: &dyn Fn(&mut Value)| {
@@ -148,14 +148,14 @@ fn what_is_wrong_is_named() {
     assert!(torn.starts_with("my.plan: no JSON: ") && torn.ends_with("; save the plan again"), "{torn}");
 }
 
-/// Every part that has a version is of one that is known, and has no name that is not: whatever is put into an object
-/// is read, known to fly nothing, or refused by its name.
+/// Unknown versions and unknown names are refused in every part of a plan: anything added to an object is read, known
+/// to have no effect on the flight, or refused by its name.
 #[test]
 fn what_is_not_understood_is_refused_by_name() {
     fn objects(value: &Value, path: &str, found: &mut Vec<String>) {
         match value {
             Value::Object(object) => {
-                // Of complex items, the list of those that they were worked out to is flown.
+                // Of a complex item, only the list of computed simple items is flown.
                 let is_described = path.ends_with("/items/6") || path.contains("TransectStyle");
                 if !is_described || path.ends_with("/Items/0") {
                     found.push(path.into());
@@ -188,14 +188,14 @@ fn what_is_not_understood_is_refused_by_name() {
         }
     }
     assert_eq!(versions, 6);
-    // A fence of old, which has other names.
+    // A fence in an old format, with other names.
     let mut old = whole.clone();
     old["geoFence"] = json!({ "version": 1, "polygon": [at(-60.0, -60.0), at(60.0, -60.0), at(60.0, 60.0)] });
     let cure = "save the plan again in a QGroundControl of today";
     assert_eq!(read(&old).unwrap_err(), format!("my.plan: geoFence.version: 1 is not known, 2 is; {cure}"));
 }
 
-/// From take-off to the landing at home, with the loop flown twice, inside the fence.
+/// Flies from take-off to the landing at home inside the fence, with the loop flown twice.
 #[test]
 fn a_plan_is_flown() {
     let (end, lines) = fly(&read(&plan()).unwrap());
@@ -204,7 +204,7 @@ fn a_plan_is_flown() {
     assert!(end.disarmed, "{lines:#?}");
 }
 
-/// What the vehicle refuses is named, with the item.
+/// If the vehicle refuses a plan, the error names the item.
 #[test]
 fn what_the_vehicle_refuses_is_named() {
     let refused = |change: &dyn Fn(&mut Value)| {
@@ -239,6 +239,6 @@ fn a_return_lands_at_the_nearest_rally_point() {
     assert!(vehicle.move_origin(HOME, 30.0));
     let end = fly_plan(&mut vehicle, &plan, 600.0, &mut |_| ()).unwrap();
     let place = vehicle.world().plant().motion().position_m;
-    // x is north, y west; the receiver is off by a metre or two.
+    // x is north, y is west. The GNSS receiver is off by a metre or two.
     assert!(end.disarmed && (place.x - 10.0).hypot(place.y + 20.0) < 3.0, "{place}");
 }

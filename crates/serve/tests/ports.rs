@@ -1,4 +1,4 @@
-//! The ports, on loopback at free ports. Whatever is waited for comes for certain, however slow the machine is.
+//! Tests of the ports, on loopback at free ports. No test depends on the speed of the machine.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
@@ -25,7 +25,7 @@ fn socket() -> UdpSocket {
     socket
 }
 
-/// Runs `server` for so many milliseconds at the time `now`.
+/// Runs `server` for this many milliseconds; the ports' clock stands at `now`.
 fn steps(server: &mut Server, ports: &mut Ports, milliseconds: u32, now: Duration) -> Vec<String> {
     let mut reported = Vec::new();
     for _ in 0..milliseconds {
@@ -35,7 +35,7 @@ fn steps(server: &mut Server, ports: &mut Ports, milliseconds: u32, now: Duratio
     reported
 }
 
-/// Returns the datagrams that wait.
+/// Returns the datagrams that have arrived.
 fn datagrams(socket: &UdpSocket) -> Vec<Vec<u8>> {
     let (mut all, mut buffer) = (Vec::new(), [0; 65_536]);
     while let Ok((length, _)) = socket.recv_from(&mut buffer) {
@@ -47,7 +47,7 @@ fn datagrams(socket: &UdpSocket) -> Vec<Vec<u8>> {
 fn messages(datagrams: &[Vec<u8>]) -> Vec<Downlink> {
     let mut messages = Vec::new();
     for datagram in datagrams {
-        // Each holds whole frames.
+        // Each datagram holds complete frames.
         let mut decoder = Decoder::<Downlink>::new(STATION);
         let before = messages.len();
         decoder.feed(datagram, |_, message| messages.push(message));
@@ -64,7 +64,8 @@ fn answers(messages: &[Downlink]) -> usize {
     messages.iter().filter(|message| matches!(message, Downlink::Answer { .. })).count()
 }
 
-/// Heartbeats unasked, everything to whoever has sent something, and nothing any more after its silence.
+/// Stations get heartbeats without asking. A client that sends a frame gets everything, until it has been silent too
+/// long.
 #[test]
 fn stations_get_heartbeats_and_whoever_asks_gets_everything() {
     let (station, companion, other) = (socket(), socket(), socket());
@@ -86,7 +87,7 @@ fn stations_get_heartbeats_and_whoever_asks_gets_everything() {
     let reported = steps(&mut server, &mut ports, 200, Duration::from_secs(3));
     assert_eq!(reported.len(), 2, "{reported:?}");
     let (at_station, at_other) = (messages(&datagrams(&station)), messages(&datagrams(&other)));
-    // Every frame goes to all peers; the answers are for both.
+    // Every frame goes to all peers, so both get both answers.
     assert_eq!(at_station, at_other);
     assert!(at_other.len() > 10 && answers(&at_other) == 2, "{at_other:?}");
     assert!(datagrams(&companion).len() <= 1);
@@ -113,7 +114,7 @@ fn vehicles_are_at_counted_ports_and_hear_their_own() {
     assert_eq!(answers(&messages(&datagrams(&second))), 2);
 }
 
-/// Streams in pieces, one that breaks off within a frame, and one that comes after it.
+/// TCP clients send frames in pieces; one of them breaks off within a frame.
 #[test]
 fn tcp_streams_are_peers_too() {
     let (mut server, mut ports) = (served(1), Ports::open(&free(), 1).unwrap());
@@ -147,7 +148,7 @@ fn tcp_streams_are_peers_too() {
     assert_eq!(decoder.counters().skipped_bytes, 0);
 }
 
-/// A peer that does not read is let go, and stops nobody.
+/// A client that does not read is disconnected, and blocks nobody.
 #[test]
 fn a_stream_that_is_not_read_is_closed() {
     let (mut server, mut ports) = (served(1), Ports::open(&free(), 1).unwrap());
@@ -172,7 +173,7 @@ fn a_port_that_is_taken_is_named_with_the_cure() {
     assert_eq!(refused, "ports from 65535 on are not enough for 2 vehicles; begin lower");
 }
 
-/// What `sitl serve --lockstep` does with these lines: time goes on by `step` alone, and the end of the lines ends it.
+/// Runs these lines like `sitl serve --lockstep`: only `step` advances time, and the end of the input ends the run.
 #[test]
 fn in_lockstep_lines_drive_the_clock() {
     let session = |text: &'static str| {

@@ -1,4 +1,4 @@
-//! When stations take the vehicle for ready.
+//! The time at which stations consider the vehicle ready.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc_link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Sender, Telemetry, Uplink};
@@ -9,8 +9,8 @@ const STATION: Address = Address { system: 255, component: 190 };
 const ARM: u16 = Command::Arm.id();
 const HOME_POSITION: u32 = 242;
 
-/// Clients arm as soon as position and home are told, as MAVSDK's examples do; they look at nothing else. The vehicle
-/// arms then.
+/// Like MAVSDK's examples, a client arms as soon as position and home are reported, and checks nothing else. The
+/// vehicle must accept.
 #[test]
 fn whoever_arms_once_home_is_known_is_not_refused() {
     for (scenario, seed) in [("outdoor", 1), ("outdoor", 2), ("outdoor", 3), ("outdoor", 4)] {
@@ -21,7 +21,7 @@ fn whoever_arms_once_home_is_known_is_not_refused() {
         let say = |server: &mut Server, command| {
             server.hear(0, 1, Sender::new(STATION).send(&Uplink::Command(command), &mut [0; FRAME_MAX]));
         };
-        // As often as possible: no later message hides that it is too early.
+        // Request HOME_POSITION as often as possible, so that the client arms at the earliest time.
         say(&mut server, Command::SetInterval { message: HOME_POSITION, interval_us: 1_000 });
         let (mut asked, mut answer) = (false, None);
         for _ in 0..20_000 {

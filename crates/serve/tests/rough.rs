@@ -1,4 +1,4 @@
-//! The whole vehicle with sensors that fail it: a tracker whose frame jumps, GNSS that comes back, rotors that shake.
+//! Whole flights with bad sensors: a tracker whose frame jumps, GNSS that comes back, vibrating rotors.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc_link::{Address, Command, Datum, FRAME_MAX, Height, Sender, Uplink};
@@ -7,14 +7,14 @@ use afbc_serve::{Server, fleet};
 use nalgebra::Vector3;
 
 const STATION: Address = Address { system: 255, component: 190 };
-/// Times of the orders \[ms\], and from which on the vehicle holds.
+/// Times of the commands, and time from which the vehicle holds \[ms\].
 const ARM: u64 = 6_000;
 const TAKE_OFF: u64 = 6_300;
 const HOLDS: u64 = 16_000;
-/// Farthest that the vehicle may move by what it is told \[m\].
+/// Farthest distance that a jump may move the vehicle \[m\].
 const MOVES_M: f64 = 0.5;
 
-/// A vehicle that takes off, and what it says.
+/// A vehicle that takes off, and its logged lines.
 struct Session {
     server: Server,
     sender: Sender,
@@ -41,7 +41,7 @@ impl Session {
         assert_eq!(self.server.line(line).lines, [format!("ok {line}")]);
     }
 
-    /// Flies up to this time; returns the farthest from where it was \[m\].
+    /// Flies until this time; returns the largest distance from the start of this call \[m\].
     fn run(&mut self, until_ms: u64) -> f64 {
         let (from_m, mut off_m) = (self.true_m(), 0.0_f64);
         while self.ms < until_ms {
@@ -70,7 +70,7 @@ impl Session {
     }
 }
 
-/// A jump that the estimate follows, of any size, does not move a vehicle in hold.
+/// A jump of the tracker's frame, of any size, does not move a vehicle in hold.
 #[test]
 fn a_frame_that_jumps_does_not_move_the_vehicle() {
     for (seed, length_m) in (1..).zip([0.3, 1.0, 3.0, 10.0, 30.0, 100.0]) {
@@ -85,7 +85,7 @@ fn a_frame_that_jumps_does_not_move_the_vehicle() {
     }
 }
 
-/// GNSS that is away for 5.5 s, once and again; then orders are taken, and nothing lands.
+/// GNSS fails twice for 5.5 s. Afterwards the vehicle accepts commands, and does not land.
 #[test]
 fn gnss_that_comes_back_gives_back_what_was_flown() {
     let mut session = Session::named("outdoor", 3);
@@ -95,14 +95,15 @@ fn gnss_that_comes_back_gives_back_what_was_flown() {
     assert!(session.says("hold: the state is back"), "{:#?}", session.lines);
     session.line("fault gnss lost 5.5");
     session.run(HOLDS + 9_000 + 5_800);
-    // Before the second that the descent goes on is over.
+    // GNSS is back, but the descent has not ended yet: it continues for another second.
     session.say(Command::Return);
     session.run(HOLDS + 9_000 + 7_000);
     assert!(session.says("return: ordered") && !session.says("refused"), "{:#?}", session.lines);
     assert!(!session.says("AFBC off"), "{:#?}", session.lines);
 }
 
-/// Rotors that shake the inertial sensor, by how much and whether a text says so; AFBC flies on, landing included.
+/// The rotors shake the IMU. The cases give rates, accelerations and whether a text warns of vibration. AFBC flies on,
+/// up to and including the landing.
 #[test]
 fn vibration_does_not_hand_afbc_over() {
     let cases = [(0.02, 1.0, false), (0.1, 1.5, false), (0.2, 1.5, false), (0.1, 4.0, true), (0.2, 5.0, true)];

@@ -1,4 +1,4 @@
-//! The server in lockstep, without clock and sockets.
+//! Tests of the server in lockstep, without clock and sockets.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
@@ -6,7 +6,7 @@ use afbc_plant::InstrumentSuite;
 use afbc_scenario::{Scenario, built_in};
 use afbc_serve::{Server, Then, fleet};
 
-/// A command that no vehicle knows, which is answered all the same.
+/// A command that no vehicle knows; it is answered, too.
 const UNKNOWN: u16 = 31_999;
 const STATION: Address = Address { system: 255, component: 190 };
 const COMPANION: Address = Address { system: 245, component: 191 };
@@ -19,7 +19,7 @@ fn served(name: &str, vehicles: u8) -> Server {
     Server::new(&fleet(&scenario(name), vehicles).unwrap(), 1).unwrap()
 }
 
-/// Everything that was said in so many milliseconds: bytes of each vehicle, and lines.
+/// Output of some milliseconds: bytes of each vehicle, and lines.
 #[derive(Debug, Default, PartialEq)]
 struct Said {
     bytes: Vec<Vec<u8>>,
@@ -35,7 +35,7 @@ fn run(server: &mut Server, milliseconds: u32) -> Said {
     said
 }
 
-/// Returns the messages in `bytes`, and from which system each is.
+/// Returns the messages in `bytes`, each with its sender.
 fn read(bytes: &[u8]) -> Vec<(Address, Downlink)> {
     let (mut messages, mut decoder) = (Vec::new(), Decoder::<Downlink>::new(STATION));
     decoder.feed(bytes, |from, message| messages.push((from, message)));
@@ -64,7 +64,7 @@ fn status(server: &mut Server) -> String {
     server.line("status").lines.concat()
 }
 
-/// It neither sinks, tips nor takes off, and its estimate is there.
+/// The vehicle neither sinks, tips over nor takes off, and it has an estimate.
 #[test]
 fn a_vehicle_stands_where_it_was_put() {
     for name in ["outdoor", "mocap"] {
@@ -73,7 +73,7 @@ fn a_vehicle_stands_where_it_was_put() {
         for (place, vehicle) in server.vehicles().iter().enumerate() {
             let motion = vehicle.world().plant().motion();
             let start = fleet(&scenario(name), 3).unwrap()[place].initial;
-            // The breeze lets it creep, by the model of friction.
+            // The breeze makes it creep slowly, because of the friction model.
             let off_m = (motion.position_m - start.position_m).norm();
             assert!(off_m < 0.2, "{name} {place}: {off_m} m");
             assert!(motion.attitude_rad.xy().norm() < 0.02 && motion.position_m.z > 0.05, "{name}: {motion:?}");
@@ -94,7 +94,7 @@ fn each_vehicle_has_its_own_system_id_and_heartbeat() {
     assert_ne!(said.bytes[0].len(), 0);
 }
 
-/// The same lines and bytes at the same milliseconds: the same bytes and lines. Another seed: others.
+/// The same lines and bytes at the same milliseconds give the same output; another seed gives another output.
 #[test]
 fn the_same_session_twice_is_the_same_to_the_bit() {
     let session = |seed: u64| {
@@ -117,7 +117,7 @@ fn the_same_session_twice_is_the_same_to_the_bit() {
     assert_ne!(session(1), session(2));
 }
 
-/// A frame in pieces, between the pieces of others' frames, arrives all the same; and each gets its own answer.
+/// Frames in pieces arrive even if pieces of other peers' frames come in between, and each peer gets its own answer.
 #[test]
 fn the_streams_of_peers_do_not_mix() {
     let mut server = served("outdoor", 1);
@@ -128,14 +128,14 @@ fn the_streams_of_peers_do_not_mix() {
     for place in 0..here.len().max(there.len()) {
         server.hear(0, 1, here.get(place..=place).unwrap_or_default());
         server.hear(0, 2, there.get(place..=place).unwrap_or_default());
-        // A third one sends the beginning of a frame that never ends.
+        // A third peer sends the beginning of a frame that never ends.
         server.hear(0, 3, &[0xfd]);
         heard.extend(answers(&run(&mut server, 1).bytes[0]));
     }
     heard.extend(answers(&run(&mut server, 50).bytes[0]));
     heard.sort_unstable();
     assert_eq!(heard, [(COMPANION.system, UNKNOWN), (STATION.system, UNKNOWN)]);
-    // One that comes back begins anew.
+    // A peer that comes back starts with a new frame.
     server.hear(0, 1, &here[..20]);
     server.forget(0, 1);
     server.hear(0, 1, &here);
@@ -181,7 +181,7 @@ fn faults_and_weather_change_what_flies_and_are_reported() {
     assert!((wind(&server, 1) - wind(&server, 0)).norm() > 0.0, "turbulence is the scenario's again");
 }
 
-/// A strong push moves a vehicle on the ground, one that is over does not.
+/// A push lifts a vehicle off the ground, and ends after its duration.
 #[test]
 fn a_push_pushes_and_ends() {
     let mut server = served("mocap", 2);
@@ -189,7 +189,7 @@ fn a_push_pushes_and_ends() {
     ok(&mut server, "vehicle 2 push 0 0 10 0.5");
     run(&mut server, 500);
     let speed = |server: &Server, place: usize| server.vehicles()[place].world().plant().motion().velocity_m_s.z;
-    // 10 N on 0.486 kg for half a second, less its weight.
+    // 10 N act on 0.486 kg for half a second, minus its weight.
     assert!((speed(&server, 1) - (10.0 / 0.486 - 9.81) * 0.5).abs() < 0.5, "{}", speed(&server, 1));
     assert!(speed(&server, 0).abs() < 0.01);
     run(&mut server, 100);
@@ -320,7 +320,7 @@ fn what_the_firmware_cannot_fly_is_refused() {
     assert!(fleet(&heavy, 1).unwrap_err().to_string().contains("another vehicle"));
 }
 
-/// Whoever sends line after line holds no more than a little memory, and no step costs more and more.
+/// Sending line after line uses bounded memory, and does not make steps slower and slower.
 #[test]
 fn what_lines_leave_behind_is_bounded() {
     let mut server = served("outdoor", 1);
@@ -330,12 +330,12 @@ fn what_lines_leave_behind_is_bounded() {
         assert!((100..=256).contains(&taken), "{line}: {taken}");
         let refused = server.line(line).lines.concat();
         assert_eq!(refused, "error 256 of its kind act already; clear ends them", "{line}");
-        // The others go on, and the cure cures.
+        // Other changes are still accepted, and the suggested remedy works.
         ok(&mut server, "battery 0.9");
         ok(&mut server, "clear");
         ok(&mut server, line);
     }
-    // What is over makes room.
+    // Changes that are over make room for new ones.
     ok(&mut server, "clear");
     for _ in 0..2000 {
         ok(&mut server, "fault gnss lost 0.001");

@@ -1,4 +1,4 @@
-//! Strangers at the ports: who is heard, who is sent something, who has to go, and what they cost a step.
+//! Unknown clients at the ports: who is heard, who gets telemetry, who is disconnected, and the cost per step.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_link::{
@@ -14,7 +14,7 @@ use std::time::Duration;
 const STATION: Address = Address { system: 255, component: 190 };
 const KEY: Key = Key([7; 32]);
 const SIGNED_10US: u64 = 37_000_000_000_000;
-/// Most peers by one protocol, and bytes taken and written in a step, as docs/serve.md says.
+/// Most peers per protocol, and most bytes read and written in a step, as docs/serve.md says.
 const PEERS: usize = 32;
 const TAKEN: usize = 16_384;
 const WRITTEN: usize = 4096;
@@ -40,7 +40,7 @@ impl Served {
         Served { server, ports, udp, tcp: tcp.unwrap(), now: Duration::ZERO, lines: Vec::new() }
     }
 
-    /// Frames need a signature from now on.
+    /// Starts a server whose vehicle has a signing key, so that frames need a signature.
     fn with_key() -> Self {
         let mut served = Self::new();
         served.steps(10);
@@ -61,7 +61,7 @@ impl Served {
         }
     }
 
-    /// Runs until this has been reported so often.
+    /// Runs until `count` lines end with `what`.
     fn steps_until(&mut self, what: &str, count: usize) {
         for _ in 0..60_000 {
             if self.reported(what) >= count {
@@ -102,7 +102,7 @@ fn beat() -> Vec<u8> {
     frame(&Uplink::Heartbeat)
 }
 
-/// A heartbeat that is signed with the key, at so many 10 us after it was set.
+/// Returns a heartbeat signed with the key, with a time stamp this many 10 us after the key was set.
 fn signed_beat(from: Address, later_10us: u64) -> Vec<u8> {
     let stamp = Stamp { link: 3, time_10us: SIGNED_10US + later_10us };
     Sender::new(from).send_signed(&Uplink::Heartbeat, Some((&KEY, stamp)), &mut [0; SIGNED_FRAME_MAX]).to_vec()
@@ -137,7 +137,7 @@ fn datagrams(socket: &UdpSocket) -> Vec<u8> {
     all
 }
 
-/// Returns how many messages are in `bytes`, and how many of them are heartbeats.
+/// Returns the number of messages in `bytes`, and how many of them are heartbeats.
 fn messages(bytes: &[u8]) -> [usize; 2] {
     let (mut decoder, mut counts) = (Decoder::<Downlink>::new(STATION), [0; 2]);
     decoder.feed_accepted(
@@ -151,7 +151,7 @@ fn messages(bytes: &[u8]) -> [usize; 2] {
     counts
 }
 
-/// A browser that is made to send frames sends the head of a request before them; so do others.
+/// A browser that is tricked into sending frames sends an HTTP header first; other protocols begin differently, too.
 #[test]
 fn a_stream_that_begins_as_another_protocol_is_dropped() {
     let commands = [frame(&Uplink::Heartbeat), frame(&Uplink::Command(Command::Arm))].concat();
@@ -175,13 +175,13 @@ fn a_stream_that_begins_as_another_protocol_is_dropped() {
         served.steps(1000);
         assert!(!served.is_armed() && served.reported("gone") == 1, "{head:?}: {:?}", served.lines);
         assert!(served.lines.iter().all(|line| !line.contains("arm")), "{head:?}: {:?}", served.lines);
-        // By UDP likewise.
+        // The same by UDP.
         let socket = sockets(1).remove(0);
         socket.send_to(&[head, &commands].concat(), served.udp).unwrap();
         served.steps(1000);
         assert!(!served.is_armed() && served.reported("connected") == 1 && datagrams(&socket).is_empty());
     }
-    // MAVLink is heard, in pieces too, and after a first frame of MAVLink 1.
+    // MAVLink is accepted, also in pieces, and also after a first frame of MAVLink 1.
     for first in [&[][..], &[0xFE, 9, 0, 255, 190, 0, 0, 0, 0, 0, 6, 8, 0, 4, 3, 1, 1]] {
         let mut served = Served::new();
         served.steps(10_000);
@@ -195,7 +195,7 @@ fn a_stream_that_begins_as_another_protocol_is_dropped() {
     }
 }
 
-/// Single bytes, noise and pieces of frames make nobody a peer, however many send them.
+/// Single bytes, noise and incomplete frames make no client a peer, however many send them.
 #[test]
 fn only_a_frame_makes_a_peer() {
     let mut served = Served::new();
@@ -218,7 +218,8 @@ fn only_a_frame_makes_a_peer() {
     assert!(messages(&datagrams(&station))[0] > 10 && served.reported("connected") == 1, "{:?}", served.lines);
 }
 
-/// Of too many peers the one goes that has been silent for longest, whatever came of it that was no frame.
+/// If there are too many peers, the one that has been silent for longest goes; bytes that are no valid frame do not
+/// count.
 #[test]
 fn the_longest_silent_peer_goes_first() {
     let mut served = Served::new();
@@ -227,7 +228,7 @@ fn the_longest_silent_peer_goes_first() {
         peer.send_to(&beat(), served.udp).unwrap();
         served.steps(5);
     }
-    // The first one goes on, the second one sends what is no frame.
+    // The first peer sends a frame, the second one only noise.
     peers[0].send_to(&beat(), served.udp).unwrap();
     peers[1].send_to(b"here I am", served.udp).unwrap();
     served.steps(5);
@@ -242,7 +243,7 @@ fn the_longest_silent_peer_goes_first() {
     assert!(messages(&datagrams(&peers[0]))[0] > 10);
 }
 
-/// With a key, whoever does not sign is no peer, gets nothing, and keeps nobody out.
+/// With a key, a client that does not sign is no peer, gets nothing, and locks nobody out.
 #[test]
 fn with_a_key_only_an_accepted_frame_makes_a_peer() {
     let mut served = Served::with_key();
@@ -263,13 +264,13 @@ fn with_a_key_only_an_accepted_frame_makes_a_peer() {
     holder.send_to(&signed_beat(STATION, 100), served.udp).unwrap();
     served.steps(1500);
     assert!(messages(&datagrams(&holder))[0] > 10 && served.reported("connected") == 1, "{:?}", served.lines);
-    // Replayed by others, it is not accepted once more.
+    // If another client replays the frame, it is not accepted again.
     strangers[0].send_to(&signed_beat(STATION, 100), served.udp).unwrap();
     served.steps(1500);
     assert!(datagrams(&strangers[0]).is_empty());
 }
 
-/// Whoever was a peer before there was a key, and does not sign, is one for a few seconds.
+/// A client that was a peer before the key was set, and does not sign, is dropped after a few seconds.
 #[test]
 fn a_key_ends_peers_who_do_not_sign() {
     let mut served = Served::new();
@@ -288,7 +289,7 @@ fn a_key_ends_peers_who_do_not_sign() {
     assert!(datagrams(&other).is_empty() && messages(&datagrams(&holder))[0] > 10);
 }
 
-/// Streams that say nothing hold no place against one that says something.
+/// Silent connections make way for clients that send frames.
 #[test]
 fn idle_streams_keep_nobody_out() {
     for with_key in [false, true] {
@@ -301,10 +302,10 @@ fn idle_streams_keep_nobody_out() {
         assert_eq!(open, PEERS - 1, "{:?}", served.lines);
         assert!(read(&station).is_some_and(|bytes| messages(&bytes)[0] > 10), "{:?}", served.lines);
         served.steps(3000);
-        // Without a key everyone is sent everything; with one, whoever has not signed gets heartbeats alone.
+        // Without a key, everyone gets everything. With a key, clients that have not signed get heartbeats only.
         let got = idle.iter().rev().find_map(read).map(|bytes| messages(&bytes)).unwrap();
         assert!(got[1] > 0 && (got[0] == got[1]) == with_key, "{got:?}");
-        // And a second holder finds a place.
+        // A second client with the key finds a place.
         let mut second = served.connect();
         let other = Address { system: 254, component: 190 };
         second.write_all(&if with_key { signed_beat(other, 100) } else { beat() }).unwrap();
@@ -313,21 +314,22 @@ fn idle_streams_keep_nobody_out() {
     }
 }
 
-/// A reader who resumes gets what waited in parts: what one step writes is bounded, and what it does not write waits.
+/// A client that starts to read again gets the waiting bytes in parts: each step writes a bounded number, and the rest
+/// waits.
 #[test]
 fn a_reader_who_resumes_gets_a_bounded_part_in_each_step() {
     let mut served = Served::new();
     let mut stream = served.connect();
     stream.write_all(&beat()).unwrap();
     served.steps(10);
-    // Until the system takes no more, and a good deal waits here.
+    // Send until the system accepts no more and many bytes wait in the server.
     let bytes = beat().repeat(WRITTEN / beat().len());
     let (mut sent, mut got) = (0, read(&stream).unwrap().len());
     for _ in 0..70 {
         served.ports.send(0, &bytes.repeat(4));
         sent += 4 * bytes.len();
     }
-    // Everything that is in the system's hands is read between two steps.
+    // Read everything that the system holds, without any step in between.
     let mut idle = 0;
     while idle < 100 {
         let part = read(&stream).unwrap().len();
@@ -342,7 +344,7 @@ fn a_reader_who_resumes_gets_a_bounded_part_in_each_step() {
     assert!(part > 5 * WRITTEN && part <= 10 * WRITTEN, "{part}");
 }
 
-/// What many send at once is taken in parts: no step takes much of it.
+/// Bytes that many clients send at once are read in parts, so that no step reads many of them.
 #[test]
 fn a_flood_is_taken_in_parts() {
     let mut served = Served::new();

@@ -1,10 +1,10 @@
-//! Missions as text, `QGC WPL 110`: read as the same mission of a plan is, or refused by line.
+//! Missions in the text format `QGC WPL 110`: read like the same mission in a plan, or refused with the line's number.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc_serve::{QgcPlan, is_waypoint_file};
 use serde_json::{Value, json};
 
-/// Frame, command, parameters, place, height, whether it goes on.
+/// An item: frame, command, parameters, place, height, autocontinue.
 type Item = (u8, u16, [f64; 4], [f64; 2], f64, bool);
 
 const HOME: ([f64; 2], f64) = ([-33.9, 18.4], 30.0);
@@ -23,13 +23,13 @@ fn line(number: usize, (frame, command, [a, b, c, d], [x, y], z, goes_on): Item,
     [head, numbers, u8::from(goes_on).to_string()].join(between)
 }
 
-/// Writes the mission: with home first in version 110.
+/// Returns the mission as text; version 110 begins with the home position.
 fn text(version: u16, between: &str, end: &str) -> String {
     let (place, height) = HOME;
     let home = [(0, 16, [0.0; 4], place, height, true)];
     let mut items = ITEMS;
     if version == 110 {
-        // Jumps name lines.
+        // Jumps refer to line numbers.
         items[4].2[0] += 1.0;
     }
     let all = home.iter().filter(|_| version == 110).chain(&items);
@@ -37,10 +37,10 @@ fn text(version: u16, between: &str, end: &str) -> String {
     [format!("QGC WPL {version}{end}")].into_iter().chain(lines).collect()
 }
 
-/// The same mission as a plan.
+/// Returns the same mission as a QGroundControl plan.
 fn plan() -> Value {
     let item = |(number, (frame, command, [a, b, c, d], [x, y], z, goes_on)): (usize, Item)| {
-        // A plan's jumps name `doJumpId`.
+        // A plan's jumps refer to `doJumpId`.
         let a = if command == 177 { a + 1.0 } else { a };
         json!({
             "type": "SimpleItem", "autoContinue": goes_on, "doJumpId": number + 1, "command": command, "frame": frame,
@@ -72,12 +72,12 @@ fn a_mission_is_read_as_its_plan_is() {
         assert_eq!(read(&text).unwrap(), expected);
         assert_eq!(read(&format!("\u{feff}{text}")).unwrap(), expected);
     }
-    // Without a home in the file, or with one that nobody knew.
+    // A file without a home position, and one with an unknown home position (zeros).
     let no_home = QgcPlan { home: None, ..expected };
     assert_eq!(read(&text(120, "\t", "\n")).unwrap(), no_home);
     let unknown = text(110, " ", "\n").replacen(" -33.9 18.4 30 ", " 0 0 0 ", 1);
     assert_eq!(read(&unknown).unwrap(), no_home);
-    // The first line of 110 is an item if it is no waypoint.
+    // In version 110 the first line is an item if it is not a waypoint.
     assert_eq!(read(&text(120, "\t", "\n").replacen("120", "110", 1)).unwrap(), no_home);
 }
 
@@ -112,7 +112,7 @@ fn what_cannot_be_read_is_refused_by_line() {
     assert!(!is_waypoint_file(b"name = \"QGC WPL 110\"") && !is_waypoint_file(b""));
 }
 
-/// Whatever is in a file.
+/// Damaged files never cause a panic.
 #[test]
 fn no_file_panics() {
     let good = text(110, "\t", "\n").into_bytes();

@@ -1,4 +1,4 @@
-//! The port in front of a flying server: who gets in, and what hostile clients cost.
+//! The web port of a flying server: who may connect, and the cost of hostile clients.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
 use afbc_plant::EffectsState;
@@ -19,7 +19,7 @@ struct Flight {
     door: WebDoor,
     began: Instant,
     lines: Vec<String>,
-    /// The longest turn of the door.
+    /// Longest duration of one call of the door.
     longest: Duration,
 }
 
@@ -33,7 +33,7 @@ impl Flight {
         Flight { server, door, began: Instant::now(), lines: Vec::new(), longest: Duration::ZERO }
     }
 
-    /// Flies for so many milliseconds of real time.
+    /// Flies for this many milliseconds of real time.
     fn fly(&mut self, milliseconds: u64) {
         let end = Instant::now() + Duration::from_millis(milliseconds);
         while Instant::now() < end {
@@ -50,7 +50,7 @@ impl Flight {
         self.server.vehicles()[0].world().plant().telemetry().unwrap()
     }
 
-    /// Flies until `done`, for at most half a minute.
+    /// Flies until `done` is true, at most half a minute.
     fn fly_until(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
         let begun = Instant::now();
         while !done(self) {
@@ -65,7 +65,7 @@ impl Flight {
         stream
     }
 
-    /// Sends a request and returns the whole answer, while the flight goes on.
+    /// Sends a request and returns the whole answer, while the flight continues.
     fn ask(&mut self, request: &str) -> String {
         let mut stream = self.connect();
         stream.write_all(request.as_bytes()).unwrap();
@@ -85,7 +85,7 @@ impl Flight {
         self.ask(&format!("GET {target} HTTP/1.1\r\nHost: {host}\r\n{lines}\r\n"))
     }
 
-    /// Opens a socket; returns it after its first answer.
+    /// Opens a WebSocket; returns it after the server has accepted it.
     fn socket(&mut self, query: &str) -> TcpStream {
         let (mut stream, host) = (self.connect(), self.door.address());
         write!(stream, "GET /socket{query} HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\n{KEY}\r\n").unwrap();
@@ -99,7 +99,7 @@ impl Flight {
     }
 }
 
-/// A frame of a client, with a mask of zeros.
+/// Returns a client's WebSocket frame, with a mask of zeros.
 fn frame(kind: u8, payload: &[u8]) -> Vec<u8> {
     let length = payload.len();
     let mut bytes = vec![0x80 | kind];
@@ -135,7 +135,7 @@ fn the_page_and_its_files_are_served() {
     assert_eq!(status(&flight.ask(&format!("POST / HTTP/1.1\r\nHost: {host}\r\n\r\n"))), "405");
 }
 
-/// DNS rebinding: the name of another site that has been made to point here. And its page, which opens a socket.
+/// DNS rebinding: the name of another site is made to point here, and that site's page opens a WebSocket.
 #[test]
 fn pages_of_other_sites_get_nothing() {
     let mut flight = Flight::new(None);
@@ -187,7 +187,7 @@ fn other_addresses_need_the_token() {
     }
     assert_eq!(status(&flight.get(&format!("/?token={TOKEN}"), "")), "200");
     let _ = flight.socket(&format!("?token={TOKEN}"));
-    // Of another site, the token helps nothing.
+    // On a page of another site, even the right token does not help.
     assert_eq!(
         status(&flight.get(&format!("/socket?token={TOKEN}"), &format!("Origin: http://a.example\r\n{KEY}"))),
         "403"
@@ -213,19 +213,19 @@ fn commands_of_the_page_fly_the_vehicle() {
     }
 }
 
-/// Whatever arrives, the loop that flies does not wait, and those who behave are still served.
+/// Whatever arrives, the flight's loop does not wait, and well-behaved clients are still served.
 #[test]
 fn hostile_clients_cost_the_flight_nothing() {
     let mut flight = Flight::new(None);
     let mut good = flight.socket("");
     let mut held = Vec::new();
-    // Heads that never end, garbage, half a greeting.
+    // Request heads that never end, garbage, and half of a TLS handshake.
     for bytes in [&b"GET / HTTP/1.1\r\nHost:"[..], b"\x16\x03\x01\x02\x00", b"", &[b'A'; 20_000]] {
         let mut stream = flight.connect();
         let _ = stream.write_all(bytes);
         held.push(stream);
     }
-    // Frames that are too long, of no use, without a mask, without an end.
+    // WebSocket frames that are too long, too many, without a mask, or never end.
     let long = frame(1, &vec![b'x'; 200_000]);
     let huge = [&[0x81, 0xff][..], &u64::MAX.to_be_bytes(), &[0; 4]].concat();
     let flood: Vec<u8> = (0..5000).flat_map(|_| frame(1, br#"{"do":"arm"}"#)).collect();
@@ -237,26 +237,26 @@ fn hostile_clients_cost_the_flight_nothing() {
         flight.fly_until("its end", |flight| flight.lines.last().is_some_and(|line| line.ends_with("gone")));
         held.push(socket);
     }
-    // Text that is no command is answered.
+    // Text that is not a command gets an answer.
     for text in ["[".repeat(16_000), "{}".into(), r#"{"do":"line","text":"quit"}"#.into(), "\u{0}".into()] {
         good.write_all(&frame(1, text.as_bytes())).unwrap();
     }
-    // Many at a time: the rest is closed at once.
+    // Many connections at a time: those beyond the limit are closed at once.
     let many: Vec<TcpStream> = (0..100).map(|_| flight.connect()).collect();
     let is_closed = |mut stream: &TcpStream| matches!(stream.read(&mut [0; 1]), Ok(0));
     many.iter().for_each(|stream| stream.set_nonblocking(true).unwrap());
     flight.fly_until("their end", |_| many.iter().filter(|it| is_closed(it)).count() >= many.len() - CONNECTIONS_MAX);
     drop(many);
-    // Debug builds and busy machines included: a turn has no wait in it.
+    // The limit also holds in debug builds and on busy machines; it shows that the door never waits.
     assert!(flight.longest < Duration::from_millis(250), "{:?}", flight.longest);
     drop(held);
     let _ = good.write_all(&frame(1, br#"{"do":"line","text":"battery 0.5"}"#));
     flight.fly_until("the command", |flight| flight.effects().battery.unwrap().charge < 0.51);
-    // And a new page is served once the others have left.
+    // A new page is served once the others have left.
     flight.fly_until("the page", |flight| status(&flight.get("/", "")) == "200");
 }
 
-/// Whoever has no token holds no place against somebody who has one, however slowly it reads or asks.
+/// Clients without the token cannot lock out clients that have it, however slowly they read or ask.
 #[test]
 fn slow_strangers_keep_no_holder_out() {
     let mut flight = Flight::new(Some(TOKEN));
@@ -267,7 +267,7 @@ fn slow_strangers_keep_no_holder_out() {
     let get = |file: &str| format!("GET /{file} HTTP/1.1\r\nHost: {host}\r\n\r\n");
     let mut held = Vec::new();
     for round in 0..3 {
-        // Answers that nobody reads, halves of requests, and nothing at all.
+        // Answers that nobody reads, half requests, and connections that send nothing.
         for place in 0..2 * CONNECTIONS_MAX {
             let mut stream = flight.connect();
             let asked = get(&files[place % files.len()]);
@@ -281,7 +281,7 @@ fn slow_strangers_keep_no_holder_out() {
             assert_eq!(status(&flight.get(&format!("/{file}"), "")), "200", "{round} {file}");
         }
     }
-    // A page that is open stays open, whoever comes.
+    // An open page stays open, however many clients connect.
     let mut socket = flight.socket(&format!("?token={TOKEN}"));
     for _ in 0..4 * CONNECTIONS_MAX {
         held.push(flight.connect());
@@ -293,8 +293,8 @@ fn slow_strangers_keep_no_holder_out() {
     assert!(flight.longest < Duration::from_millis(250), "{:?}", flight.longest);
 }
 
-/// Eight pages that are held open keep nobody out, with or without a token: the one that has said nothing for the
-/// longest time is told that another has its place, and the others stay.
+/// Eight open pages cannot lock out a ninth one, with or without a token. The ninth page replaces the one that has been
+/// silent for longest; this page is told the reason. The others stay.
 #[test]
 fn a_page_too_many_takes_the_place_of_the_silent_one() {
     for (token, query) in [(None, ""), (Some(TOKEN), &*format!("?token={TOKEN}"))] {
@@ -302,7 +302,7 @@ fn a_page_too_many_takes_the_place_of_the_silent_one() {
         let mut pages: Vec<TcpStream> = (0..PAGES_MAX).map(|_| flight.socket(query)).collect();
         let gone = |flight: &Flight| flight.lines.iter().filter(|line| line.ends_with("gone")).count();
         for silent in [1, 2, 4] {
-            // All but this one speak, the first always.
+            // All pages except this one send a message, the first page each time.
             for (index, page) in pages.iter_mut().enumerate().filter(|(index, _)| *index != silent) {
                 page.write_all(&frame(1, br#"{"do":"line","text":"status"}"#)).unwrap_or_else(|_| panic!("{index}"));
             }
@@ -314,7 +314,7 @@ fn a_page_too_many_takes_the_place_of_the_silent_one() {
             assert_eq!(gone(&flight), before + 1, "{:?}", flight.lines);
             let mut said = Vec::new();
             pages.remove(silent).read_to_end(&mut said).unwrap();
-            // A frame that closes it, by the code 4000.
+            // A WebSocket close frame with the code 4000.
             let close = said.windows(4).rposition(|it| it[0] == 0x88 && it[2..] == 4000_u16.to_be_bytes());
             let reason = close.map(|at| String::from_utf8_lossy(&said[at + 4..]).into_owned());
             assert!(reason.as_ref().is_some_and(|it| it.starts_with("too many pages are open")), "{reason:?}");
@@ -324,7 +324,7 @@ fn a_page_too_many_takes_the_place_of_the_silent_one() {
     }
 }
 
-/// A page that is only watched, and pings to keep its connection alive, stays; one that pings without an end does not.
+/// A page that only watches, and pings to keep its connection alive, stays. A page that floods pings is disconnected.
 #[test]
 fn pings_keep_a_page_alive() {
     let mut flight = Flight::new(None);

@@ -1,4 +1,4 @@
-//! The end of it all at the vehicle.
+//! Connects a web page to the server's first vehicle: shows its state and carries out the page's commands.
 
 use crate::command::{ServerCommand, parse};
 use crate::page::command::PageCommand;
@@ -17,15 +17,15 @@ use nalgebra::{Vector2, Vector3};
 use serde_json::json;
 use std::collections::VecDeque;
 
-/// Time for which texts are shown again and again, so that a frame may be lost \[s\], and the most of them.
+/// Time for which a text is sent again with every frame, as frames may be lost \[s\], and most texts per frame.
 const TEXTS_S: f64 = 3.0;
 const TEXTS_MAX: usize = 40;
-/// Most places of a plan.
+/// Most places in a plan.
 const PLACES_MAX: usize = 50;
-/// Largest distance of a place from the origin \[m\].
+/// Largest coordinate of a place, relative to the origin \[m\].
 const FAR_M: f32 = 10_000.0;
 
-/// Shows the first vehicle of a server to a page, and commands it.
+/// Shows the first vehicle of a server to a web page, and carries out the page's commands.
 pub struct Cockpit {
     station: PageStation,
     frame: LocalFrame,
@@ -33,12 +33,12 @@ pub struct Cockpit {
     next: u32,
 }
 
-/// Answer to a command.
+/// Answer to a command of the page.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PageReply {
-    /// Messages for whoever gave it, as JSON.
+    /// Messages to the page that sent the command, as JSON.
     pub messages: Vec<String>,
-    /// What is left to do by whoever runs the server.
+    /// Action that the server's caller must carry out.
     pub then: Then,
 }
 
@@ -49,12 +49,12 @@ impl Default for Cockpit {
 }
 
 impl Cockpit {
-    /// Creates it before the server's first step.
+    /// Creates a cockpit; call this before the server's first step.
     pub fn new() -> Self {
         Cockpit { station: PageStation::new(), frame: LocalFrame::default(), texts: VecDeque::new(), next: 0 }
     }
 
-    /// Returns what does not change, as JSON; none without a vehicle.
+    /// Returns what does not change, as JSON; `None` without a vehicle.
     pub fn hello(&self, server: &Server) -> Option<String> {
         let hello = PageHello::new(server.vehicles().first()?);
         serde_json::to_string(&hello).ok()
@@ -68,12 +68,12 @@ impl Cockpit {
         Some(json!({ "kind": "values", "values": values }).to_string())
     }
 
-    /// Takes what the vehicle at this place has sent in a step.
+    /// Takes the bytes that the vehicle with this index sent in a step.
     pub fn sent(&mut self, vehicle: usize, bytes: &[u8]) {
         self.station.hear(vehicle, bytes);
     }
 
-    /// Goes on after a step.
+    /// Updates the state after a step.
     pub fn turn(&mut self, server: &mut Server) {
         let mut said = Vec::new();
         self.station.turn(server, &mut |severity, text| said.push((severity, text)));
@@ -83,7 +83,7 @@ impl Cockpit {
         }
     }
 
-    /// Shows a text.
+    /// Queues a text for the page.
     pub fn say(&mut self, time_s: f64, severity: MavSeverity, text: String) {
         self.texts.push_back(PageText { number: self.next, time_s, severity: severity as u8, text });
         self.next = self.next.wrapping_add(1);
@@ -92,7 +92,7 @@ impl Cockpit {
         }
     }
 
-    /// Returns what is seen now, as JSON; none without a vehicle.
+    /// Returns the current state as JSON; `None` without a vehicle.
     pub fn frame(&mut self, server: &Server, flow: TimeFlow) -> Option<String> {
         let vehicle = server.vehicles().first()?;
         let now_s = server.now_s();
@@ -134,7 +134,7 @@ impl Cockpit {
         serde_json::to_string(&shown).ok()
     }
 
-    /// Carries out a command of the page, in JSON; returns the answer.
+    /// Carries out a command of the page, given as JSON; returns the answer.
     pub fn command(&mut self, server: &mut Server, json: &str) -> PageReply {
         match serde_json::from_str(json) {
             Ok(command) => self.carry_out(server, command),
@@ -182,7 +182,7 @@ impl Cockpit {
         }
         let local_m = self.frame.local(&place_m);
         let origin = server.vehicles().first().and_then(|vehicle| vehicle.origin());
-        // A place on the earth is what DO_REPOSITION needs: without one, targets in the local frame lead the vehicle.
+        // DO_REPOSITION needs a place on the earth. Without one, targets in the local frame lead the vehicle.
         let Some(origin) = origin else {
             self.station.lead(server, local_m, Command::SelectMode(custom(FlightMode::Offboard)));
             return PageReply::default();
@@ -212,7 +212,7 @@ impl Cockpit {
             None if corners_m.is_empty() => Vec::new(),
             None => return PageReply::refused("a fence needs a satellite receiver: fly outdoors"),
         };
-        // The mission is checked against the fence.
+        // The fence comes first: the vehicle checks the mission against it.
         let mut plans = vec![(Plan::FENCE, fence), (Plan::MISSION, mission_items(&places_m))];
         plans.retain(|(plan, _)| origin.is_some() || *plan == Plan::MISSION);
         self.station.upload(server, plans);
@@ -220,7 +220,7 @@ impl Cockpit {
     }
 }
 
-/// Carries out a line.
+/// Carries out a line of the text protocol.
 fn line(server: &mut Server, text: &str) -> PageReply {
     if let Ok(Some(line)) = parse(text)
         && matches!(line.command, ServerCommand::Quit | ServerCommand::Step(_))
@@ -239,7 +239,7 @@ impl PageReply {
     }
 }
 
-/// Returns the shortest number that is read as the same `f32`.
+/// Returns the shortest decimal number that reads back as the same `f32`.
 fn short(value: f32) -> f64 {
     value.to_string().parse().unwrap_or(value.into())
 }

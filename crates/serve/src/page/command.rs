@@ -1,60 +1,60 @@
-//! What the page may do.
+//! Commands that a web page may send.
 
 use serde::{Deserialize, Serialize};
 
-/// Something that the page wants done. Places are in the earth frame of the simulator: north, west, up.
+/// A command of the page. Places are in the simulator's earth frame: north, west, up.
 ///
-/// Braces without a field: of what has none, serde would take any.
+/// Variants without fields have braces because serde would accept unknown fields for a unit variant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub enum PageCommand {
-    /// Start the motors.
+    /// Starts the motors.
     Arm {},
-    /// Stop the motors of a vehicle on the ground.
+    /// Stops the motors of a vehicle on the ground.
     Disarm {},
-    /// Stop the motors, also in flight.
+    /// Stops the motors, also in flight.
     Kill {},
-    /// Arm, if need be, and climb to this height above where it stands.
+    /// Arms the vehicle if needed, and climbs.
     TakeOff {
-        /// Height \[m\].
+        /// Height above the place where the vehicle stands \[m\].
         height_m: f32,
     },
-    /// Land where it is.
+    /// Lands at the current place.
     Land {},
-    /// Fly home and land.
+    /// Flies home and lands.
     Return {},
-    /// Hold where it is.
+    /// Holds the current position.
     Hold {},
-    /// Fly to this place and hold there.
+    /// Flies to a place and holds there.
     GoTo {
-        /// Place \[m\].
+        /// The place \[m\].
         position_m: [f32; 3],
     },
-    /// Replace mission and geofence.
+    /// Replaces the mission and the geofence.
     Plan {
-        /// Places of the mission, in order; none for no mission \[m\].
+        /// Places of the mission, in order; an empty list deletes the mission \[m\].
         #[serde(default)]
         waypoints_m: Vec<[f32; 3]>,
-        /// Corners of the geofence; none for no fence \[m\].
+        /// Corners of the geofence; an empty list deletes the fence \[m\].
         #[serde(default)]
         fence_m: Vec<[f32; 2]>,
     },
-    /// Arm, if need be, and fly the mission.
+    /// Arms the vehicle if needed, and flies the mission.
     StartMission {},
-    /// Set a parameter.
+    /// Sets a parameter.
     Parameter {
-        /// Its name.
+        /// Name of the parameter.
         name: String,
-        /// The value.
+        /// New value of the parameter.
         value: f32,
     },
-    /// Send the values of all parameters.
+    /// Requests the values of all parameters.
     Values {},
-    /// Let AFBC fly again after its monitor has switched to the fallback law.
+    /// Lets AFBC fly again after its monitor has switched to the fallback law.
     Engage {},
-    /// A line of the text protocol: weather, faults, laws, time.
+    /// Sends a line of the text protocol: weather, faults, laws, time.
     Line {
-        /// The line.
+        /// Text of the line.
         text: String,
     },
 }

@@ -1,22 +1,22 @@
-//! What changes while the vehicle flies.
+//! The state of the vehicle that a web page shows, sent some thirty times a second.
 
 use crate::page::plan::{FenceArea, MissionPoint};
 use serde::Serialize;
 
-/// The vehicle at one time.
+/// State of the vehicle at one time.
 #[derive(Clone, Debug, Serialize)]
 pub struct PageFrame {
-    /// Always `frame`.
+    /// Type of the message: always `frame`.
     pub kind: &'static str,
     /// Time since power-up \[s\].
     pub time_s: f64,
-    /// How many times real time it runs; 0: as fast as possible, none: in lockstep.
+    /// Multiple of real time; 0: as fast as possible, `None`: in lockstep.
     pub speed: Option<f64>,
-    /// True if time stands still.
+    /// True while the simulation is paused.
     pub paused: bool,
     /// True if the motors may turn.
     pub armed: bool,
-    /// True if it is armed and in the air.
+    /// True if the vehicle is armed and in the air.
     pub airborne: bool,
     /// Mode of the flight core.
     pub core: &'static str,
@@ -24,43 +24,43 @@ pub struct PageFrame {
     pub mode: &'static str,
     /// True if a failsafe has taken over.
     pub failsafe: bool,
-    /// The law that flies.
+    /// Name of the law that flies.
     pub law: &'static str,
-    /// Why a fallback law flies instead, if one does.
+    /// Reason why a fallback law flies instead, if one does.
     pub fallback: Option<&'static str>,
-    /// True motion.
+    /// True motion of the vehicle.
     pub truth: MotionView,
-    /// What it follows; none without a state.
+    /// Setpoint that the vehicle follows; `None` without a state estimate.
     pub reference: Option<ReferenceView>,
-    /// What it estimates; none before the first sample.
+    /// State that the vehicle estimates; `None` before the first sample.
     pub estimate: Option<EstimateView>,
-    /// The rotors, in the order of their numbers.
+    /// State of each rotor, in the order of their numbers.
     pub rotors: Vec<RotorView>,
-    /// Velocity of the air, earth frame \[m/s\].
+    /// Wind velocity, earth frame \[m/s\].
     pub wind_m_s: [f32; 3],
-    /// The battery, if there is one.
+    /// State of the battery, if there is one.
     pub battery: Option<BatteryView>,
-    /// Mass of what it carries \[kg\].
+    /// Mass of the payload \[kg\].
     pub payload_kg: f32,
-    /// Errors and estimates of the law.
+    /// Errors and adaptive estimates of the law.
     pub adaptation: Adaptation,
-    /// Where a return lands, earth frame \[m\].
+    /// Home, where a return lands, earth frame \[m\].
     pub home_m: Option<[f32; 3]>,
-    /// The mission.
+    /// Places of the mission.
     pub mission: Vec<MissionPoint>,
-    /// Number of the item that is flown, or to be flown.
+    /// Number of the mission item that is flown, or is to be flown next.
     pub item: u16,
-    /// The geofence.
+    /// Areas of the geofence.
     pub fence: Vec<FenceArea>,
-    /// What it suffers, in words.
+    /// Faults that act on the vehicle now, in words.
     pub faults: Vec<String>,
-    /// What was said of late, oldest first.
+    /// Recent status texts, oldest first.
     pub texts: Vec<PageText>,
-    /// Changes of the parameters since power-up.
+    /// Number of parameter changes since power-up.
     pub parameter_changes: u32,
 }
 
-/// A motion.
+/// A true motion.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct MotionView {
     /// Position, earth frame \[m\].
@@ -75,7 +75,7 @@ pub struct MotionView {
     pub rates_rad_s: [f32; 3],
 }
 
-/// What the vehicle follows.
+/// Setpoint that the vehicle follows.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct ReferenceView {
     /// Position, earth frame \[m\].
@@ -86,7 +86,7 @@ pub struct ReferenceView {
     pub yaw_rad: f32,
 }
 
-/// What the vehicle estimates.
+/// State that the vehicle estimates.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct EstimateView {
     /// Position, earth frame \[m\].
@@ -99,13 +99,13 @@ pub struct EstimateView {
     pub position_sigma_m: [f32; 3],
     /// Standard deviations of the velocity \[m/s\].
     pub velocity_sigma_m_s: [f32; 3],
-    /// Standard deviations of the rotation about the earth's axes \[rad\].
+    /// Standard deviations of the attitude, as rotations about the earth's axes \[rad\].
     pub attitude_sigma_rad: [f32; 3],
-    /// True if a law may fly on it.
+    /// True if the estimate is good enough for a law to fly on.
     pub valid: bool,
 }
 
-/// A rotor.
+/// State of a rotor.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct RotorView {
     /// True speed \[rad/s\].
@@ -114,11 +114,11 @@ pub struct RotorView {
     pub commanded_rad_s: f32,
     /// True thrust \[N\].
     pub thrust_n: f32,
-    /// Share of its thrust that it has left.
+    /// Remaining share of the rotor's thrust, 0 to 1.
     pub share: f32,
 }
 
-/// The battery.
+/// State of the battery.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct BatteryView {
     /// Voltage \[V\].
@@ -129,39 +129,39 @@ pub struct BatteryView {
     pub charge: f32,
 }
 
-/// Errors and estimates of the law.
+/// Errors and adaptive estimates of the law.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Adaptation {
-    /// Per subsystem: roll, pitch, yaw, z, x, y.
+    /// Values of each subsystem: roll, pitch, yaw, z, x, y.
     pub axes: Vec<AxisAdaptation>,
-    /// Sum of V over the subsystems; none for laws outside the cascade.
+    /// Lyapunov function: sum of V over the subsystems; `None` for laws outside the cascade.
     pub lyapunov: Option<f32>,
 }
 
-/// Errors and estimates of one subsystem.
+/// Errors and adaptive estimates of one subsystem.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct AxisAdaptation {
-    /// Name.
+    /// Name of the subsystem.
     pub name: &'static str,
-    /// e_1 \[m or rad\].
+    /// Tracking error e_1 \[m or rad\].
     pub e1: f32,
-    /// |Theta_hat|, in the unit of the subsystem's input; none for laws without it.
+    /// Norm |Theta_hat|, in the unit of the subsystem's input; `None` for laws without it.
     pub theta_norm: Option<f32>,
-    /// delta_hat, likewise.
+    /// Estimate delta_hat, in the unit of the subsystem's input; `None` for laws without it.
     pub delta: Option<f32>,
-    /// The computable terms of V (14), (27); none for laws outside the cascade.
+    /// The computable terms of V, equations (14) and (27); `None` for laws outside the cascade.
     pub lyapunov: Option<f32>,
 }
 
-/// Something that was said.
+/// A status text.
 #[derive(Clone, Debug, Serialize)]
 pub struct PageText {
-    /// Number, counted up: what was seen before is not new.
+    /// Running number, by which a page recognizes texts that it has already shown.
     pub number: u32,
-    /// When \[s\].
+    /// Time of the text \[s\].
     pub time_s: f64,
-    /// How grave it is, by MAVLink's number: 0 an emergency, 7 for debugging.
+    /// MAVLink severity, from 0 (emergency) to 7 (debug).
     pub severity: u8,
-    /// What.
+    /// The text.
     pub text: String,
 }

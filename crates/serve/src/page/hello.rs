@@ -1,4 +1,4 @@
-//! What does not change while the vehicle flies.
+//! The data about a vehicle that stay the same during a flight; a page receives them once.
 
 use crate::ServedVehicle;
 use crate::command::COMMANDS;
@@ -10,7 +10,7 @@ use serde_json::Value;
 /// The vehicle, and what can be done with it.
 #[derive(Clone, Debug, Serialize)]
 pub struct PageHello {
-    /// Always `hello`.
+    /// Type of the message: always `hello`.
     pub kind: &'static str,
     /// Version of the program.
     pub version: &'static str,
@@ -18,7 +18,7 @@ pub struct PageHello {
     pub scenario: String,
     /// Name of the vehicle.
     pub vehicle: String,
-    /// Frames, in words.
+    /// Explanation of the frames.
     pub frames: &'static str,
     /// Mass \[kg\].
     pub mass_kg: f64,
@@ -26,41 +26,41 @@ pub struct PageHello {
     pub weight_n: f64,
     /// Distance from the centre of mass to a rotor shaft \[m\].
     pub arm_m: f64,
-    /// Largest force of one rotor, as the law knows it \[N\].
+    /// Largest force of one rotor that the law assumes \[N\].
     pub force_max_n: f64,
-    /// The rotors, in the order of their numbers.
+    /// Positions of the rotors, in the order of their numbers.
     pub rotors: Vec<RotorPlace>,
-    /// Every law that can fly it.
+    /// Laws that can fly the vehicle.
     pub laws: Vec<PageLaw>,
-    /// Its instruments, by the names that faults use.
+    /// Names of the vehicle's instruments, as in the command `fault`.
     pub instruments: Vec<&'static str>,
-    /// Lines of the text protocol: name, what follows it, what it does.
+    /// Commands of the text protocol: name, arguments, meaning.
     pub lines: &'static [[&'static str; 3]],
-    /// Every parameter with range, unit and meaning, as ground stations download them: PX4's parameters.json.
+    /// Metadata of every parameter (range, unit, meaning), in the format of PX4's `parameters.json`.
     pub parameters: Value,
 }
 
 /// Position of a rotor, body frame.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct RotorPlace {
-    /// Forward and left \[m\].
+    /// Position forward and left of the centre of mass \[m\].
     pub position_m: [f64; 2],
-    /// True if it turns clockwise, seen from above.
+    /// True if the rotor turns clockwise, seen from above.
     pub clockwise: bool,
 }
 
-/// A law.
+/// A control law.
 #[derive(Clone, Debug, Serialize)]
 pub struct PageLaw {
-    /// Name in lines and files.
+    /// Name in commands and files.
     pub name: &'static str,
-    /// Name for people.
+    /// Name to display.
     pub title: &'static str,
 }
 
-/// What positions and directions refer to.
+/// Explanation of the frames.
 const FRAMES: &str = "earth: x north, y west, z up; body: x forward, y left, z up; angles to the left are positive";
-/// File of the parameters among the metadata.
+/// Name of the metadata file with the parameters.
 const PARAMETERS: &str = "parameters.json";
 
 impl PageHello {
@@ -94,7 +94,7 @@ impl PageHello {
     }
 }
 
-/// Returns the largest force of one rotor \[N\].
+/// Returns the largest force of one rotor \[N\]: AFBC's limit, or the weight if the scenario has no AFBC.
 fn force_max_n(vehicle: &ServedVehicle) -> f64 {
     let scenario = vehicle.scenario();
     let common = scenario.contender(ControllerKind::Afbc).map(|afbc| afbc.settings.common.rotor_force_max_n);

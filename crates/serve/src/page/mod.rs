@@ -1,16 +1,16 @@
-//! What a page in a browser sees of a [served vehicle](crate) and may do with it, as JSON. There is no socket,
-//! clock or thread here: `sitl serve --web` and WebAssembly run the same code.
+//! State and commands of a [served vehicle](crate) for a web page, as JSON. This code has no socket, clock or thread:
+//! `sitl serve --web` and WebAssembly both run it.
 //!
 //! # Reading order
 //!
-//! 1. [`PageHello`]: what does not change while the vehicle flies. [`PageFrame`]: what does, some thirty times a
-//!    second.
-//! 2. [`PageCommand`]: what the page may do. Weather, faults, laws and time are the lines of [`crate::command`];
-//!    the rest is what ground stations do, by the same messages.
-//! 3. [`Cockpit`]: the end of all this at the vehicle.
+//! 1. [`PageHello`]: the data that stay the same during a flight. [`PageFrame`]: the data that change, some thirty
+//!    times a second.
+//! 2. [`PageCommand`]: the commands of the page. Weather, faults, laws and time are lines of [`crate::command`]; the
+//!    others are sent as a ground station's MAVLink messages.
+//! 3. [`Cockpit`]: connects these messages to the vehicle.
 //!
-//! Axes are those of the workspace: earth frame north, west, up; body frame forward, left, up. The earth frame is the
-//! simulator's: what the vehicle estimates in a local frame of its own is shifted by where it stood when it was armed.
+//! Axes: earth frame north, west, up; body frame forward, left, up. The earth frame is the simulator's. A vehicle may
+//! estimate positions in a local frame of its own; these are shifted by its true position when it was armed.
 
 mod cockpit;
 mod command;

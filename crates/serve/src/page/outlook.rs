@@ -1,4 +1,4 @@
-//! What is seen of a vehicle, part by part.
+//! Builds the parts of a [`PageFrame`](crate::page::PageFrame) from a vehicle.
 
 use crate::ServedVehicle;
 use crate::page::frame::{Adaptation, AxisAdaptation, BatteryView, EstimateView, MotionView, ReferenceView, RotorView};
@@ -21,7 +21,7 @@ pub(crate) fn truth(motion: &Motion) -> MotionView {
     }
 }
 
-/// Returns what the vehicle follows.
+/// Returns the setpoint that the vehicle follows.
 pub(crate) fn reference(vehicle: &ServedVehicle, frame: &LocalFrame) -> Option<ReferenceView> {
     let setpoint = vehicle.report()?.guided.setpoint?;
     Some(ReferenceView {
@@ -31,7 +31,7 @@ pub(crate) fn reference(vehicle: &ServedVehicle, frame: &LocalFrame) -> Option<R
     })
 }
 
-/// Returns what the vehicle estimates.
+/// Returns the state that the vehicle estimates.
 pub(crate) fn estimate(vehicle: &ServedVehicle, frame: &LocalFrame) -> Option<EstimateView> {
     let estimate = vehicle.host().details().estimate?;
     let (state, sigmas, validity) = (&estimate.state, &estimate.sigmas, &estimate.validity);
@@ -46,7 +46,7 @@ pub(crate) fn estimate(vehicle: &ServedVehicle, frame: &LocalFrame) -> Option<Es
     })
 }
 
-/// Returns the rotors.
+/// Returns the state of each rotor.
 pub(crate) fn rotors(vehicle: &ServedVehicle) -> Vec<RotorView> {
     let plant = vehicle.world().plant();
     let (truth, telemetry) = (plant.truth(), plant.telemetry());
@@ -63,7 +63,7 @@ pub(crate) fn rotors(vehicle: &ServedVehicle) -> Vec<RotorView> {
     shares.iter().zip(truth.rotor_speeds_rad_s.iter()).zip(commanded.0.iter()).map(rotor).collect()
 }
 
-/// Returns the velocity of the air \[m/s\], and the battery.
+/// Returns the wind velocity \[m/s\] and the state of the battery.
 pub(crate) fn air_and_battery(vehicle: &ServedVehicle) -> ([f32; 3], Option<BatteryView>) {
     let Some(telemetry) = vehicle.world().plant().telemetry() else { return ([0.0; 3], None) };
     let wind_m_s: Vector3<f32> = telemetry.wind_m_s.cast();
@@ -75,14 +75,14 @@ pub(crate) fn air_and_battery(vehicle: &ServedVehicle) -> ([f32; 3], Option<Batt
     (wind_m_s.into(), battery)
 }
 
-/// Returns the mass of what the vehicle carries \[kg\].
+/// Returns the mass of the current payload \[kg\].
 pub(crate) fn payload_kg(vehicle: &ServedVehicle) -> f32 {
     let plant = vehicle.world().plant();
     let carried = |it: &&afbc_plant::Payload| (it.start_s..it.end_s).contains(&plant.time_s());
     plant.environment().payloads().iter().filter(carried).map(|payload| payload.mass_kg).sum::<f64>() as f32
 }
 
-/// Returns errors and estimates of the law.
+/// Returns errors and adaptive estimates of the law.
 pub(crate) fn adaptation(vehicle: &ServedVehicle) -> Adaptation {
     let (details, estimates) = (vehicle.host().details(), vehicle.host().estimates());
     let model = ModelConstants::new(&vehicle.scenario().vehicle.to_f32());

@@ -1,4 +1,4 @@
-//! Mission and geofence, as items of the link and as a page draws them.
+//! Mission and geofence, as MAVLink items and as a web page draws them.
 
 use crate::ServedVehicle;
 use crate::page::local_frame::LocalFrame;
@@ -9,48 +9,48 @@ use afbc_station::services::origin::{EarthOrigin, Global};
 use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 
-/// MAV_FRAME_LOCAL_NED, MAV_FRAME_GLOBAL.
+/// MAVLink frames MAV_FRAME_LOCAL_NED and MAV_FRAME_GLOBAL.
 const LOCAL_NED: u8 = 1;
 const GLOBAL: u8 = 0;
 const TAKE_OFF: u16 = MavCmd::MAV_CMD_NAV_TAKEOFF as u16;
 const WAYPOINT: u16 = MavCmd::MAV_CMD_NAV_WAYPOINT as u16;
 const RETURN: u16 = MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH as u16;
-/// Corners of areas to stay in and out of, then circles likewise.
+/// Corners of inclusion and exclusion polygons, and inclusion circles.
 const INSIDE: u16 = MavCmd::MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION as u16;
 const OUTSIDE: u16 = MavCmd::MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION as u16;
 const CIRCLE_INSIDE: u16 = MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION as u16;
 
-/// A place that a mission flies to.
+/// A place on the mission.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct MissionPoint {
-    /// Number of its item.
+    /// Number of the mission item.
     pub number: u16,
-    /// Place, earth frame \[m\].
+    /// Position of the place, earth frame \[m\].
     pub position_m: [f32; 3],
 }
 
 /// An area of the geofence.
 #[derive(Clone, Debug, Serialize)]
 pub struct FenceArea {
-    /// Corners, earth frame; one, the centre, for a circle \[m\].
+    /// Corners of a polygon, or the centre of a circle, earth frame \[m\].
     pub corners_m: Vec<[f32; 2]>,
-    /// Radius of a circle \[m\].
+    /// Radius of a circle \[m\]; `None` for a polygon.
     pub radius_m: Option<f32>,
-    /// True if the vehicle is to stay in it, and not out of it.
+    /// True for an inclusion area, false for an exclusion area.
     pub inside: bool,
 }
 
-/// Returns the items of a mission to these places of the local frame, from the ground and back home.
+/// Returns the items of a mission through these places of the local frame: take-off, waypoints, return.
 pub(crate) fn mission_items(places_m: &[Vector3<f32>]) -> Vec<MissionItem> {
     let Some(first) = places_m.first() else { return Vec::new() };
     let at = |command: u16, place_m: &Vector3<f32>| MissionItem {
         command,
         frame: LOCAL_NED,
         goes_on: true,
-        // Whatever heading leads there.
+        // Any heading is fine.
         parameters: [0.0, 0.0, 0.0, f32::NAN],
         x: (place_m.x * 1e4) as i32,
-        // Positions of the workspace are north, west, up; those of the frame north, east, down.
+        // Positions here are north, west, up; the MAVLink frame is north, east, down.
         y: (place_m.y * -1e4) as i32,
         z: -place_m.z,
         ..MissionItem::default()
@@ -62,7 +62,7 @@ pub(crate) fn mission_items(places_m: &[Vector3<f32>]) -> Vec<MissionItem> {
     items
 }
 
-/// Returns the items of a fence with these corners in the local frame.
+/// Returns the items of an inclusion polygon with these corners in the local frame.
 pub(crate) fn fence_items(corners_m: &[Vector2<f32>], origin: &EarthOrigin) -> Vec<MissionItem> {
     let item = |(number, corner_m): (u16, &Vector2<f32>)| {
         let [latitude, longitude] = origin.global(&corner_m.push(0.0)).e7();
@@ -107,7 +107,7 @@ pub(crate) fn fence_areas(vehicle: &ServedVehicle, frame: &LocalFrame) -> Vec<Fe
     while let Some(item) = rest.first() {
         let [first, ..] = item.parameters;
         let is_polygon = [INSIDE, OUTSIDE].contains(&item.command);
-        // At least one, so that the loop ends, and no more than are left, whatever the item says.
+        // At least one item, so that the loop ends, and no more than are left, whatever the item says.
         let count = if is_polygon { (first as usize).clamp(1, rest.len()) } else { 1 };
         let (area, others) = rest.split_at(count);
         areas.push(FenceArea {

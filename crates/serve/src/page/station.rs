@@ -1,4 +1,4 @@
-//! The page as a ground station: what it asks of the vehicle by messages, and what it hears.
+//! The web page's ground station: sends commands to the vehicle as MAVLink messages, and handles the answers.
 
 use crate::Server;
 use afbc_ground::{Client, Patience, UploadEnd};
@@ -7,23 +7,23 @@ use afbc_link::{
 };
 use nalgebra::Vector3;
 
-/// Its address: a station's, and a component of its own.
+/// Address of the station: a ground station's system id, with a component id of its own.
 const ADDRESS: Address = Address { system: 255, component: 191 };
-/// Number of its peer; ports count up from 1.
+/// Peer number of the station; ports count up from 1.
 const PEER: u32 = u32::MAX;
-/// The vehicle that it talks to: the first.
+/// Index of the vehicle that the station talks to: the first.
 const VEHICLE: usize = 0;
-/// Time between heartbeats, between targets, and until it gives up \[ms\].
+/// Heartbeat period, interval of targets, and longest wait for arming \[ms\].
 const HEARTBEAT_MS: u64 = 1_000;
 const TARGET_MS: u64 = 50;
 const PATIENCE_MS: u64 = 3_000;
-/// Messages that are heard: COMMAND_ACK, STATUSTEXT, MISSION_REQUEST, MISSION_REQUEST_INT, MISSION_ACK, PARAM_VALUE,
-/// PARAM_ERROR.
+/// Messages that the station decodes: COMMAND_ACK, STATUSTEXT, MISSION_REQUEST, MISSION_REQUEST_INT, MISSION_ACK,
+/// PARAM_VALUE, PARAM_ERROR.
 const HEARD: [u32; 7] = [77, 253, 40, 51, 47, 22, 345];
-/// Severity of what did not happen, and of what goes on.
+/// Severities of texts about a refusal, and about progress.
 const REFUSED: MavSeverity = MavSeverity::MAV_SEVERITY_ERROR;
 const INFO: MavSeverity = MavSeverity::MAV_SEVERITY_INFO;
-/// Commands by number, in words.
+/// Names of commands by their number.
 const NAMES: [(u16, &str); 8] = [
     (MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16, "arm or disarm"),
     (MavCmd::MAV_CMD_NAV_TAKEOFF as u16, "take off"),
@@ -35,13 +35,13 @@ const NAMES: [(u16, &str); 8] = [
     (Command::Engage.id(), "engage"),
 ];
 
-/// A station.
+/// The ground station of the web page.
 pub(crate) struct PageStation {
     client: Client,
     now_ms: u64,
-    /// What follows once the vehicle is armed, and when that is given up.
+    /// Command to give once the vehicle is armed, and the time at which to give up \[ms\].
     once_armed: Option<(Command, u64)>,
-    /// Where it leads a vehicle that does not know where on the earth it is, local frame \[m\].
+    /// Target for a vehicle that does not know its place on the earth, local frame \[m\].
     target_m: Option<Vector3<f32>>,
     heard: Vec<Downlink>,
     parameter_changes: u32,
@@ -59,12 +59,12 @@ impl PageStation {
         }
     }
 
-    /// Returns the number of parameters that were changed.
+    /// Returns the number of parameter changes so far.
     pub(crate) fn parameter_changes(&self) -> u32 {
         self.parameter_changes
     }
 
-    /// Hands the vehicle what is to be said. Who has spoken once stays with the vehicle.
+    /// Sends all queued messages. Once the station has sent anything, it keeps sending heartbeats.
     fn send(&mut self, server: &mut Server) {
         let mut speaks = false;
         self.client.send(|_, frame| {
@@ -76,25 +76,25 @@ impl PageStation {
         }
     }
 
-    /// Gives a command.
+    /// Sends a command.
     pub(crate) fn command(&mut self, server: &mut Server, command: Command) {
-        // What was to follow an earlier command must not follow this one.
+        // A new command cancels what was to follow the last one.
         (self.once_armed, self.target_m) = (None, None);
         self.client.command(command, Patience::ONCE);
         self.send(server);
     }
 
-    /// Gives a command that needs an armed vehicle, which is armed first.
+    /// Arms the vehicle if it is not armed, then sends a command.
     pub(crate) fn command_armed(&mut self, server: &mut Server, command: Command) {
         let armed = server.vehicles().get(VEHICLE).and_then(|it| it.report()).is_some_and(|it| it.mode.armed());
         self.command(server, if armed { command } else { Command::Arm });
         self.once_armed = (!armed).then_some((command, self.now_ms + PATIENCE_MS));
     }
 
-    /// Leads the vehicle to a place of its local frame, in mode offboard \[m\].
+    /// Leads the vehicle to a place of its local frame \[m\] in offboard mode.
     pub(crate) fn lead(&mut self, server: &mut Server, place_m: Vector3<f32>, offboard: Command) {
         self.target_m = Some(place_m);
-        // The target first: without a fresh one the vehicle refuses the mode.
+        // Send the target first: the vehicle refuses offboard mode without a fresh target.
         self.say_target();
         self.client.command(offboard, Patience::ONCE);
         self.send(server);
@@ -113,29 +113,29 @@ impl PageStation {
         self.send(server);
     }
 
-    /// Replaces plans, in this order.
+    /// Uploads plans, in this order.
     pub(crate) fn upload(&mut self, server: &mut Server, plans: impl IntoIterator<Item = (Plan, Vec<MissionItem>)>) {
         self.client.upload(plans, Patience::ONCE);
         self.send(server);
     }
 
-    /// Takes what the vehicle has sent in a step.
+    /// Takes the bytes that the vehicle sent in a step.
     pub(crate) fn hear(&mut self, vehicle: usize, bytes: &[u8]) {
         if vehicle == VEHICLE {
             let PageStation { client, heard, .. } = self;
-            // Telemetry is not decoded, since the page is shown the vehicle itself.
+            // Telemetry is not decoded: the page shows the simulated vehicle directly.
             client.hear_accepted(bytes, |frame| HEARD.contains(&frame.id), |_, message| heard.push(*message));
         }
     }
 
-    /// Answers what was heard, after a step; what is worth a line goes to `say`.
+    /// Handles the received messages after a step, and passes texts for the page to `say`.
     pub(crate) fn turn(&mut self, server: &mut Server, say: &mut dyn FnMut(MavSeverity, String)) {
         let now_ms = (server.now_s() * 1e3).round() as u64;
-        // Time may stand still.
+        // Time does not advance during a pause.
         let goes_on = now_ms != self.now_ms;
         self.now_ms = now_ms;
         self.send(server);
-        // They are shown from what was heard, in its order.
+        // The loop below shows the texts in the order of all messages, so drop this copy.
         drop(self.client.take_texts());
         for message in std::mem::take(&mut self.heard) {
             match message {

@@ -1,26 +1,27 @@
-//! Who gets in.
+//! Access checks for requests of web clients.
 
 use crate::web::head::Head;
 use crate::web::token::Token;
 use std::net::IpAddr;
 
-/// Who gets in.
+/// Rules for who may connect.
 #[derive(Clone, Debug)]
 pub struct Admission {
-    /// What clients must tell; none on loopback.
+    /// Token that clients must send; `None` on loopback.
     pub token: Option<Token>,
-    /// True if only this machine's own names lead here.
+    /// True if a request's host must be a loopback name of this machine.
     pub loopback: bool,
 }
 
-/// Why a request is refused: status and one line.
+/// A refusal: HTTP status and one line with the reason.
 pub(crate) type Refused = (&'static str, String);
 
 impl Admission {
-    /// Admits this machine alone, or whoever tells the token.
+    /// Creates the rules for this address. On loopback, a request must name this machine. If there is a token, clients
+    /// need it.
     ///
     /// # Errors
-    /// An address that others reach, without a token.
+    /// Fails for an address that other machines reach, without a token.
     pub fn at(address: IpAddr, token: Option<Token>) -> Result<Self, String> {
         let loopback = address.is_loopback();
         if !loopback && token.is_none() {
@@ -29,14 +30,14 @@ impl Admission {
         Ok(Admission { token, loopback })
     }
 
-    /// Checks the names in a request: that of this machine and, if a browser tells it, that of the page it comes from.
+    /// Checks the request's host and, if a browser sends it, the origin: the page must come from this server.
     pub(crate) fn check_names(&self, head: &Head) -> Result<(), Refused> {
         let Some(host) = &head.host else { return Err(("400 Bad Request", "it names no host".into())) };
         if self.loopback && !is_own(host) {
             let cure = "open the address that was printed at the start";
             return Err(("403 Forbidden", format!("this machine is not called so; {cure}")));
         }
-        // Of another site: a browser tells on it.
+        // Browsers send the origin of the page that makes the request.
         let origin = head.origin.as_ref().map(|origin| origin.split_once("://").map_or("", |(_, authority)| authority));
         if origin.is_some_and(|origin| !origin.eq_ignore_ascii_case(host)) {
             return Err(("403 Forbidden", "it comes from a page of another site".into()));
@@ -56,7 +57,7 @@ impl Admission {
     }
 }
 
-/// True for this machine's own names on loopback, whatever the port.
+/// Returns true for a loopback name or address, with any port.
 fn is_own(host: &str) -> bool {
     let name = match host.rsplit_once(':') {
         Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,

@@ -1,4 +1,4 @@
-//! One connection, from its first byte to its last.
+//! Serves one connection, from its first byte to its last.
 
 use crate::web::admission::Admission;
 use crate::web::head::{HEAD_MAX, Head};
@@ -17,35 +17,35 @@ use tungstenite::protocol::frame::coding::CloseCode;
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Message, WebSocket};
 
-/// Time for a request to be whole, for an answer to be taken, and for a page to take a part of what is written.
+/// Limits: time for a complete request, time for reading an answer, and time for a page to accept a write.
 const HEAD_MAX_TIME: Duration = Duration::from_secs(5);
 const ANSWER_MAX_TIME: Duration = Duration::from_secs(30);
 const PATIENCE: Duration = Duration::from_secs(5);
-/// Time between two looks at what is to be sent.
+/// Interval at which outgoing messages are looked for.
 const NAP: Duration = Duration::from_millis(8);
-/// Longest message from a page, and most of what waits to be written \[bytes\].
+/// Longest message from a page, and most bytes that wait to be written.
 const MESSAGE_MAX: usize = 16_384;
 const WAITING_MAX: usize = 1 << 20;
-/// Messages that wait for a client, and for the flight.
+/// Most outgoing messages that are queued for a client.
 const OUT_MAX: usize = 32;
-/// Messages of a client in a second, pings among them.
+/// Most messages of a client per second, including pings.
 const RATE_MAX: u32 = 60;
 
-/// Why a page is closed that another has taken the place of: it does not come again by itself.
+/// WebSocket close code for a page that another page has replaced; such a page does not reconnect by itself.
 const TAKEN: u16 = 4000;
 const TAKEN_BY: &str = "too many pages are open, and another has taken the place of this one; reload to take it back";
 
-/// Something that a client does.
+/// An event of a client.
 pub(crate) enum Event {
-    /// It is there, and hears by this.
+    /// A client has connected: its number, its address and the sender of its messages.
     New(u32, String, SyncSender<Arc<str>>),
-    /// It says something.
+    /// The client with this number has sent a text.
     Said(u32, String),
-    /// It is gone.
+    /// The client with this number is gone.
     Gone(u32),
 }
 
-/// What all connections share.
+/// Data that all connections share.
 pub(crate) struct Shared {
     pub(crate) admission: Admission,
     pub(crate) files: Vec<PageFile>,
@@ -67,7 +67,7 @@ pub(crate) fn serve(mut stream: TcpStream, (number, place): (u32, &Place), share
         Some("index.html") => Some(""),
         page => page,
     };
-    // Scripts and styles are the same for everybody, and a browser asks for them without the token.
+    // Scripts and styles are not secret, and a browser requests them without the token.
     let secret = page == Some("") || page == Some("socket");
     if let (true, Err((status, problem))) = (secret, shared.admission.check_token(&head)) {
         return refuse(out, status, &problem);
@@ -89,7 +89,7 @@ pub(crate) fn serve(mut stream: TcpStream, (number, place): (u32, &Place), share
     }
 }
 
-/// Reads a head; returns what follows it, too.
+/// Reads the head of a request; returns it with the bytes that follow it.
 fn read_head(stream: &mut impl Read) -> io::Result<Result<(Head, Vec<u8>), &'static str>> {
     let (mut bytes, mut part) = (Vec::new(), [0; 1024]);
     loop {
@@ -110,7 +110,7 @@ fn read_head(stream: &mut impl Read) -> io::Result<Result<(Head, Vec<u8>), &'sta
     }
 }
 
-/// Carries messages both ways.
+/// Carries messages in both directions until the connection ends.
 fn converse(stream: TcpStream, rest: Vec<u8>, (number, place): (u32, &Place), shared: &Shared) -> io::Result<()> {
     let from = stream.peer_addr()?.to_string();
     stream.set_read_timeout(Some(NAP))?;
@@ -120,15 +120,15 @@ fn converse(stream: TcpStream, rest: Vec<u8>, (number, place): (u32, &Place), sh
     limits.max_message_size = Some(MESSAGE_MAX);
     limits.max_frame_size = Some(MESSAGE_MAX);
     limits.max_write_buffer_size = WAITING_MAX;
-    // Each message is written at once: a frame that waits for others to fill a buffer is late.
+    // Write each message at once: waiting to fill a buffer would delay the frames.
     limits.write_buffer_size = 0;
     let mut socket = WebSocket::from_partially_read(stream, rest, Role::Server, Some(limits));
-    // The loop that flies takes these in a millisecond.
+    // The flight's loop handles this event within a millisecond.
     if shared.events.send(Event::New(number, from, sender)).is_err() {
         return Ok(());
     }
     let end = exchange(&mut socket, &out, (number, place), shared);
-    // Once the flight has ended nobody wants to know, and the connection ends in any case.
+    // If the flight has ended, nobody receives this event, and that is fine.
     let _ = shared.events.send(Event::Gone(number));
     let taken = (!place.is_page()).then(|| CloseFrame { code: CloseCode::Library(TAKEN), reason: TAKEN_BY.into() });
     let _ = socket.close(taken).and_then(|()| socket.flush());
@@ -147,7 +147,7 @@ fn exchange(
             match out.try_recv() {
                 Ok(text) => socket.send(Message::text(text.as_ref())).map_err(in_io)?,
                 Err(TryRecvError::Empty) => break,
-                // The flight has ended, or has had enough of this client.
+                // The flight has ended, or has dropped this client.
                 Err(TryRecvError::Disconnected) => return Ok(()),
             }
         }
@@ -162,7 +162,7 @@ fn exchange(
                 }
             }
             Ok(Message::Ping(_) | Message::Pong(_)) => {}
-            // What is no text says nothing sensible.
+            // Pages send only text.
             Ok(Message::Binary(_) | Message::Frame(_) | Message::Close(_)) => return Ok(()),
             Err(tungstenite::Error::Io(error)) if is_silence(&error) => {}
             Err(error) => return Err(in_io(error)),

@@ -1,4 +1,4 @@
-//! The page's way to the vehicles.
+//! Connects web pages to the vehicles.
 
 use crate::page::Cockpit;
 use crate::web::admission::Admission;
@@ -14,40 +14,40 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread;
 use std::time::Duration;
 
-/// Time between two frames, and while time stands still.
+/// Time between two frames, in flight and during a pause.
 const FRAME: Duration = Duration::from_millis(33);
 const PAUSED: Duration = Duration::from_millis(250);
-/// Messages that wait for the flight.
+/// Most messages of clients that wait for the flight's loop.
 const EVENTS_MAX: usize = 32;
-/// Time for which a client may take nothing.
+/// Time after which a client that accepts nothing is dropped.
 const STUCK: Duration = Duration::from_secs(10);
 
-/// Serves the page, in threads of its own, and connects it to the first vehicle of a server.
+/// Serves the web page in separate threads, and connects it to the server's first vehicle.
 pub struct WebDoor {
     address: SocketAddr,
     admission: Admission,
     cockpit: Cockpit,
-    /// What does not change: made once, since it takes longer than a step.
+    /// Message with the data that do not change. It is built once, since that takes longer than a step.
     hello: Option<Arc<str>>,
     events: Receiver<Event>,
     pages: Vec<OpenPage>,
     shown: Duration,
 }
 
-/// A page that somebody looks at.
+/// A page that is open in a browser.
 struct OpenPage {
     number: u32,
     from: String,
     out: SyncSender<Arc<str>>,
-    /// When it last took something.
+    /// Time when the page last accepted a frame.
     took: Duration,
 }
 
 impl WebDoor {
-    /// Opens the port, any free one for 0.
+    /// Opens the port; port 0 takes any free one.
     ///
     /// # Errors
-    /// One line that names the address and the cure.
+    /// Fails with one line that names the address and the remedy.
     pub fn open(address: SocketAddr, admission: Admission) -> Result<Self, String> {
         let listener = TcpListener::bind(address).map_err(|error| taken(address, &error))?;
         let address = listener.local_addr().map_err(|error| taken(address, &error))?;
@@ -64,13 +64,13 @@ impl WebDoor {
         self.address
     }
 
-    /// Returns what to open in a browser.
+    /// Returns the address to open in a browser.
     pub fn url(&self) -> String {
         let token = self.admission.token.as_ref().map_or(String::new(), |token| format!("?token={token}"));
         format!("http://{}/{token}", self.address)
     }
 
-    /// Takes what has come: one message, so that a flood of them costs a step little.
+    /// Handles one event only, so that a flood of messages costs a step little.
     fn receive(&mut self, server: &mut Server, now: Duration, log: &mut dyn FnMut(&str)) -> Then {
         let Ok(event) = self.events.try_recv() else { return Then::Nothing };
         let now_s = server.now_s();
@@ -82,7 +82,7 @@ impl WebDoor {
                 first.into_iter().flatten().for_each(|text| drop(page.out.try_send(text)));
                 self.pages.push(page);
             }
-            // Its sender is dropped, which ends it.
+            // This drops the client's sender, which ends the connection.
             Event::New(..) => {}
             Event::Gone(number) => {
                 let gone = self.pages.extract_if(.., |page| page.number == number);
@@ -91,7 +91,7 @@ impl WebDoor {
             Event::Said(number, text) => {
                 let reply = self.cockpit.command(server, &text);
                 if let Some(page) = self.pages.iter().find(|page| page.number == number) {
-                    // The flight waits for nobody: a page whose queue is full misses an answer.
+                    // The flight never waits: a page whose queue is full misses the answer.
                     reply.messages.into_iter().for_each(|text| drop(page.out.try_send(text.into())));
                 }
                 return reply.then;
@@ -100,7 +100,7 @@ impl WebDoor {
         Then::Nothing
     }
 
-    /// Shows the vehicle to every page; forgets those that take nothing.
+    /// Sends the current state to every page; drops pages that accept nothing.
     fn show(&mut self, server: &Server, flow: TimeFlow, now: Duration) {
         let Some(frame) = self.cockpit.frame(server, flow) else { return };
         let frame: Arc<str> = frame.into();
@@ -110,7 +110,7 @@ impl WebDoor {
                 true
             }
             Err(TrySendError::Full(_)) => now.saturating_sub(page.took) < STUCK,
-            // Its connection has ended, and the event that says so, which is logged, is on the way.
+            // The connection has ended, and its `Gone` event, which is logged, will follow.
             Err(TrySendError::Disconnected(_)) => true,
         });
     }
@@ -123,7 +123,7 @@ impl Door for WebDoor {
         }
         let then = self.receive(server, now, log);
         self.cockpit.turn(server);
-        // What somebody has done is seen at once.
+        // Show the effect of a command at once.
         let wait = if flow.paused && then == Then::Nothing { PAUSED } else { FRAME };
         if now.saturating_sub(self.shown) >= wait && !self.pages.is_empty() {
             self.shown = now;
@@ -137,7 +137,7 @@ impl Door for WebDoor {
     }
 }
 
-/// Tells why a port cannot be opened.
+/// Returns why the port cannot be opened.
 fn taken(address: SocketAddr, error: &io::Error) -> String {
     let cure = "choose another one, as in --web 127.0.0.1:0 for any free port";
     format!("--web {address}: it cannot be opened ({error}); {cure}")

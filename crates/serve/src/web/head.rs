@@ -1,12 +1,12 @@
-//! The head of a request.
+//! Parses the head of an HTTP request.
 
 use httparse::{EMPTY_HEADER, Request, Status};
 
-/// Longest head \[bytes\], and most lines.
+/// Longest head \[bytes\], and most header lines.
 pub(crate) const HEAD_MAX: usize = 8192;
 const LINES_MAX: usize = 64;
 
-/// What is used of a head.
+/// The parts of a head that are used.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Head {
     pub(crate) method: String,
@@ -14,17 +14,17 @@ pub(crate) struct Head {
     pub(crate) query: String,
     pub(crate) host: Option<String>,
     pub(crate) origin: Option<String>,
-    /// Key of a WebSocket of version 13, if one is asked for.
+    /// Key of a WebSocket handshake (version 13), if the request asks for one.
     pub(crate) socket_key: Option<String>,
     /// Length of the head \[bytes\].
     pub(crate) length: usize,
 }
 
 impl Head {
-    /// Reads a head; none as long as it is not whole.
+    /// Parses a head; returns `None` as long as it is incomplete.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// Fails with what is wrong with the head.
     pub(crate) fn read(bytes: &[u8]) -> Result<Option<Head>, &'static str> {
         let mut lines = [EMPTY_HEADER; LINES_MAX];
         let mut request = Request::new(&mut lines);
@@ -34,7 +34,7 @@ impl Head {
             Ok(Status::Partial) => return Err("its head is too long"),
             Err(_) => return Err("it is no request of HTTP"),
         };
-        // Each counts once: of two nobody knows which one others believe.
+        // A header must not appear twice: other programs might use a different one of the two.
         let only = |name: &str| {
             let mut named = request.headers.iter().filter(|line| line.name.eq_ignore_ascii_case(name));
             match (named.next(), named.next()) {

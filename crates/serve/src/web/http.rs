@@ -1,8 +1,9 @@
-//! Answers of HTTP, one a connection.
+//! HTTP responses, one per connection.
 
 use std::io::{self, Write};
 
-/// Scripts and styles of the page alone; no frame of others; no address in what it asks of others.
+/// Security headers: only the page's own scripts and styles, no embedding by other sites, and no referrer for other
+/// sites.
 const SAFETY: &str = "Content-Security-Policy: default-src 'self'; img-src 'self' data: blob:; \
     style-src 'self' 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'\r\n\
     X-Content-Type-Options: nosniff\r\n\
@@ -11,7 +12,7 @@ const SAFETY: &str = "Content-Security-Policy: default-src 'self'; img-src 'self
     Cross-Origin-Opener-Policy: same-origin\r\n\
     Cache-Control: no-store\r\n";
 
-/// Answers with a text; of a HEAD, without it.
+/// Sends a text; for a HEAD request, only its header.
 pub(crate) fn answer(out: &mut impl Write, status: &str, media: &str, text: &str, head: bool) -> io::Result<()> {
     let length = text.len();
     write!(
@@ -24,12 +25,12 @@ pub(crate) fn answer(out: &mut impl Write, status: &str, media: &str, text: &str
     out.flush()
 }
 
-/// Answers with a line on what is wrong.
+/// Sends an error with one line that says what is wrong.
 pub(crate) fn refuse(out: &mut impl Write, status: &str, problem: &str) -> io::Result<()> {
     answer(out, status, "text/plain; charset=utf-8", &format!("{problem}\n"), false)
 }
 
-/// Answers that a WebSocket begins.
+/// Sends the response that starts a WebSocket.
 pub(crate) fn switch(out: &mut impl Write, key: &str) -> io::Result<()> {
     write!(
         out,

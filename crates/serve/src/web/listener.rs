@@ -1,4 +1,4 @@
-//! The port, and a thread for each connection.
+//! Listens on the port, with a thread for each connection.
 
 use crate::web::client::{Shared, serve};
 use crate::web::places::Places;
@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
-/// Wait after a failure to accept, such as too many open files.
+/// Wait after a failed accept, for example if too many files are open.
 const NAP: Duration = Duration::from_millis(50);
 
 /// Accepts connections for as long as the program runs.
@@ -25,12 +25,12 @@ pub(crate) fn listen(listener: &TcpListener, shared: &Arc<Shared>) {
             }
         };
         number = number.wrapping_add(1);
-        // Whoever is gone already needs no place.
+        // A client that is already gone needs no place.
         let Ok(place) = places.enter(number, &stream) else { continue };
         let shared = Arc::clone(shared);
-        // Without a thread, the connection is closed and its place free.
+        // If no thread can be started, the connection is closed and its place becomes free.
         let _ = thread::Builder::new().name("page".into()).spawn(move || {
-            // How a connection ends is its own business.
+            // It does not matter how a connection ends.
             let _ = serve(stream, (number, &place), &shared);
         });
     }

@@ -1,4 +1,4 @@
-//! Places of connections: how many there are, and who has to go for another.
+//! Limits the number of connections, and chooses which connection a new one replaces.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -6,14 +6,14 @@ use std::net::{IpAddr, Shutdown, TcpStream};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// Most pages at a time: sockets of those who may come in.
+/// Most pages at a time: WebSockets of admitted clients.
 pub const PAGES_MAX: usize = 8;
 /// Most other connections at a time.
 const OTHERS_MAX: usize = 32;
 /// Most connections at a time.
 pub const CONNECTIONS_MAX: usize = PAGES_MAX + OTHERS_MAX;
 
-/// The connections that are open.
+/// The open connections.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Places(Arc<Mutex<Vec<Connection>>>);
 
@@ -22,7 +22,7 @@ struct Connection {
     number: u32,
     from: IpAddr,
     stream: TcpStream,
-    /// When a page last said something, or came; none of what is no page, or is one no longer.
+    /// Time when a page last sent a message, or connected; `None` for connections that are no page, or no longer one.
     said: Option<Instant>,
 }
 
@@ -32,7 +32,7 @@ impl Connection {
     }
 }
 
-/// The place of one connection, until it is dropped.
+/// A connection's place; dropping it frees the place.
 #[derive(Debug)]
 pub(crate) struct Place {
     places: Places,
@@ -40,18 +40,18 @@ pub(crate) struct Place {
 }
 
 impl Places {
-    /// Gives a new connection a place. If too many have not shown that they may come in, it takes the place of the
-    /// oldest of them from the address that has the most: whoever holds many places loses one of them.
+    /// Gives a new connection a place. If too many connections are no pages yet, it replaces the oldest of them from
+    /// the address that has the most: a client with many connections loses one of its own.
     ///
     /// # Errors
-    /// The system's.
+    /// Fails with the system's error.
     pub(crate) fn enter(&self, number: u32, stream: &TcpStream) -> io::Result<Place> {
         let (from, stream) = (stream.peer_addr()?.ip(), stream.try_clone()?);
         let mut open = self.lock();
         if open.iter().filter(|it| !it.is_page()).count() >= OTHERS_MAX
             && let Some(place) = last_to_stay(&open)
         {
-            // Its thread, which may be waiting for it, ends by this.
+            // This ends the thread of the connection, which may be waiting for data.
             let _ = open.remove(place).stream.shutdown(Shutdown::Both);
         }
         open.push(Connection { number, from, stream, said: None });
@@ -64,8 +64,8 @@ impl Places {
 }
 
 impl Place {
-    /// Makes it the place of a page, if nobody has taken it. Of too many pages the one that has said nothing for the
-    /// longest time is none any longer: eight that are left open, or held, keep nobody out.
+    /// Turns the connection into a page; returns false if its place has been taken. If there are too many pages, the
+    /// one that has been silent for longest stops being a page, so that eight open pages lock nobody out.
     pub(crate) fn keep(&self) -> bool {
         let mut open = self.places.lock();
         let Some(own) = open.iter().position(|it| it.number == self.number) else { return false };
@@ -76,14 +76,14 @@ impl Place {
         open.get_mut(own).map(|own| own.said = Some(Instant::now())).is_some()
     }
 
-    /// Notes that the page says something.
+    /// Notes that the page has sent a message.
     pub(crate) fn speaks(&self) {
         let mut open = self.places.lock();
         let own = open.iter_mut().find(|it| it.number == self.number && it.is_page());
         own.into_iter().for_each(|own| own.said = Some(Instant::now()));
     }
 
-    /// False once its place has been taken.
+    /// Returns false once the page's place has been taken.
     pub(crate) fn is_page(&self) -> bool {
         self.places.lock().iter().any(|it| it.number == self.number && it.is_page())
     }
@@ -95,7 +95,7 @@ impl Drop for Place {
     }
 }
 
-/// Returns the oldest connection of the address that has the most, pages apart.
+/// Returns the oldest connection of the address with the most connections, not counting pages.
 fn last_to_stay(open: &[Connection]) -> Option<usize> {
     let mut counts = BTreeMap::new();
     open.iter().filter(|it| !it.is_page()).for_each(|it| *counts.entry(it.from).or_insert(0_usize) += 1);

@@ -1,10 +1,10 @@
-//! Limits of time and of rate.
+//! Limits on time and on message rate.
 
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// A stream that ends at a deadline, however slowly it is read or written until then.
+/// A stream with a deadline that applies to all reads and writes together, however slow each is.
 pub(crate) struct Timed<'a> {
     stream: &'a mut TcpStream,
     deadline: Instant,
@@ -39,7 +39,7 @@ impl Write for Timed<'_> {
     }
 }
 
-/// Counts events of a second.
+/// Counts events per second.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rate {
     since: Instant,
@@ -51,7 +51,7 @@ impl Rate {
         Rate { since: now, count: 0 }
     }
 
-    /// Counts an event; returns its number in the second that goes on.
+    /// Counts an event; returns how many there have been in the current second.
     pub(crate) fn count(&mut self, now: Instant) -> u32 {
         if now.saturating_duration_since(self.since) >= Duration::from_secs(1) {
             *self = Rate::new(now);
@@ -67,7 +67,7 @@ mod tests {
     use super::*;
     use std::net::{Ipv4Addr, TcpListener};
 
-    /// Whoever takes a byte now and then gets no more time than others.
+    /// A peer that reads or writes one byte now and then gets no more time than others.
     #[test]
     fn a_slow_reader_or_writer_ends_at_the_deadline() {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
@@ -84,7 +84,7 @@ mod tests {
         assert!(std::iter::repeat_with(|| timed.read(&mut [0; 1])).any(|read| read.is_err()));
     }
 
-    /// As many as are allowed, for ever; one more in a second, never.
+    /// A steady rate at the limit never exceeds it. The limit counts per second, not in total.
     #[test]
     fn a_rate_is_of_each_second() {
         let start = Instant::now();
