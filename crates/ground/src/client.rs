@@ -1,4 +1,4 @@
-//! A station's end of the link.
+//! A ground station's end of the link to a vehicle.
 
 use crate::commands::{CommandState, Commands};
 use crate::parameters::VehicleParameters;
@@ -10,10 +10,10 @@ use afbc_link::{
     ReceivedFrame, Sender, Uplink,
 };
 
-/// A ground station or companion computer at its end of the link to one vehicle.
+/// A ground station or companion computer that talks to one vehicle.
 ///
-/// It has no socket, clock or thread: [`Client::hear`] takes bytes, [`Client::turn`] the time, and [`Client::send`]
-/// hands out what is to be sent.
+/// The client has no socket, clock or thread: [`Client::hear`] takes received bytes, [`Client::turn`] takes the time,
+/// and [`Client::send`] hands out the frames to send.
 pub struct Client {
     address: Address,
     sender: Sender,
@@ -28,10 +28,10 @@ pub struct Client {
 }
 
 impl Client {
-    /// Usual address of a ground station.
+    /// Usual MAVLink address of a ground station.
     pub const STATION: Address = Address { system: 255, component: 190 };
 
-    /// Creates one with this address, which has no heartbeat.
+    /// Creates a client with this address that sends no heartbeat.
     pub fn new(address: Address) -> Self {
         Client {
             address,
@@ -47,17 +47,17 @@ impl Client {
         }
     }
 
-    /// Has it send a heartbeat whenever its time is a multiple of this \[ms\]; none: never.
+    /// Sends a heartbeat at each multiple of this period \[ms\]; `None` sends none.
     pub fn beat_every(&mut self, heartbeat_ms: Option<u64>) {
         self.heartbeat_ms = heartbeat_ms.filter(|period_ms| *period_ms > 0);
     }
 
-    /// Returns what the vehicle has said of itself.
+    /// Returns the state that the vehicle has reported.
     pub fn vehicle(&self) -> &VehicleState {
         &self.vehicle
     }
 
-    /// Returns the texts that have come since this was last called.
+    /// Returns the status texts since the last call.
     pub fn take_texts(&mut self) -> Vec<VehicleText> {
         std::mem::take(&mut self.vehicle.texts)
     }
@@ -77,18 +77,18 @@ impl Client {
         self.outgoing.push(message);
     }
 
-    /// Gives a command, and repeats it until it is answered.
+    /// Sends a command, and repeats it until it is answered or `patience` ends.
     pub fn command(&mut self, command: Command, patience: Patience) {
         self.commands.give(command, patience, self.now_ms());
         self.say(Uplink::Command(command));
     }
 
-    /// Returns what has become of the last command with the number of this one.
+    /// Returns the state of the last command with the same number as `command`.
     pub fn state(&self, command: Command) -> Option<CommandState> {
         self.commands.state(command)
     }
 
-    /// Returns the answer to it, once there is one.
+    /// Returns the answer to `command`, once there is one.
     pub fn answer(&self, command: Command) -> Option<Answer> {
         match self.commands.state(command) {
             Some(CommandState::Answered { answer, .. }) => Some(answer),
@@ -96,29 +96,29 @@ impl Client {
         }
     }
 
-    /// Uploads plans one after the other, in the place of any that are still on their way.
+    /// Uploads plans one after the other. They replace the plans that have not been uploaded yet.
     pub fn upload(&mut self, plans: impl IntoIterator<Item = (Plan, Vec<MissionItem>)>, patience: Patience) {
         let offer = self.uploads.begin(plans, patience, self.now_ms());
         self.outgoing.extend(offer.map(Uplink::Mission));
     }
 
-    /// Returns how the upload has ended, once.
+    /// Returns how the upload ended; only the first call returns it.
     pub fn take_upload_end(&mut self) -> Option<UploadEnd> {
         self.uploads.take_end()
     }
 
-    /// Reads all parameters, and asks again for those that do not come.
+    /// Reads all parameters, and requests missing ones again.
     pub fn read_parameters(&mut self) {
         let request = self.parameters.read(self.now_ms());
         self.say(Uplink::Parameter(request));
     }
 
-    /// Sets a parameter, of whose name at most 16 letters count: the vehicle answers with its value, or with an error.
+    /// Sets a parameter. At most 16 letters of the name count. The vehicle answers with its value, or with an error.
     pub fn set_parameter(&mut self, name: &str, value: f32) {
         self.say(Uplink::Parameter(ParameterRequest::set(name, value)));
     }
 
-    /// Goes on to this time: queues what is to be repeated, and the heartbeat.
+    /// Sets the time: queues due repetitions and the heartbeat.
     pub fn turn(&mut self, now_ms: u64) {
         let before_ms = self.now_ms.replace(now_ms);
         let Client { outgoing, commands, uploads, parameters, .. } = self;
@@ -134,27 +134,27 @@ impl Client {
         }
     }
 
-    /// Hands out each message that is to be sent, and its frame, in order.
+    /// Passes each queued message and its frame to `send`, in order.
     pub fn send(&mut self, mut send: impl FnMut(&Uplink, &[u8])) {
         for message in self.outgoing.drain(..) {
             send(&message, self.sender.send(&message, &mut [0; FRAME_MAX]));
         }
     }
 
-    /// Returns all that is to be sent.
+    /// Returns the frames of all queued messages.
     pub fn take(&mut self) -> Vec<u8> {
         let mut bytes = Vec::new();
         self.send(|_, frame| bytes.extend_from_slice(frame));
         bytes
     }
 
-    /// Takes bytes in any pieces, and passes to `see` each message of the vehicle that is for this station or for all.
-    /// Signed frames are left out.
+    /// Decodes received bytes, in pieces of any size. Passes to `see` each message of the vehicle that is addressed to
+    /// this station or to all. Signed frames are ignored.
     pub fn hear(&mut self, bytes: &[u8], see: impl FnMut(Address, &Downlink)) {
         self.hear_accepted(bytes, |frame| frame.stamp().is_none(), see);
     }
 
-    /// The same of the frames that `accept` accepts.
+    /// As [`Client::hear`], for the frames that `accept` accepts.
     pub fn hear_accepted(
         &mut self,
         bytes: &[u8],
@@ -170,7 +170,8 @@ impl Client {
         }
     }
 
-    /// Takes a message that was decoded elsewhere; false if another has sent it, or it is for another station.
+    /// Handles a message that was decoded elsewhere. Returns false if another vehicle sent it, or it is for another
+    /// station.
     pub fn receive(&mut self, from: Address, message: &Downlink) -> bool {
         let now_ms = self.now_ms();
         let to = match message {

@@ -1,25 +1,26 @@
-//! Commands and their answers. MAVLink's answer names the command's number only, so there is one of each at a time.
+//! Commands and their answers. MAVLink's answer gives only the command's number, so one command per number is open at a
+//! time.
 
 use crate::repeated::{Due, Patience, Repeated};
 use afbc_link::{Answer, Command, MavCmd};
 use std::collections::BTreeMap;
 
-/// A command that no vehicle knows, so that it is answered at once and changes nothing.
+/// A command that no vehicle knows: it is answered at once and changes nothing.
 pub const PING: Command = Command::Other(MavCmd::MAV_CMD_USER_5 as u16);
 
-/// What has become of a command.
+/// State of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CommandState {
-    /// Nothing yet, or the vehicle is at it.
+    /// No final answer yet; the vehicle may be working on it.
     Waiting,
-    /// Answered, after this time since the last try.
+    /// The vehicle has answered.
     Answered {
-        /// The answer; never [`Answer::InProgress`].
+        /// The final answer, never [`Answer::InProgress`].
         answer: Answer,
-        /// Time from the last try, or from the last answer that it is in progress \[ms\].
+        /// Time since the last try, or since the last [`Answer::InProgress`] \[ms\].
         after_ms: u64,
     },
-    /// Not answered in time.
+    /// The vehicle has not answered in time.
     Silent,
 }
 
@@ -33,7 +34,7 @@ struct Given {
 pub(crate) struct Commands(BTreeMap<u16, Given>);
 
 impl Commands {
-    /// An answer to an earlier command of this number is none to this one.
+    /// Stores a command. It replaces an earlier one of the same number, whose answer no longer counts.
     pub(crate) fn give(&mut self, command: Command, patience: Patience, now_ms: u64) {
         let repeated = Repeated::new(patience, now_ms);
         self.0.insert(command.id(), Given { command, repeated, state: CommandState::Waiting });
@@ -51,7 +52,7 @@ impl Commands {
         given.state = CommandState::Answered { answer, after_ms: given.repeated.waited_ms(now_ms) };
     }
 
-    /// Passes to `say` what is to be repeated.
+    /// Passes to `say` the commands that are due to be repeated.
     pub(crate) fn turn(&mut self, now_ms: u64, mut say: impl FnMut(Command)) {
         for given in self.0.values_mut().filter(|given| given.state == CommandState::Waiting) {
             match given.repeated.due(now_ms) {

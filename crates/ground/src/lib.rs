@@ -1,13 +1,13 @@
-//! A ground station's end of the link, for simulators, servers, tools and tests: without socket, clock or thread.
+//! A ground station's end of the link, for simulators, servers, tools and tests. It has no socket, clock or thread.
 //!
 //! # Reading order
 //!
-//! 1. [`Client`]: a station or companion computer. Messages, bytes and times in, messages and bytes out.
-//! 2. What it does for whoever uses it: commands that are repeated until they are answered ([`CommandState`]), uploads
-//!    of missions, fences and rally points ([`UploadEnd`]), [`VehicleParameters`] read and set. [`Patience`]: for how
-//!    long, and how often. Commands have the names and numbers of [`afbc_link::Command`].
-//! 3. [`VehicleState`]: what the vehicle says of itself.
-//! 4. [`bring_up`]: first steps with a board, propellers off.
+//! 1. [`Client`]: a station or companion computer. Messages, bytes and times go in; messages and bytes come out.
+//! 2. Services of the client: commands that are repeated until they are answered ([`CommandState`]), uploads of
+//!    missions, fences and rally points ([`UploadEnd`]), and parameters ([`VehicleParameters`]). [`Patience`] says how
+//!    often and for how long to try. Commands have the names and numbers of [`afbc_link::Command`].
+//! 3. [`VehicleState`]: the state that the vehicle reports.
+//! 4. [`bring_up`]: first checks of a board, with the propellers off.
 #![forbid(unsafe_code)]
 
 pub mod bring_up;

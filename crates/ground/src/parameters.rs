@@ -1,15 +1,15 @@
-//! The parameters that the vehicle has.
+//! Download of the vehicle's parameters.
 
 use crate::repeated::{Due, Patience, Repeated};
 use afbc_link::{ParameterRequest, ParameterValue};
 use std::collections::BTreeMap;
 
-/// Time without a further parameter after which the rest is asked for \[ms\], how often that is done, and how many are
-/// asked for at once.
+/// Time without a new parameter after which missing ones are requested \[ms\], how many times that is done, and how
+/// many parameters each time requests.
 const STALLED: Patience = Patience { answer_ms: 1_000, tries: 20 };
 const MISSING_MAX: usize = 10;
 
-/// The vehicle's parameters, as far as they are known.
+/// The vehicle's parameters that have been received.
 #[derive(Default)]
 pub struct VehicleParameters {
     count: Option<u16>,
@@ -18,22 +18,22 @@ pub struct VehicleParameters {
 }
 
 impl VehicleParameters {
-    /// Returns how many there are, once the vehicle has said so.
+    /// Returns the number of the vehicle's parameters, once the vehicle has reported it.
     pub fn count(&self) -> Option<u16> {
         self.count
     }
 
-    /// Returns those that are known, in the vehicle's order.
+    /// Returns the received parameters, in the vehicle's order.
     pub fn values(&self) -> impl ExactSizeIterator<Item = &ParameterValue> {
         self.values.values()
     }
 
-    /// True once every parameter has come.
+    /// Returns true once every parameter has been received.
     pub fn are_complete(&self) -> bool {
         self.count.is_some_and(|count| self.values.len() == usize::from(count))
     }
 
-    /// True while they are being read.
+    /// Returns true while parameters are being read.
     pub fn are_being_read(&self) -> bool {
         self.download.is_some()
     }
@@ -55,13 +55,13 @@ impl VehicleParameters {
         self.download.iter_mut().for_each(|download| download.progresses(now_ms));
     }
 
-    /// Passes to `say` what is to be asked again.
+    /// Passes to `say` the requests that are due to be repeated.
     pub(crate) fn turn(&mut self, now_ms: u64, mut say: impl FnMut(ParameterRequest)) {
         match self.download.as_mut().map_or(Due::Nothing, |download| download.due(now_ms)) {
             Due::Nothing => (),
             Due::GiveUp => self.download = None,
             Due::Again => match self.count {
-                // Nothing has come: the request itself was lost.
+                // No parameter has come, so the request itself was lost.
                 None => say(ParameterRequest::List),
                 Some(count) => {
                     let missing = (0..count).filter(|place| !self.values.contains_key(place)).take(MISSING_MAX);

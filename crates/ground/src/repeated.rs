@@ -1,22 +1,22 @@
-//! Questions that are repeated until something comes back.
+//! Questions that are repeated until an answer comes.
 
-/// For how long an answer is waited for, and how often the question is asked.
+/// Number of tries of a question, and time to wait for each answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
-    /// Time until the next try, or until it is given up \[ms\].
+    /// Time until the next try, or until giving up \[ms\].
     pub answer_ms: u64,
     /// Number of tries.
     pub tries: u32,
 }
 
 impl Patience {
-    /// Asked once, over a link that loses nothing.
+    /// Asks once, for a link that loses nothing.
     pub const ONCE: Self = Patience { answer_ms: 3_000, tries: 1 };
-    /// Asked three times.
+    /// Asks three times.
     pub const REPEATED: Self = Patience { answer_ms: 1_000, tries: 3 };
 }
 
-/// What is to be done about a question now.
+/// Action that is due for a question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Due {
     Nothing,
@@ -24,7 +24,7 @@ pub(crate) enum Due {
     GiveUp,
 }
 
-/// A question that has been asked.
+/// A question that has been asked and may be repeated.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Repeated {
     patience: Patience,
@@ -44,12 +44,13 @@ impl Repeated {
         now_ms.saturating_sub(self.since_ms)
     }
 
-    /// A part of the answer has come.
+    /// Notes that a part of the answer has come.
     pub(crate) fn progresses(&mut self, now_ms: u64) {
         self.since_ms = now_ms;
     }
 
-    /// The vehicle is at it: nothing needs to be asked again, and it is given the time of all tries for the next sign.
+    /// Notes that the vehicle is working on it: the question is not repeated, and the next sign may take the time of
+    /// all tries.
     pub(crate) fn goes_on(&mut self, now_ms: u64) {
         (self.tries_left, self.since_ms) = (0, now_ms);
         self.wait_ms = self.patience.answer_ms.saturating_mul(self.patience.tries.into());

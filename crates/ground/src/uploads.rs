@@ -1,28 +1,28 @@
-//! Uploads of missions, fences and rally points, which the vehicle asks for item by item.
+//! Uploads of missions, fences and rally points. The vehicle requests them item by item.
 
 use crate::repeated::{Due, Patience, Repeated};
 use afbc_link::{Mission, MissionItem, MissionResult, Plan};
 use std::collections::VecDeque;
 
-/// How an upload has ended.
+/// Result of an upload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UploadEnd {
-    /// The vehicle has all plans.
+    /// The vehicle has accepted all plans.
     Accepted,
-    /// It does not want one of them, and keeps what it had.
+    /// The vehicle has refused this plan, and keeps its old one.
     Refused(Plan, MissionResult),
-    /// It does not answer.
+    /// The vehicle does not answer while this plan is being uploaded.
     Silent(Plan),
 }
 
-/// Plans on their way, the first one now.
+/// Plans that are still to be uploaded; the first one is in progress.
 pub(crate) struct Uploads {
     plans: VecDeque<(Plan, Vec<MissionItem>)>,
     patience: Patience,
     repeated: Repeated,
-    /// What was said last, which is repeated.
+    /// Last message sent; it is repeated if no answer comes.
     said: Option<Mission>,
-    /// Number of items of the first plan up to the last one asked for.
+    /// Number of items of the first plan that the vehicle has requested.
     asked: usize,
     end: Option<UploadEnd>,
 }
@@ -35,7 +35,7 @@ impl Default for Uploads {
 }
 
 impl Uploads {
-    /// Replaces what is on its way; returns what is to be said.
+    /// Replaces the current upload; returns the first message to send.
     pub(crate) fn begin(
         &mut self,
         plans: impl IntoIterator<Item = (Plan, Vec<MissionItem>)>,
@@ -46,7 +46,7 @@ impl Uploads {
         self.offer(now_ms)
     }
 
-    /// Returns how it has ended, once.
+    /// Returns how the upload ended; only the first call returns it.
     pub(crate) fn take_end(&mut self) -> Option<UploadEnd> {
         self.end.take()
     }
@@ -70,7 +70,7 @@ impl Uploads {
         self.end = Some(end);
     }
 
-    /// Returns the answer.
+    /// Handles a message of the vehicle; returns the reply.
     pub(crate) fn hear(&mut self, message: &Mission, now_ms: u64) -> Option<Mission> {
         let (plan, items) = self.plans.front()?;
         let plan = *plan;
@@ -80,7 +80,7 @@ impl Uploads {
                 self.asked = self.asked.max(usize::from(number) + 1);
                 self.say(Some(Mission::Item(item, plan)), now_ms)
             }
-            // Nobody has all items who has not asked for them: that answers an earlier upload.
+            // An acknowledgement before all items were requested answers an earlier upload.
             Mission::Ack(MissionResult::ACCEPTED, of) if of == plan && self.asked == items.len() => {
                 self.plans.pop_front();
                 self.offer(now_ms)
@@ -93,7 +93,7 @@ impl Uploads {
         }
     }
 
-    /// Returns what is to be repeated.
+    /// Returns the message that is due to be repeated.
     pub(crate) fn turn(&mut self, now_ms: u64) -> Option<Mission> {
         let plan = self.plans.front()?.0;
         match self.repeated.due(now_ms) {

@@ -1,40 +1,40 @@
-//! The vehicle's state, as it tells it.
+//! State of the vehicle, as its messages report it.
 
 use afbc_link::{Address, Downlink, MavSeverity};
 
 /// `MAV_COMP_ID_AUTOPILOT1`.
 const AUTOPILOT: u8 = 1;
 
-/// What the vehicle has said of itself last.
+/// Newest state that the vehicle has reported.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VehicleState {
-    /// Who it is: the first autopilot that was heard.
+    /// Address of the first autopilot that was heard.
     pub address: Option<Address>,
-    /// Number of its heartbeats.
+    /// Number of its heartbeats that were received.
     pub heartbeats: u32,
     /// True if the motors may turn.
     pub armed: bool,
-    /// Mode, as `custom_mode` of HEARTBEAT.
+    /// Flight mode: `custom_mode` of HEARTBEAT.
     pub mode: u32,
-    /// Its texts, since they were last taken.
+    /// Status texts since they were last taken.
     pub texts: Vec<VehicleText>,
 }
 
-/// A STATUSTEXT.
+/// A STATUSTEXT of the vehicle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VehicleText {
-    /// When it came \[ms\].
+    /// Time of arrival \[ms\].
     pub at_ms: u64,
-    /// How grave it is.
+    /// MAVLink severity.
     pub severity: MavSeverity,
     /// The text.
     pub text: String,
 }
 
 impl VehicleState {
-    /// Takes a message; false if it is another's.
+    /// Handles a message; returns false if another vehicle sent it.
     pub(crate) fn hear(&mut self, from: Address, message: &Downlink, now_ms: u64) -> bool {
-        // Stations have heartbeats too, this one's own among them where a wire sends it back.
+        // Only autopilots count: stations send heartbeats, too, and a wire may send back this station's own.
         if matches!(message, Downlink::Heartbeat { .. }) && from.component == AUTOPILOT {
             self.address.get_or_insert(from);
         }

@@ -1,4 +1,4 @@
-//! What a station can rely on, over links that lose, repeat and delay, and among others who speak on them.
+//! Guarantees of the client on links that lose, repeat and delay frames and carry other stations' traffic.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 mod line;
@@ -11,10 +11,10 @@ use line::{COMPANION, Line, OTHER_VEHICLE, VEHICLE};
 use proptest::prelude::*;
 
 const STATION: Address = Client::STATION;
-/// Enough for any of the links here.
+/// Long enough for every link in these tests.
 const PATIENT: Patience = Patience { answer_ms: 600, tries: 60 };
 const LONG_MS: u64 = 60_000;
-/// Time after which nothing is under way any more, that could be taken for an answer to what follows.
+/// Time after which no old frame is left on the line that could be taken for an answer to the next question \[ms\].
 const UNDER_WAY_MS: u64 = 1_000;
 
 fn items(count: u16) -> Vec<MissionItem> {
@@ -31,7 +31,7 @@ fn ack(result: MissionResult, plan: Plan, to: Address) -> Downlink {
     Downlink::Mission { message: Mission::Ack(result, plan), to }
 }
 
-/// Returns what the client is about to say.
+/// Returns the messages that the client would send now.
 fn said(client: &mut Client) -> Vec<Uplink> {
     let mut said = Vec::new();
     client.send(|message, _| said.push(*message));
@@ -41,7 +41,8 @@ fn said(client: &mut Client) -> Vec<Uplink> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Whatever is lost, repeated, late or said by others: what counts as answered has been carried out.
+    /// A command that counts as accepted has reached the vehicle, whatever frames are lost, repeated, late or sent by
+    /// others.
     #[test]
     fn commands_get_through(seed: u64, lost in 0..40_u64, again in 0..40_u64, late_ms in 0..200_u64) {
         let mut line = Line::new(seed, [lost, again, late_ms]);
@@ -54,20 +55,20 @@ proptest! {
         }
     }
 
-    /// What counts as accepted is aboard, all of it and nothing else.
+    /// An upload that counts as accepted has left exactly these items aboard.
     #[test]
     fn plans_get_through(
         seed: u64, lost in 0..40_u64, again in 0..40_u64, late_ms in 0..200_u64,
         counts in prop::array::uniform3(0..9_u16),
     ) {
         let mut line = Line::new(seed, [lost, again, late_ms]);
-        // Each twice: nothing of the first upload may be taken for the second.
+        // Upload twice: no frame of the first upload may count for the second.
         for counts in [[5, 0, 2], counts] {
             let plans = [Plan::FENCE, Plan::RALLY, Plan::MISSION].into_iter().zip(counts.map(items));
             line.client.upload(plans.clone(), PATIENT);
             let mut end = None;
             line.run_until(LONG_MS, |client| { end = end.or(client.take_upload_end()); end.is_some() });
-            // A count that comes again, late, begins another upload at the vehicle, as the protocol has it.
+            // A late repeated MISSION_COUNT starts a new upload at the vehicle, as the protocol says.
             prop_assert!(end == Some(UploadEnd::Accepted) || (again > 0 && late_ms > 0), "{:?}", end);
             for (plan, items) in plans.filter(|_| end == Some(UploadEnd::Accepted)) {
                 prop_assert_eq!(line.vehicle.plan(plan), &items[..]);
@@ -92,7 +93,7 @@ proptest! {
         prop_assert!(held == value.to_le_bytes() || lost > 0);
     }
 
-    /// At each multiple of the period that has been passed, once.
+    /// The client sends exactly one heartbeat at each multiple of the period.
     #[test]
     fn heartbeats_keep_time(period_ms in 1..1_000_u64, steps_ms in prop::collection::vec(0..400_u64, 1..60)) {
         let mut client = Client::new(STATION);
@@ -114,7 +115,7 @@ proptest! {
     }
 }
 
-/// Nobody is there: so many tries, so long after each other, and then it is given up.
+/// Without any vehicle the client tries the set number of times at the set interval, and then gives up.
 #[test]
 fn silence_is_told() {
     let mut client = Client::new(STATION);
@@ -136,14 +137,14 @@ fn silence_is_told() {
     let once = (0, Uplink::Command(Command::Return));
     let of = |now_ms| [land, count].map(|message| (now_ms, message));
     assert_eq!(times, [&of(0)[..], &[once], &of(1_000), &of(2_000)].concat());
-    // What comes too late, or to nobody's question, changes nothing.
+    // Answers that come too late, or that answer no question, change nothing.
     for command in [Command::Land, Command::Arm] {
         client.receive(VEHICLE, &answer(command, Answer::Accepted, STATION));
     }
     assert_eq!((client.state(Command::Land), client.state(Command::Arm)), (Some(CommandState::Silent), None));
 }
 
-/// The list is asked for until it comes, and then what is missing of it, but not for ever.
+/// The client requests the list until it comes, then the missing parameters, but not for ever.
 #[test]
 fn missing_parameters_are_asked_for() {
     let mut line = Line::new(1, [0; 3]);
@@ -169,7 +170,7 @@ fn missing_parameters_are_asked_for() {
     assert!(!line.client.parameters().are_being_read() && !line.client.parameters().are_complete());
 }
 
-/// What is in progress is not repeated, and given more time.
+/// A command in progress is not repeated, and gets more time.
 #[test]
 fn what_is_in_progress_is_waited_for() {
     let mut client = Client::new(STATION);
@@ -185,19 +186,19 @@ fn what_is_in_progress_is_waited_for() {
     client.receive(VEHICLE, &answer(Command::SelfTest, Answer::Failed, STATION));
     let failed = CommandState::Answered { answer: Answer::Failed, after_ms: 200 };
     assert_eq!(client.state(Command::SelfTest), Some(failed));
-    // The first final answer counts; the next command waits for its own.
+    // The first final answer counts. The next command waits for its own answer.
     client.receive(VEHICLE, &answer(Command::SelfTest, Answer::Accepted, STATION));
     assert_eq!(client.state(Command::SelfTest), Some(failed));
     client.command(Command::SelfTest, Patience::ONCE);
     assert_eq!(client.state(Command::SelfTest), Some(CommandState::Waiting));
 }
 
-/// Others' answers are not this station's, whoever they are for, and whoever sends them.
+/// Answers for other stations, and answers by other vehicles, are ignored.
 #[test]
 fn answers_to_others_are_not_heard() {
     let mut client = Client::new(STATION);
     let beat = Downlink::Heartbeat { armed: false, failsafe: false, mode: 7 };
-    // A station's own heartbeat, sent back, is no vehicle's.
+    // A station's own heartbeat that is sent back does not count as a vehicle's.
     assert!(client.receive(STATION, &beat) && client.vehicle().address.is_none());
     assert!(client.receive(VEHICLE, &beat));
     client.command(Command::Arm, Patience::ONCE);
@@ -224,7 +225,8 @@ fn answers_to_others_are_not_heard() {
     assert_eq!(client.answer(Command::Arm), Some(Answer::Refused(3)));
 }
 
-/// A refusal ends the upload, also of the plans that would follow; what was accepted before is no answer to this one.
+/// A refusal ends the upload, including the plans that would follow. An acknowledgement before all items were requested
+/// does not count.
 #[test]
 fn refused_plans_end_the_upload() {
     let mut client = Client::new(STATION);
@@ -232,7 +234,7 @@ fn refused_plans_end_the_upload() {
     said(&mut client);
     client.receive(VEHICLE, &ack(MissionResult::ACCEPTED, Plan::FENCE, STATION));
     client.receive(VEHICLE, &ack(MissionResult::ERROR, Plan::MISSION, STATION));
-    // Neither is there an item of this number, nor is that plan under way.
+    // The first request has an unknown item number; the second names a plan that is not being uploaded.
     for message in [Mission::Request(2, Plan::FENCE), Mission::Request(0, Plan::MISSION)] {
         client.receive(VEHICLE, &Downlink::Mission { message, to: STATION });
     }

@@ -1,4 +1,4 @@
-//! The list with the firmware's code on simulated sensors, in lockstep, and with what is no board.
+//! Bring-ups of the firmware's code on simulated sensors in lockstep, and of things that are no board.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc_ground::bring_up::{BringUpLog, BringUpOptions, Error, Verdict, bring_up};
@@ -6,7 +6,7 @@ use afbc_link::{Address, Command, Downlink, FRAME_MAX, Key, SIGNED_FRAME_MAX, Se
 use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
 
-/// A vehicle, at the other end of a line in lockstep.
+/// A simulated vehicle at the other end of a line, in lockstep.
 struct Served(Server);
 
 impl Served {
@@ -23,7 +23,7 @@ impl Served {
     }
 }
 
-/// What a hand does when it is told this.
+/// Returns the simulator command for what a person does on this instruction; `wrong` swaps left and right.
 fn obeyed(told: &str, wrong: bool) -> Option<String> {
     let (right, left) = if wrong { ("left", "right") } else { ("right", "left") };
     let side = [("level", "down"), ("right side", right), ("left side", left), ("down", "front"), ("up", "back")]
@@ -33,7 +33,7 @@ fn obeyed(told: &str, wrong: bool) -> Option<String> {
     side.filter(|_| asked).map(|(_, side)| format!("hold {side}"))
 }
 
-/// Of a vehicle in the hands of somebody who does what is asked: what is told is obeyed in the next millisecond.
+/// Runs a bring-up with a person who does what is asked: each instruction is carried out in the next millisecond.
 fn with_a_hand(wrong: bool) -> BringUpLog {
     let orders = std::cell::RefCell::new(Vec::<String>::new());
     let mut served = Served::new("outdoor");
@@ -67,7 +67,7 @@ fn a_vehicle_in_good_hands_passes_every_step() {
     assert!(log.parameters.iter().any(|(name, value)| name == "SER_TEL1_BAUD" && value == "460800"));
 }
 
-/// A board whose y axis is wrong looks like one that is turned to the other side.
+/// Turning the board to the wrong side looks like a board whose y-axis is reversed, and fails.
 #[test]
 fn a_turn_to_the_other_side_fails() {
     let log = with_a_hand(true);
@@ -80,7 +80,7 @@ fn a_turn_to_the_other_side_fails() {
     assert!(!log.is_well());
 }
 
-/// Alone it does what needs no hand, in the same way each time, and shows what is wrong.
+/// Without a person, the bring-up does the steps that need none, gives the same log each time, and finds faults.
 #[test]
 fn alone_it_does_what_needs_no_hand() {
     let run = |fault: &str| {
@@ -113,7 +113,7 @@ fn alone_it_does_what_needs_no_hand() {
     assert_eq!((fails, reasons.as_str()), (Verdict::Failed, "the compass failed its self-test"));
 }
 
-/// Something else at the other end, which sends the same bytes each millisecond.
+/// Something other than a board sends the same bytes each millisecond.
 #[test]
 fn what_is_no_board_is_named() {
     let beat = |armed| {
@@ -133,7 +133,7 @@ fn what_is_no_board_is_named() {
     for (bytes, wanted) in [
         (Vec::new(), "sends nothing"),
         (vec![0x24, 0x4d, 0x3c, 0xfd, 0x09, 0x00], "bytes and no MAVLink heartbeat"),
-        // Its own words, sent back by a wire from TX to RX.
+        // The station's own frames, sent back by a wire from TX to RX.
         (uplink, "bytes and no MAVLink heartbeat"),
         (beat(false), "not this firmware"),
         (beat(true), "is armed"),

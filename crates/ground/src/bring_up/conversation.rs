@@ -1,4 +1,4 @@
-//! A conversation with a vehicle, a millisecond at a time.
+//! A conversation with a vehicle in steps of one millisecond.
 
 use super::error::{Error, ExchangeError};
 use super::heard::Heard;
@@ -7,20 +7,19 @@ use crate::commands::CommandState;
 use crate::repeated::Patience;
 use afbc_link::{Answer, Command, Decoder, InertialSample, ReceivedFrame};
 
-/// What carries bytes to the board and back.
+/// Carries bytes to the board and back.
 ///
-/// It sends the bytes that it is given, runs a millisecond, and passes those that have come to the other function, in
-/// pieces of any size.
+/// Sends the given bytes, runs one millisecond, and passes the received bytes to the callback, in pieces of any size.
 pub type Exchange<'a> = dyn FnMut(&[u8], &mut dyn FnMut(&[u8])) -> Result<(), ExchangeError> + 'a;
 
-/// Time between two heartbeats \[ms\].
+/// Heartbeat period \[ms\].
 const BEAT_MS: u64 = 1_000;
 
-/// A conversation with a vehicle.
+/// A ground station's conversation with one vehicle.
 pub(crate) struct Conversation<'a> {
     exchange: &'a mut Exchange<'a>,
     pub(crate) client: Client,
-    /// The same bytes: what sensors read is a message by itself.
+    /// Second decoder of the same bytes, for the inertial samples.
     samples: Decoder<InertialSample>,
     now_ms: u64,
     bytes: u64,
@@ -35,17 +34,17 @@ impl<'a> Conversation<'a> {
         Conversation { exchange, client, samples, now_ms: 0, bytes: 0, heard: Heard::default() }
     }
 
-    /// Time since it began \[ms\].
+    /// Returns the time since the conversation began \[ms\].
     pub(crate) fn now_ms(&self) -> u64 {
         self.now_ms
     }
 
-    /// Number of bytes that have come.
+    /// Returns the number of bytes received.
     pub(crate) fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// Lets a millisecond go by.
+    /// Sends the queued frames, runs one millisecond, and handles the received bytes.
     fn exchange(&mut self) -> Result<(), Error> {
         let Conversation { exchange, client, samples, now_ms, bytes, heard } = self;
         client.turn(*now_ms);
@@ -68,12 +67,12 @@ impl<'a> Conversation<'a> {
         if signed { Err(Error::Signed) } else { Ok(()) }
     }
 
-    /// Lets this time go by.
+    /// Receives for this time \[ms\].
     pub(crate) fn listen(&mut self, milliseconds: u64) -> Result<(), Error> {
         (0..milliseconds).try_for_each(|_| self.exchange())
     }
 
-    /// Waits until this is so, for so long at most; returns whether it is.
+    /// Waits at most `patience_ms` until `done` is true; returns whether it is.
     pub(crate) fn wait(&mut self, patience_ms: u64, mut done: impl FnMut(&mut Self) -> bool) -> Result<bool, Error> {
         for _ in 0..patience_ms {
             if done(self) {
@@ -84,20 +83,20 @@ impl<'a> Conversation<'a> {
         Ok(done(self))
     }
 
-    /// Gives a command; returns the answer, and after how long it came \[ms\].
+    /// Sends a command; returns the answer and the time since the last try \[ms\], or `None` without an answer.
     pub(crate) fn command(&mut self, command: Command) -> Result<Option<(Answer, u64)>, Error> {
         self.client.command(command, Patience::REPEATED);
         loop {
             match self.client.state(command) {
                 Some(CommandState::Waiting) => self.exchange()?,
-                // What comes within a millisecond is there at its end.
+                // The answer came during the last millisecond: count this one, too.
                 Some(CommandState::Answered { answer, after_ms }) => return Ok(Some((answer, after_ms + 1))),
                 Some(CommandState::Silent) | None => return Ok(None),
             }
         }
     }
 
-    /// Reads all parameters, as far as they come.
+    /// Reads all parameters; returns when they are complete or the client gives up.
     pub(crate) fn read_parameters(&mut self) -> Result<(), Error> {
         self.client.read_parameters();
         while self.client.parameters().are_being_read() {
@@ -106,7 +105,7 @@ impl<'a> Conversation<'a> {
         Ok(())
     }
 
-    /// Texts that have come after the first so many.
+    /// Returns the texts that came after the first `told` texts.
     pub(crate) fn texts_after(&self, told: usize) -> impl Iterator<Item = &str> {
         self.client.vehicle().texts.iter().skip(told).map(|text| text.text.as_str())
     }

@@ -1,25 +1,25 @@
-//! Why there is no log.
+//! Reasons why a bring-up ends without a log.
 
 use std::fmt;
 
-/// Why an [`Exchange`](super::Exchange) has failed.
+/// Reason why an [`Exchange`](super::Exchange) failed.
 pub type ExchangeError = Box<dyn std::error::Error + Send + Sync>;
 
-/// Why there is no log; displayed as one line.
+/// Reason why a bring-up ends without a log; displayed as one line.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Error {
-    /// Nothing has come.
+    /// The board sent nothing.
     Silent,
-    /// Bytes have come, so many, and no heartbeat of an autopilot.
+    /// The board sent this number of bytes, but no heartbeat of an autopilot.
     Nonsense(u64),
-    /// It speaks MAVLink and is not this firmware.
+    /// The board speaks MAVLink, but runs other firmware.
     Stranger,
     /// The vehicle is armed.
     Armed,
-    /// Its frames are signed.
+    /// The vehicle signs its frames.
     Signed,
-    /// The connection has failed.
+    /// The connection failed.
     Connection(ExchangeError),
 }
 

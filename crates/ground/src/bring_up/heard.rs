@@ -1,10 +1,10 @@
-//! What the vehicle has said of its sensors and its clock.
+//! Messages in which the vehicle reported its sensors and its clock.
 
 use afbc_link::telemetry::{ActuatorOutputs, BatteryStatus, Fix, SystemStatus, Version};
 use afbc_link::{Downlink, HealthArray, InertialSample, Telemetry};
 use nalgebra::Vector3;
 
-/// The newest of each message, and what is counted.
+/// The newest message of each kind, and some counts.
 #[derive(Debug, Default)]
 pub(crate) struct Heard {
     pub(crate) health: Option<HealthArray>,
@@ -16,16 +16,16 @@ pub(crate) struct Heard {
     /// Roll, pitch, yaw \[rad\].
     pub(crate) attitude_rad: Option<Vector3<f32>>,
     pub(crate) attitudes: u32,
-    /// Altitudes since they were last taken \[m\].
+    /// Altitudes since the list was last cleared \[m\].
     pub(crate) altitudes_m: Vec<f32>,
-    /// Samples since they were last taken.
+    /// Inertial samples since the list was last cleared.
     pub(crate) samples: Vec<InertialSample>,
-    /// How often its clock has run backward.
+    /// Number of times that the vehicle's clock has jumped back, as after a restart.
     pub(crate) restarts: u32,
 }
 
 impl Heard {
-    /// Takes a message.
+    /// Stores a message.
     pub(crate) fn take(&mut self, message: &Downlink) {
         match *message {
             Downlink::Health(health) => {

@@ -1,15 +1,15 @@
-//! The log.
+//! The log of a bring-up.
 
 use std::fmt::{self, Display, Write as _};
 
-/// What a step has come to.
+/// Result of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// As it should be.
+    /// All checks passed.
     Passed,
-    /// Not as it should be.
+    /// A check failed.
     Failed,
-    /// Not done: nobody was there to do it, or the board has nothing of the kind.
+    /// Not done: nobody was there to do it, or the board lacks the device.
     Skipped,
 }
 
@@ -23,31 +23,31 @@ impl Display for Verdict {
     }
 }
 
-/// A step with what it has found.
+/// A step with its findings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BringUpStep {
-    /// Its name.
+    /// Name of the step.
     pub name: &'static str,
-    /// Its verdict.
+    /// Result of the step.
     pub verdict: Verdict,
-    /// Why it has failed, or was not done.
+    /// Reasons for a failed or skipped step.
     pub reasons: Vec<String>,
-    /// What was found: a name and a value with its unit.
+    /// Findings: a name, and a value with its unit.
     pub findings: Vec<(String, String)>,
 }
 
 impl BringUpStep {
-    /// A step that has found nothing wrong yet.
+    /// Creates a step that has passed so far.
     pub(crate) fn new(name: &'static str) -> Self {
         BringUpStep { name, verdict: Verdict::Passed, reasons: Vec::new(), findings: Vec::new() }
     }
 
-    /// Adds what was found.
+    /// Adds a finding.
     pub(crate) fn found(&mut self, what: &str, value: impl Display) {
         self.findings.push((what.into(), value.to_string()));
     }
 
-    /// Fails with this reason unless it is so.
+    /// Fails the step with the reason `otherwise` unless `is_so`.
     pub(crate) fn check(&mut self, is_so: bool, otherwise: impl Display) {
         if !is_so {
             self.verdict = Verdict::Failed;
@@ -55,7 +55,7 @@ impl BringUpStep {
         }
     }
 
-    /// A step that is not done, for this reason.
+    /// Marks the step as skipped for this reason.
     pub(crate) fn skipped(mut self, reason: impl Display) -> Self {
         self.verdict = Verdict::Skipped;
         self.reasons.push(reason.to_string());
@@ -63,28 +63,28 @@ impl BringUpStep {
     }
 }
 
-/// All steps, and what is not a step's.
+/// Log of a bring-up: all steps, and what belongs to no step.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct BringUpLog {
-    /// What was connected, when and how: a name and a value.
+    /// About the board, the time and the connection: a name and a value.
     pub head: Vec<(String, String)>,
-    /// Steps in their order.
+    /// Steps in the order they were done.
     pub steps: Vec<BringUpStep>,
-    /// Parameters of the vehicle, names and values.
+    /// Names and values of the vehicle's parameters.
     pub parameters: Vec<(String, String)>,
-    /// Texts of the vehicle, with the time since the beginning \[s\].
+    /// Status texts of the vehicle, with the time since the beginning \[s\].
     pub texts: Vec<(f64, String)>,
 }
 
 impl BringUpLog {
-    /// True if no step has failed.
+    /// Returns true if no step has failed.
     #[must_use]
     pub fn is_well(&self) -> bool {
         self.steps.iter().all(|step| step.verdict != Verdict::Failed)
     }
 
-    /// Returns it as a page of Markdown.
+    /// Returns the log as a page of Markdown.
     #[must_use]
     pub fn page(&self) -> String {
         let mut page = String::from("# Bring-up\n\n");
@@ -107,7 +107,7 @@ impl BringUpLog {
     }
 }
 
-/// Writes a table of two columns.
+/// Writes a table with two columns.
 fn table(page: &mut String, [first, second]: [&str; 2], rows: &[(String, String)]) {
     let _ = writeln!(page, "| {first} | {second} |\n|---|---|");
     for (name, value) in rows {
@@ -115,7 +115,7 @@ fn table(page: &mut String, [first, second]: [&str; 2], rows: &[(String, String)
     }
 }
 
-/// Text as a cell, whatever the vehicle has sent.
+/// Makes a text safe for a table cell: replaces `|` and control characters by spaces.
 fn cell(text: &str) -> String {
     text.chars().map(|character| if character == '|' || character.is_control() { ' ' } else { character }).collect()
 }

@@ -1,12 +1,12 @@
-//! First steps with a board, propellers off: a fixed list of questions over MAVLink and of things to do by hand, each
-//! with a verdict, and a log of all answers that people can send back. Nothing is armed and no parameter is changed.
+//! Bring-up of a board with the propellers off: a fixed list of MAVLink requests and manual actions, each with a
+//! verdict. The log of all answers can be sent to others. Nothing is armed and no parameter is changed.
 //!
 //! # Reading order
 //!
-//! 1. [`bring_up`]: the list. Its steps are in `steps` and `turns`.
-//! 2. [`BringUpLog`]: what it comes to, and its text.
-//! 3. `conversation`: a [`Client`](crate::Client) at the end of an [`Exchange`], a millisecond at a time. It has no
-//!    clock: in lockstep the same vehicle gives the same log.
+//! 1. [`bring_up`]: runs the list. Its steps are in `steps` and `turns`.
+//! 2. [`BringUpLog`]: the results, and their text.
+//! 3. `conversation`: drives a [`Client`](crate::Client) over an [`Exchange`] in steps of one millisecond. It reads no
+//!    clock, so the same vehicle in lockstep gives the same log.
 
 mod conversation;
 mod error;

@@ -1,4 +1,4 @@
-//! The list of steps.
+//! Runs all steps of a bring-up.
 
 use super::conversation::{Conversation, Exchange};
 use super::error::Error;
@@ -7,23 +7,23 @@ use super::steps;
 use super::turns;
 use afbc_link::ParameterValue;
 
-/// Longest wait for the first heartbeat, of which there is one per second, and for the health array \[ms\].
+/// Longest wait for the first heartbeat (sent once per second) and for the health array \[ms\].
 const SILENT_MS: u64 = 5_000;
 
-/// How it is done.
+/// Options of a bring-up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BringUpOptions {
-    /// Time at rest over which noise and ticks are measured \[s\].
+    /// Time at rest for measuring noise and tick times \[s\].
     pub rest_s: u32,
     /// True if somebody is there to turn the board, warm it and take it outside.
     pub is_attended: bool,
 }
 
-/// Goes through all steps with the board at the other end of `exchange`; `tell` is given each line that says what is
-/// going on, or what is to be done by hand.
+/// Runs all steps with the board at the other end of `exchange`. `tell` receives each line about the progress, or about
+/// what to do by hand.
 ///
 /// # Errors
-/// If nothing can be asked: the board is silent, sends something else, is armed, or the connection fails.
+/// Fails if the board is silent, sends something else, is armed or signs its frames, or if the connection fails.
 pub fn bring_up(
     exchange: &mut Exchange<'_>,
     options: BringUpOptions,
@@ -68,7 +68,7 @@ pub fn bring_up(
 
 fn name_and_value(parameter: &ParameterValue) -> (String, String) {
     let name: Vec<u8> = parameter.name.iter().copied().take_while(|&byte| byte != 0).collect();
-    // MAV_PARAM_TYPE: 9 is a float, even numbers below it are signed.
+    // MAV_PARAM_TYPE: 9 is a float; even numbers below it are signed integers.
     let value = match parameter.kind {
         9 => f32::from_le_bytes(parameter.value).to_string(),
         2 | 4 | 6 => i32::from_le_bytes(parameter.value).to_string(),

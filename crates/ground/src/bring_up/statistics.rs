@@ -1,8 +1,8 @@
-//! Mean and standard deviation of three axes.
+//! Mean and standard deviation of vectors.
 
 use nalgebra::Vector3;
 
-/// Sums over vectors; standard deviations by Welford's recursion.
+/// Running mean and sum of squared differences, by Welford's algorithm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct VectorStatistics {
     count: u32,
@@ -27,7 +27,7 @@ impl VectorStatistics {
         self.mean
     }
 
-    /// Zeros for fewer than two.
+    /// Returns the standard deviation; zeros for fewer than two vectors.
     pub(crate) fn deviation(&self) -> Vector3<f64> {
         let divisor = f64::from(self.count.saturating_sub(1).max(1));
         self.squares.map(|squares| (squares / divisor).sqrt())
@@ -38,7 +38,7 @@ impl VectorStatistics {
 mod tests {
     use super::*;
 
-    /// 2, 4, 4, 4, 5, 5, 7, 9: mean 5, sum of squares 32, over seven.
+    /// The numbers 2, 4, 4, 4, 5, 5, 7, 9 have the mean 5. Their squared differences sum to 32, divided by seven.
     #[test]
     fn of_eight_numbers() {
         let numbers = [2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0];

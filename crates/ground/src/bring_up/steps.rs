@@ -1,4 +1,4 @@
-//! Steps in which the board does not move.
+//! Steps during which the board does not move.
 
 use super::conversation::Conversation;
 use super::error::Error;
@@ -8,15 +8,15 @@ use crate::commands::PING;
 use afbc_link::{Answer, Command, InertialSample};
 use nalgebra::Vector3;
 
-/// Messages that are asked for.
+/// MAVLink message that the bring-up requests.
 const HIGHRES_IMU: u32 = 105;
-/// Shorter than the 20 ms of a sample, so that each is sent \[us\].
+/// Requested interval \[us\]: shorter than the 20 ms between samples, so that every sample is sent.
 const SAMPLE_US: i32 = 10_000;
-/// Time of a sample, over which the board takes means \[s\].
+/// Time over which the board averages each sample \[s\].
 const SAMPLE_S: f64 = 0.02;
 const GRAVITY_M_S2: f64 = 9.81;
 
-/// `MAV_SYS_STATUS_SENSOR`, of those that this firmware reports.
+/// Bits of `MAV_SYS_STATUS_SENSOR` that this firmware reports.
 const SENSORS: [(u32, &str); 9] = [
     (1, "gyroscope"),
     (2, "accelerometer"),
@@ -28,17 +28,17 @@ const SENSORS: [(u32, &str); 9] = [
     (0x20_0000, "attitude"),
     (0x0200_0000, "battery"),
 ];
-/// Those whose health depends on the place: outside, or a tracker's sight.
+/// Sensors that are healthy only outdoors or in view of a tracker.
 const ELSEWHERE: u32 = 0x20 | 0x80;
 const GYROSCOPE: u32 = 1;
 
-/// What the texts with the results of self-tests contain, and of those that have failed.
+/// Phrase in the text of every self-test result, and phrase in the text of a failed one.
 const SELF_TEST: &str = "its self-test";
 const FAILED_TEST: &str = "failed its self-test";
-/// Longest wait for a result, or for a further one \[ms\].
+/// Longest wait for the next self-test result \[ms\].
 const SELF_TEST_MS: u64 = 3_000;
 
-/// Version of the firmware.
+/// Reads the version of the firmware.
 pub(crate) fn version(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
     let mut step = BringUpStep::new("version");
     talk.command(Command::RequestMessage { message: 148, index: 0 })?;
@@ -57,7 +57,7 @@ pub(crate) fn version(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error>
     Ok(step)
 }
 
-/// All parameters.
+/// Reads all parameters.
 pub(crate) fn parameters(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
     let mut step = BringUpStep::new("parameters");
     talk.read_parameters()?;
@@ -68,11 +68,11 @@ pub(crate) fn parameters(talk: &mut Conversation<'_>) -> Result<BringUpStep, Err
     Ok(step)
 }
 
-/// What is there, and whether it is well.
+/// Reads which sensors are present and healthy.
 pub(crate) fn sensors(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
     let mut step = BringUpStep::new("sensors");
     talk.wait(3_000, |talk| talk.heard.system.is_some())?;
-    // Again, after what was unwell at the start.
+    // Wait for a second message: some sensors may have been unhealthy at the start.
     talk.heard.system = None;
     talk.wait(3_000, |talk| talk.heard.system.is_some())?;
     let Some(system) = talk.heard.system else {
@@ -96,7 +96,7 @@ pub(crate) fn sensors(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error>
     Ok(step)
 }
 
-/// The sensors' own tests, of those that have one.
+/// Runs the built-in self-tests of the sensors that have one.
 pub(crate) fn self_tests(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
     let mut step = BringUpStep::new("self-tests");
     let told = talk.client.vehicle().texts.len();
@@ -113,7 +113,7 @@ pub(crate) fn self_tests(talk: &mut Conversation<'_>) -> Result<BringUpStep, Err
             return Ok(step);
         }
     }
-    // Until there is no further one.
+    // Wait until no further result comes.
     let mut count = 0;
     while talk.wait(SELF_TEST_MS, |talk| results(talk).len() > count)? {
         count = results(talk).len();
@@ -129,7 +129,7 @@ pub(crate) fn self_tests(talk: &mut Conversation<'_>) -> Result<BringUpStep, Err
     Ok(step)
 }
 
-/// Ticks, and noise at rest.
+/// Measures tick times, and noise at rest.
 pub(crate) fn at_rest(talk: &mut Conversation<'_>, rest_s: u32, add: &mut dyn FnMut(BringUpStep)) -> Result<(), Error> {
     let senses = senses(talk);
     show_samples(talk, true)?;
@@ -174,12 +174,12 @@ pub(crate) fn at_rest(talk: &mut Conversation<'_>, rest_s: u32, add: &mut dyn Fn
     Ok(())
 }
 
-/// True if the vehicle has an inertial sensor.
+/// Returns true if the vehicle has an inertial sensor.
 pub(crate) fn senses(talk: &Conversation<'_>) -> bool {
     talk.heard.system.is_some_and(|system| system.present & GYROSCOPE != 0)
 }
 
-/// Asks for samples, or for no more.
+/// Starts or stops the inertial samples.
 pub(crate) fn show_samples(talk: &mut Conversation<'_>, shows: bool) -> Result<(), Error> {
     let interval_us = if shows { SAMPLE_US } else { 0 };
     talk.command(Command::SetInterval { message: HIGHRES_IMU, interval_us })?;
@@ -190,7 +190,8 @@ fn rate(count: u32, elapsed_s: f64) -> f64 {
     if elapsed_s > 0.0 { f64::from(count) / elapsed_s } else { 0.0 }
 }
 
-/// What a sensor at rest shows. The limits are some ten times what the parts' data sheets say, and a hand's tremor.
+/// Checks the noise of the inertial sensors at rest. The limits are some ten times the data sheets' values, and allow
+/// for a hand's tremor.
 fn inertial_noise(step: &mut BringUpStep, samples: &[InertialSample], elapsed_s: f64) {
     const RATES_MAX_RAD_S: f64 = 0.02;
     const FORCE_MAX_M_S2: f64 = 0.2;
@@ -203,7 +204,7 @@ fn inertial_noise(step: &mut BringUpStep, samples: &[InertialSample], elapsed_s:
     );
     step.found("gyroscope, mean [rad/s]", three(rates.mean()));
     step.found("gyroscope, deviation [rad/s]", three(rates.deviation()));
-    // White noise of density n has the deviation n / sqrt(2 T) in means over T.
+    // White noise of density n, averaged over T, has the deviation n / sqrt(2 T).
     let density = |deviation: Vector3<f64>| deviation * (2.0 * SAMPLE_S).sqrt();
     step.found("gyroscope, density [rad/s/sqrt(Hz)]", three(density(rates.deviation())));
     step.found("accelerometer, mean [m/s2]", three(force.mean()));
@@ -219,7 +220,7 @@ fn inertial_noise(step: &mut BringUpStep, samples: &[InertialSample], elapsed_s:
     step.check(rates.mean().norm() < BIAS_MAX_RAD_S, "the gyroscope's offset is above 0.2 rad/s: calibrate it");
 }
 
-/// True gravity, upward.
+/// Checks that the specific force at rest is 9.81 m/s² upward.
 fn level(samples: &[InertialSample]) -> BringUpStep {
     const TILT_MAX_RAD: f64 = 0.26;
     let mut step = BringUpStep::new("level");
@@ -232,7 +233,7 @@ fn level(samples: &[InertialSample]) -> BringUpStep {
     step
 }
 
-/// The magnetometer at rest.
+/// Checks the magnetometer at rest.
 fn field(samples: &[InertialSample]) -> BringUpStep {
     let mut step = BringUpStep::new("magnetic field");
     let fields: Vec<_> = samples.iter().filter_map(|sample| sample.field_ut).collect();
@@ -244,7 +245,7 @@ fn field(samples: &[InertialSample]) -> BringUpStep {
     step.found("mean, body frame [uT]", three(field.mean()));
     step.found("strength", format!("{:.1} uT", field.mean().norm()));
     step.found("deviation [uT]", three(field.deviation()));
-    // The earth's is 22 to 67 uT.
+    // The earth's field is 22 to 67 uT strong.
     step.check((15.0..=80.0).contains(&field.mean().norm()), "not the earth's: take it away from iron, and calibrate");
     step
 }
@@ -254,7 +255,7 @@ fn three(vector: Vector3<f64>) -> String {
     format!("{x:.6} {y:.6} {z:.6}")
 }
 
-/// How the gyroscope's offset changes with the temperature.
+/// Measures how the gyroscope's offset changes when the sensor is warmed.
 pub(crate) fn warmth(
     talk: &mut Conversation<'_>,
     is_attended: bool,
@@ -286,7 +287,7 @@ pub(crate) fn warmth(
     Ok(step)
 }
 
-/// The GNSS receiver.
+/// Waits for a GNSS fix.
 pub(crate) fn position(
     talk: &mut Conversation<'_>,
     is_attended: bool,
@@ -314,7 +315,7 @@ pub(crate) fn position(
     Ok(step)
 }
 
-/// The battery's converter.
+/// Reads the measured battery voltage and current.
 pub(crate) fn battery(talk: &Conversation<'_>) -> BringUpStep {
     let mut step = BringUpStep::new("battery");
     let Some(battery) = talk.heard.battery else { return step.skipped("no reading of a battery") };
@@ -325,7 +326,7 @@ pub(crate) fn battery(talk: &Conversation<'_>) -> BringUpStep {
     step
 }
 
-/// What the motors are told while disarmed: nothing.
+/// Checks that all motor outputs are zero while disarmed.
 pub(crate) fn motors(talk: &Conversation<'_>) -> BringUpStep {
     let mut step = BringUpStep::new("motors, disarmed");
     match talk.heard.outputs {
@@ -339,7 +340,7 @@ pub(crate) fn motors(talk: &Conversation<'_>) -> BringUpStep {
     step
 }
 
-/// What speaks against arming, which is not tried.
+/// Asks the vehicle for its arming checks, without arming it.
 pub(crate) fn arming(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
     let mut step = BringUpStep::new("checks before arming");
     let told = talk.client.vehicle().texts.len();
@@ -353,7 +354,7 @@ pub(crate) fn arming(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> 
     Ok(step)
 }
 
-/// The line.
+/// Measures the link: loss, corruption and round trip.
 pub(crate) fn link(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
     const PINGS: u32 = 20;
     let mut step = BringUpStep::new("link");

@@ -1,4 +1,4 @@
-//! Turning the board by hand: signs of gyroscope, accelerometer and attitude.
+//! Turns of the board by hand, which check the signs of gyroscope, accelerometer and attitude.
 
 use super::conversation::Conversation;
 use super::error::Error;
@@ -7,15 +7,15 @@ use super::log::BringUpStep;
 use super::steps::senses;
 use nalgebra::Vector3;
 
-/// Longest wait for a hand \[ms\].
+/// Longest wait for the person to do what is asked \[ms\].
 const PATIENCE_MS: u64 = 60_000;
-/// Largest angle between gravity and the axis that is to be vertical \[rad\]: 30 degrees.
+/// Largest angle between gravity and the axis that should be vertical \[rad\]: 30 degrees.
 const ASIDE_MAX_RAD: f32 = 0.52;
-/// Longest time between two samples that is counted \[s\].
+/// A longer time between two samples counts as this \[s\].
 const GAP_MAX_S: f64 = 0.1;
 
-/// A side, what to do, the axis that points up then (x forward, y left, z up), and the turn from level, whose sign the
-/// gyroscope and the attitude have to show.
+/// A turn by hand from level: its name, the instruction, the direction that points up afterwards (x forward, y left, z
+/// up), and the axis and sign of the rotation that gyroscope and attitude must show.
 struct Turn {
     name: &'static str,
     order: &'static str,
@@ -31,7 +31,7 @@ const TURNS: [Turn; 4] = [
     Turn { name: "nose up", order: "turn its nose straight up", up: [1.0, 0.0, 0.0], axis: 1, sign: -1.0 },
 ];
 
-/// All turns.
+/// Runs all turns.
 pub(crate) fn turns(
     talk: &mut Conversation<'_>,
     is_attended: bool,
@@ -49,7 +49,7 @@ pub(crate) fn turns(
         let is_level = talk.wait(PATIENCE_MS, |talk| level.follow(&mut talk.heard, &Vector3::z()))?;
         step.check(is_level, "it was not held level");
         tell(turn.order);
-        // Anew, so that the angle counts from level on.
+        // Start anew, so that the angle counts from level.
         let mut turned = Turned::default();
         let is_done = talk.wait(PATIENCE_MS, |talk| turned.follow(&mut talk.heard, &turn.up.into()))?;
         let angle_rad = turned.angle_rad.get(turn.axis).copied().unwrap_or_default() * turn.sign;
@@ -59,7 +59,7 @@ pub(crate) fn turns(
         step.found("turned by the gyroscope, expected 90", format!("{:.0} degrees", angle_rad.to_degrees()));
         step.found("by the estimate, expected 90", format!("{:.0} degrees", attitude_rad.to_degrees()));
         step.check(is_done, "the accelerometer has not shown that side up which should be");
-        // Half a right angle and one and a half.
+        // Between half and one and a half right angles.
         step.check((0.78..2.36).contains(&angle_rad), "the gyroscope has not shown this turn");
         step.check(attitude_rad > 0.5, "the attitude has not shown this turn");
         add(step);
@@ -67,18 +67,18 @@ pub(crate) fn turns(
     Ok(())
 }
 
-/// What the samples have shown of a turn.
+/// Result of following the samples during a turn.
 #[derive(Default)]
 struct Turned {
     force_m_s2: Vector3<f32>,
     angle_rad: Vector3<f64>,
     last_us: Option<u64>,
-    /// Samples in the attitude that is waited for, one after the other.
+    /// Number of consecutive samples in the requested attitude.
     held: u32,
 }
 
 impl Turned {
-    /// Takes the samples that have come; true once this axis has been up for half a second.
+    /// Takes the new samples; returns true once `up` has pointed up for half a second.
     fn follow(&mut self, heard: &mut Heard, up: &Vector3<f32>) -> bool {
         const HELD: u32 = 25;
         for sample in heard.samples.drain(..) {

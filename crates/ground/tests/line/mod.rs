@@ -1,4 +1,4 @@
-//! A vehicle by the letter of the protocols, and a line to it that loses, repeats and delays.
+//! A vehicle that follows the protocols strictly, and a line to it that loses, repeats and delays frames.
 
 use afbc_ground::Client;
 use afbc_link::{
@@ -9,20 +9,20 @@ use afbc_link::{
 pub(crate) const VEHICLE: Address = Address { system: 1, component: 1 };
 pub(crate) const OTHER_VEHICLE: Address = Address { system: 2, component: 1 };
 pub(crate) const COMPANION: Address = Address { system: 245, component: 191 };
-/// Time after which the vehicle asks for an item again \[ms\].
+/// Time after which the vehicle requests an item again \[ms\].
 const AGAIN_MS: u64 = 250;
 const STEP_MS: usize = 5;
 
-/// What a vehicle does, as the protocols have it.
+/// Test vehicle that answers commands, plans and parameters as the protocols say.
 pub(crate) struct Vehicle {
     sender: Sender,
     decoder: Decoder<Uplink>,
     pub(crate) commands: Vec<Command>,
     parameters: Vec<ParameterValue>,
     plans: [Vec<MissionItem>; 3],
-    /// Plan, number of items, those that have come, and when the last one was asked for \[ms\].
+    /// Upload in progress: plan, number of items, items received, and time of the last request \[ms\].
     upload: Option<(Plan, usize, Vec<MissionItem>, u64)>,
-    /// Plan and number of the last item of the last upload.
+    /// Plan of the last finished upload, and the number of its last item.
     done: Option<(Plan, u16)>,
 }
 
@@ -59,7 +59,7 @@ impl Vehicle {
         &self.plans[usize::from(plan.0)]
     }
 
-    /// Hears a frame; returns the answers.
+    /// Handles a frame; returns the answers.
     fn hear(&mut self, frame: &[u8], now_ms: u64) -> Vec<Downlink> {
         let mut heard = Vec::new();
         self.decoder.feed(frame, |from, message| heard.push((from, message)));
@@ -108,7 +108,7 @@ impl Vehicle {
             }
             Mission::Item(item, plan) => {
                 let Some((_, count, held, asked_ms)) = self.upload.as_mut().filter(|(of, ..)| *of == plan) else {
-                    // The answer to the last item was lost.
+                    // The acknowledgement of the last item was lost: send it again.
                     let is_done = self.done == Some((plan, item.number));
                     return is_done.then_some(Mission::Ack(MissionResult::ACCEPTED, plan));
                 };
@@ -128,7 +128,7 @@ impl Vehicle {
         }
     }
 
-    /// Returns the item that is asked for again.
+    /// Returns the repeated request for an item, if it is due.
     fn turn(&mut self, now_ms: u64) -> Option<Downlink> {
         let (plan, _, held, asked_ms) = self.upload.as_mut().filter(|(.., asked_ms)| now_ms > *asked_ms + AGAIN_MS)?;
         *asked_ms = now_ms;
@@ -137,23 +137,23 @@ impl Vehicle {
     }
 }
 
-/// A client, a vehicle, and what lies between.
+/// A client and a vehicle with a faulty line between them.
 pub(crate) struct Line {
     pub(crate) client: Client,
     pub(crate) vehicle: Vehicle,
     strangers: [Sender; 2],
-    /// Share of frames that are lost, and that come twice \[%\], and by how much they may be late \[ms\].
+    /// Share of frames that are lost, and share that come twice \[%\]; longest delay \[ms\].
     faults: [u64; 3],
     random: u64,
     now_ms: u64,
-    /// Frames under way: when they arrive, whether at the vehicle.
+    /// Frames on the line: time of arrival, whether they go to the vehicle, and bytes.
     frames: Vec<(u64, bool, Vec<u8>)>,
 }
 
 impl Line {
     pub(crate) fn new(seed: u64, faults: [u64; 3]) -> Self {
         let mut client = Client::new(Client::STATION);
-        // It knows whom it talks to.
+        // The client knows its vehicle from the start.
         client.receive(VEHICLE, &Downlink::Heartbeat { armed: false, failsafe: false, mode: 0 });
         Line {
             client,
@@ -166,7 +166,7 @@ impl Line {
         }
     }
 
-    /// Runs for so long, or until this is so.
+    /// Runs for `limit_ms`, or until `done` is true.
     pub(crate) fn run_until(&mut self, limit_ms: u64, mut done: impl FnMut(&mut Client) -> bool) {
         for now_ms in (self.now_ms..self.now_ms + limit_ms).step_by(STEP_MS) {
             self.now_ms = now_ms;
@@ -203,7 +203,7 @@ impl Line {
         }
     }
 
-    /// Others answer others, and other vehicles this station.
+    /// Adds frames of others: answers by another vehicle to this station, and answers to another station.
     fn disturb(&mut self) {
         let plan = Plan((self.next() % 3) as u8);
         let refused = |to| {
@@ -234,7 +234,7 @@ impl Line {
         }
     }
 
-    /// By xorshift.
+    /// Returns a random number by xorshift.
     fn next(&mut self) -> u64 {
         self.random ^= self.random << 13;
         self.random ^= self.random >> 7;
