@@ -1,4 +1,4 @@
-//! The paper's three claims about its experiment, checked on the flights.
+//! Checks the paper's three claims about its experiment on the flights.
 
 use afbc_scenario::contender::ControllerKind;
 use afbc_scenario::paper;
@@ -7,26 +7,26 @@ use afbc_sim::metrics::tracking_error;
 use afbc_sim::run::Run;
 use nalgebra::Vector4;
 
-/// A claim of Section IV and the result of checking it.
+/// A claim of the paper's Section IV, and the result of checking it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Claim {
-    /// The paper's claim.
+    /// Claim of the paper, in words.
     pub statement: String,
     /// Whether the flights confirm it.
     pub holds: bool,
-    /// The figures that show it.
+    /// Numbers that confirm or refute the claim.
     pub evidence: String,
 }
 
-/// Limit for "goes to zero": AFBC's remaining error as a share of backstepping's, on every axis. Not zero, since the
-/// last gust comes 15 s before the end and yaw is still adapting to it.
+/// Limit for "goes to zero": AFBC's remaining error as a share of backstepping's, on every axis. The limit is not zero
+/// because the last gust comes 15 s before the end, and yaw is still adapting to it.
 pub const VANISHED: f64 = 0.25;
 
-/// The remaining error is the mean |error| over this long at the end \[s\].
+/// Time at the end over which the remaining error is averaged \[s\].
 pub const TAIL_S: f64 = 5.0;
 
-/// Checks the three claims on the first scenario that both laws have flown; none if there is no such scenario, or if it
-/// ends before the experiment does. No claim holds if a vehicle was lost.
+/// Checks the three claims on the first scenario that both laws have flown. Returns an empty list if there is no such
+/// scenario, or if it is shorter than the paper's experiment. No claim holds if a vehicle was lost.
 pub fn claims(flown: &[Flown]) -> Vec<Claim> {
     let find = |kind, of: &Flown| {
         let whole = of.scenario.duration_s >= paper::DURATION_S;
@@ -77,7 +77,7 @@ fn weigh(afbc: &Run, baseline: &Run) -> [(&'static str, bool, String); 3] {
     ]
 }
 
-/// True if `a` is smaller on every axis.
+/// Returns true if `a` is smaller on every axis.
 fn below(a: &Vector4<f64>, b: &Vector4<f64>) -> bool {
     a.iter().zip(b).all(|(a, b)| a < b)
 }

@@ -1,4 +1,4 @@
-//! One CSV file for each run, with every logged step and units in the header.
+//! Writes one CSV file per run, with every logged step. Column names end in the unit.
 
 use afbc::model::ModelConstants;
 use afbc_plant::{EffectsState, Sensing};
@@ -14,11 +14,11 @@ use std::io::{self, Write};
 
 /// A value, written with the fewest digits that restore it exactly.
 enum Number {
-    /// Computed by the controller.
+    /// A value that the controller computes.
     Single(f32),
-    /// Computed by the plant or the reference.
+    /// A value that the plant or the reference computes.
     Double(f64),
-    /// 0 or 1.
+    /// A flag, written as 0 or 1.
     Flag(bool),
 }
 
@@ -29,11 +29,11 @@ struct Row<'a> {
     sample: &'a Sample,
     /// Lowest and highest U1..U4 since the previous row.
     extremes: &'a [Vector4<f64>; 2],
-    /// See [`lyapunov`].
+    /// Values of the function [`lyapunov`].
     lyapunov: PerAxis<f32>,
 }
 
-/// A header and the value under it.
+/// Name of a column, and the function that returns its value.
 struct Column {
     name: String,
     value: Box<dyn Fn(&Row) -> Number>,
@@ -45,7 +45,7 @@ fn lyapunov(model: &ModelConstants, sample: &Sample) -> PerAxis<f32> {
     PerAxis::from_fn(|axis| model.lyapunov(axis, &state, &sample.trace.errors[axis]))
 }
 
-/// Returns every column of a flight's log, left to right.
+/// Returns every column of a flight's log, from left to right.
 fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
     let mut columns = Vec::new();
     let mut add = |name: String, value: Box<dyn Fn(&Row) -> Number>| columns.push(Column { name, value });
@@ -57,7 +57,7 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
     for (name, value) in MOTION {
         add(name.into(), Box::new(move |row| Double(value(row.sample))));
     }
-    // phi_d and theta_d: from (40), then behind the command filter, as tracked by roll and pitch.
+    // phi_d and theta_d: first as given by (40), then after the command filter, as roll and pitch track them.
     add! { Single
         "phi_d_raw_rad": |s| s.trace.desired_rad[0];
         "theta_d_raw_rad": |s| s.trace.desired_rad[1];
@@ -66,8 +66,8 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
         "phi_d_rate_rad_s": |s| s.trace.filtered[0].rate;
         "theta_d_rate_rad_s": |s| s.trace.filtered[1].rate;
     }
-    // U1..U4 as produced by the rotors, then as demanded by the law; further down, their extremes since the previous
-    // row.
+    // U1..U4 as produced by the rotors, then as demanded by the law. Columns with their extremes since the previous row
+    // follow below.
     add! { Single
         "u1_n": |s| s.action.given.roll_n;
         "u2_n": |s| s.action.given.pitch_n;
@@ -97,7 +97,7 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
         }
     }
     add! { Flag "saturated": |s| s.action.health.saturated; }
-    // Peers have neither e_2 nor estimates, so these columns are left out.
+    // The comparison laws outside the cascade have neither e_2 nor estimates, so these columns are left out for them.
     let (in_cascade, adaptive) = (contender.kind().in_cascade(), contender.gains().is_some());
     for axis in Axis::ALL {
         let name = axis.name();
@@ -131,7 +131,7 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
     columns
 }
 
-/// Returns the columns of non-ideal rotors, air and sensors.
+/// Returns the columns of real rotors, air and sensors, as far as the scenario has them.
 fn real(scenario: &Scenario) -> Vec<Column> {
     let mut columns = Vec::new();
     if !scenario.is_ideal() {
@@ -186,7 +186,7 @@ fn real(scenario: &Scenario) -> Vec<Column> {
     columns
 }
 
-/// Returns every row of a flight's log for its columns.
+/// Returns every row of a flight's log.
 fn rows<'a>(Flown { scenario, run }: &'a Flown) -> impl Iterator<Item = Row<'a>> {
     let model = ModelConstants::new(&scenario.vehicle.to_f32());
     let row =
@@ -194,7 +194,7 @@ fn rows<'a>(Flown { scenario, run }: &'a Flown) -> impl Iterator<Item = Row<'a>>
     run.log.iter().zip(&run.input_extremes).map(row)
 }
 
-/// Returns the columns of the flight's CSV file, names that end in the unit and values; flags are 0 and 1.
+/// Returns the columns of the flight's CSV file with their values. Names end in the unit; flags are 0 and 1.
 pub fn values(flown: &Flown) -> Vec<(String, Vec<f64>)> {
     let columns = columns(&flown.scenario, &flown.run.contender);
     let mut values = vec![Vec::with_capacity(flown.run.log.len()); columns.len()];
@@ -210,7 +210,7 @@ pub fn values(flown: &Flown) -> Vec<(String, Vec<f64>)> {
     columns.into_iter().map(|column| column.name).zip(values).collect()
 }
 
-/// Writes the header and one line for each logged step.
+/// Writes the header and one line per logged step.
 pub(super) fn write(out: &mut dyn Write, flown: &Flown) -> io::Result<()> {
     let columns = columns(&flown.scenario, &flown.run.contender);
     let mut writer = csv::Writer::from_writer(out);

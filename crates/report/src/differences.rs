@@ -1,4 +1,4 @@
-//! Medians, and differences over the same seeds: as text, JSON and CSV.
+//! Medians, and differences between contenders over the same seeds: as text, JSON and CSV.
 
 use crate::grid::{Grid, GridCell};
 use afbc_campaign::Versus;
@@ -7,11 +7,11 @@ use afbc_campaign::statistics::{Median, SignedRank};
 use serde::Serialize;
 use std::io::{self, Write};
 
-/// Formats a figure with the digits of its measure.
+/// Formats a value with its measure's number of digits.
 pub(crate) fn number(value: f64, measure: &Measure) -> String {
     let value = value * measure.scale;
     match value {
-        // Of a lost flight.
+        // Value of a lost flight.
         f64::INFINITY => "∞".into(),
         f64::NEG_INFINITY => "-∞".into(),
         _ if value.abs() < 1e4 => format!("{value:.0$}", measure.digits),
@@ -27,25 +27,25 @@ pub(crate) fn median(median: &Median, measure: &Measure) -> String {
     number(*value, measure) + &ends
 }
 
-/// Formats a probability.
+/// Formats a p-value.
 pub(crate) fn probability(p: f64) -> String {
     if p < 0.001 { "<0.001".into() } else { format!("{p:.3}") }
 }
 
-/// Formats probability and effect size.
+/// Formats the p-value and the effect size of a test.
 pub(crate) fn test(test: &SignedRank, p_holm: f64) -> [String; 2] {
     [probability(p_holm), format!("{:+.2}", test.effect)]
 }
 
-/// Heads of [`test`].
+/// Column heads of [`test`].
 pub(crate) const TEST: [&str; 2] = ["p", "effect"];
 
-/// What they mean.
+/// Explanation of the columns of `test`.
 pub(crate) const TEST_LEGEND: &str = "p: Wilcoxon's signed rank test, two-sided, exact up to 100 pairs, by Holm's \
                                       correction for as many laws. effect: matched-pairs rank-biserial correlation, \
                                       +1 where the law is always the further one, -1 where it is always the nearer.";
 
-/// Returns the distances of a comparison and how they differ from one contender's; none with a single seed.
+/// Returns a table of the distances, and of their differences to the reference contender's; `None` for a single seed.
 pub(crate) fn grid(comparison: &Comparison) -> Option<Grid> {
     let against = comparison.entries.get(comparison.against).filter(|_| comparison.is_repeated())?.contender().title();
     let row = |(entry, versus): (&Entry, Option<Versus>)| {
@@ -82,7 +82,8 @@ pub(crate) fn grid(comparison: &Comparison) -> Option<Grid> {
     Some(Grid { caption, heads, rows, note })
 }
 
-/// A figure of a contender over its seeds. A field is null where it does not apply, or would be infinite.
+/// Statistics of one figure of merit over a contender's seeds. A field is null if it does not apply or would be
+/// infinite.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(crate) struct FigureOverSeeds {
     name: &'static str,
@@ -97,7 +98,7 @@ pub(crate) struct FigureOverSeeds {
     rank_biserial: Option<f64>,
 }
 
-/// Returns these figures of each contender.
+/// Returns the statistics of these figures of merit, per contender.
 pub(crate) fn figures<'a>(
     comparison: &Comparison,
     measures: impl IntoIterator<Item = &'a Measure>,
@@ -157,7 +158,7 @@ struct StatisticsRow<'a> {
     rank_biserial: Option<f64>,
 }
 
-/// Writes a row for each figure of each contender in each scenario.
+/// Writes one row per figure of each contender in each scenario.
 pub(crate) fn csv(out: &mut dyn Write, comparisons: &[Comparison], measures: &[&Measure]) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     for comparison in comparisons {
@@ -187,7 +188,7 @@ pub(crate) fn csv(out: &mut dyn Write, comparisons: &[Comparison], measures: &[&
     csv.flush()
 }
 
-/// Returns the name of the contender that the others are compared with.
+/// Returns the name of the contender with which the others are compared.
 pub(crate) fn against(comparison: &Comparison) -> &str {
     comparison.entries.get(comparison.against).map_or("", |entry| &entry.contender().name)
 }

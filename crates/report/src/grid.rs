@@ -1,4 +1,4 @@
-//! A table: for the terminal, for a page, and for a paper as Markdown and as LaTeX with booktabs.
+//! A table for the terminal, for an HTML page, and for a paper as Markdown and as LaTeX with booktabs.
 
 use crate::table::line_width;
 use core::fmt::Write;
@@ -7,30 +7,30 @@ use maud::{Markup, Render, html};
 /// Format of the tables for a paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TableFormat {
-    /// A table of GitHub's Markdown.
+    /// A table in GitHub's Markdown.
     Markdown,
-    /// An environment `table` that needs the package booktabs.
+    /// A `table` environment that needs the package booktabs.
     Latex,
 }
 
-/// A table: a column of names, and columns of figures.
+/// A table: a column of names, and columns of numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Grid {
-    /// What it shows, in a sentence without its full stop.
+    /// Caption: a sentence without its full stop.
     pub(crate) caption: String,
-    /// Heads of all columns, that of the names first.
+    /// Heads of all columns, starting with the names' column.
     pub(crate) heads: Vec<String>,
-    /// Name and figures of each row.
+    /// Name and cells of each row.
     pub(crate) rows: Vec<(String, Vec<GridCell>)>,
-    /// What the figures mean.
+    /// Explanation of the numbers.
     pub(crate) note: String,
 }
 
-/// A figure as text.
+/// A cell of the table.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct GridCell {
     pub(crate) text: String,
-    /// Whether it is the best of its column or row.
+    /// Whether the value is the best of its column or row.
     pub(crate) best: bool,
 }
 
@@ -42,7 +42,7 @@ impl<T: Into<String>> From<T> for GridCell {
 
 impl Render for GridCell {
     fn render(&self) -> Markup {
-        // An interval goes below its median: beside it, a table of several columns is wider than a page.
+        // Put an interval below its median; next to it, a table with several columns would be wider than a page.
         let (figure, interval) = match self.text.split_once(" [") {
             Some((figure, interval)) => (figure, Some(interval)),
             None => (self.text.as_str(), None),
@@ -56,7 +56,7 @@ impl Render for GridCell {
     }
 }
 
-/// Formats tables one below the other; `name` is what their labels begin with.
+/// Formats tables one below the other; `name` is the prefix of their LaTeX labels.
 pub(crate) fn tables(grids: &[Grid], name: &str, format: TableFormat) -> String {
     let one = |(index, grid): (usize, &Grid)| match format {
         TableFormat::Markdown => grid.markdown(),
@@ -65,8 +65,8 @@ pub(crate) fn tables(grids: &[Grid], name: &str, format: TableFormat) -> String 
     grids.iter().enumerate().map(one).collect::<Vec<_>>().join("\n")
 }
 
-/// Formats rows for the terminal: names to the left, cells to the right. Columns that do not fit beside others go below
-/// them, into a part of their own with the names again.
+/// Formats rows for the terminal: names left-aligned, cells right-aligned. Columns that do not fit into the line form a
+/// further part below, which repeats the names.
 pub(crate) fn parts(rows: &[(String, Vec<String>)]) -> Vec<Vec<String>> {
     let width = |text: &str| text.chars().count();
     let name_width = rows.iter().map(|(name, _)| width(name)).max().unwrap_or_default();
@@ -94,13 +94,13 @@ pub(crate) fn parts(rows: &[(String, Vec<String>)]) -> Vec<Vec<String>> {
 }
 
 impl Grid {
-    /// Formats as lines for the terminal: names to the left, figures to the right, the best with an asterisk. If it is
-    /// too wide, its last columns go below.
+    /// Returns the lines for the terminal: names left-aligned, numbers right-aligned, the best with an asterisk. If the
+    /// table is too wide, its last columns go below.
     pub(crate) fn lines(&self) -> Vec<String> {
         self.parts().join(&String::new())
     }
 
-    /// The same, part by part.
+    /// Returns the lines of [`Grid::lines`], part by part.
     pub(crate) fn parts(&self) -> Vec<Vec<String>> {
         let marked = |cell: &GridCell| cell.text.clone() + if cell.best { "*" } else { " " };
         let heads: Vec<String> = self.heads.iter().skip(1).map(|head| format!("{head} ")).collect();
@@ -109,7 +109,7 @@ impl Grid {
         parts(&[(first, heads)].into_iter().chain(rows).collect::<Vec<_>>())
     }
 
-    /// Formats for a page, below a heading: table and note.
+    /// Returns the table and its note for an HTML page; the caller adds a heading.
     pub(crate) fn section(&self) -> Markup {
         html! {
             div.scroll { table {
@@ -125,7 +125,7 @@ impl Grid {
     }
 
     fn markdown(&self) -> String {
-        // What Markdown takes for links, columns and emphasis.
+        // Characters that Markdown takes for links, columns and emphasis.
         let escaped = |text: &str| {
             text.chars().fold(String::new(), |mut escaped, c| {
                 if matches!(c, '[' | ']' | '|' | '*' | '_' | '<' | '`' | '\\') {
@@ -171,7 +171,7 @@ impl Grid {
     }
 }
 
-/// Escapes text for LaTeX: what it takes for commands, and what pdfLaTeX has no characters for.
+/// Escapes a text for LaTeX: command characters, and characters that pdfLaTeX's fonts lack.
 fn latex(text: &str) -> String {
     let mut escaped = String::new();
     for c in text.chars() {
@@ -181,7 +181,7 @@ fn latex(text: &str) -> String {
             '~' => escaped += "\\textasciitilde{}",
             '^' => escaped += "\\textasciicircum{}",
             '<' | '>' | '|' => escaped.extend(['$', c, '$']),
-            // At the start of a line it would be the length of a space.
+            // At the beginning of a line, LaTeX would take this for the length of a space.
             '[' | ']' => escaped.extend(['{', c, '}']),
             'ψ' => escaped += "$\\psi$",
             'Δ' => escaped += "$\\Delta$",
@@ -216,7 +216,7 @@ mod tests {
         }
     }
 
-    /// Takes away what is escaped; what is left may not be a command or a column of its own.
+    /// Removes everything that is escaped; the rest must not contain a command or a column separator.
     fn unescaped(text: &str) -> String {
         let words = ["\\textbackslash{}", "\\textasciitilde{}", "\\textasciicircum{}", "\\textbf", "$\\Delta$", "\\\\"];
         let text = words.iter().fold(text.to_owned(), |text, word| text.replace(word, ""));

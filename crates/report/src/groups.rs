@@ -1,4 +1,4 @@
-//! Flights grouped by scenario, and their file names.
+//! Groups flights by scenario, and names their files.
 
 use crate::words::{case_words, slug};
 use afbc_scenario::Scenario;
@@ -46,7 +46,7 @@ pub(super) fn groups(flown: &[Flown]) -> Vec<Group<'_>> {
     groups
 }
 
-/// Returns the scenario's name with what distinguishes it from others of that name.
+/// Returns the scenario's name, with the words that distinguish it from other scenarios of that name.
 fn distinct_stem(scenario: &Scenario, all: &[&Scenario]) -> String {
     let own = case_words(scenario);
     let mut name = slug(&scenario.name);
@@ -59,7 +59,7 @@ fn distinct_stem(scenario: &Scenario, all: &[&Scenario]) -> String {
     name
 }
 
-/// Returns `name`, with a number if it is taken, also ignoring case, as some file systems do.
+/// Returns `name`, with a number if it is taken. Case is ignored, as on some file systems.
 fn unique(taken: &mut HashSet<String>, name: String) -> String {
     let mut candidate = name.clone();
     let mut number = 2;

@@ -1,4 +1,4 @@
-//! Results of flights: tables for the terminal, and in a folder CSV, JSON, figures and a page.
+//! Results of flights: tables for the terminal; and CSV, JSON, figures and an HTML page in a folder.
 //!
 //! [`flights`], [`compare`], [`campaign`], [`replay`] and [`exact`] each have a function `write` for a folder and a
 //! function `table`. The same flights give the same bytes: nothing depends on the time of day or the machine.

@@ -1,9 +1,9 @@
-//! What a scenario adds to the ideal vehicle, for the report.
+//! Describes the parts that a scenario adds to the ideal vehicle, for the HTML page.
 
 use afbc_plant::{Deviations, Rotors, Sensing};
 use afbc_scenario::Scenario;
 
-/// Returns name and value of each part present.
+/// Returns the name and value of each such part.
 pub(super) fn rows(scenario: &Scenario) -> Vec<(&'static str, String)> {
     [rotors(scenario), air(scenario), sensors(scenario)].concat()
 }

@@ -1,4 +1,4 @@
-//! One self-contained page with tables, claims, figures and parameters.
+//! Self-contained HTML pages with tables, claims, figures and parameters.
 
 use crate::claims::Claim;
 use crate::explore::{Explorable, ExplorableScene};
@@ -15,10 +15,10 @@ use afbc_types::{Axis, Declared, PerAxis, Value};
 use core::convert::Infallible;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-/// Style: one column, dark on white, or light on dark for readers who prefer it, except on paper. A table is as wide as
-/// it needs, beyond the column up to the screen. What is wider still scrolls by itself, under a bar and, on the side
-/// where it goes on, a shadow; a table's first column stays. On paper, where nothing scrolls, the cells of a wide table
-/// wrap, and its type is smaller.
+/// Style sheet of the pages. There is one column, dark on white, or light on dark for readers who prefer it (not in
+/// print). A table may be wider than the column, up to the screen's width. A still wider table scrolls: it has a scroll
+/// bar and a shadow on the side where it continues, and its first column stays visible. In print, the cells of wide
+/// tables wrap, and their font is smaller.
 const STYLE: &str = "
 :root { color-scheme: light dark; --paper: #fff; --ink: #1a1a1a; --quiet: #555; --rule: #888; --faint: #ccc;
   --good: #146c2e; --bad: #a12; --shade: #0003; }
@@ -94,10 +94,10 @@ body > .scroll:has(.prose) { max-width: min(100%, 900px); }
 }
 ";
 
-/// Namespace needed by an SVG file, but not within a page.
+/// Namespace that an SVG file needs, but not an SVG within a page.
 const NAMESPACE: &str = " xmlns=\"http://www.w3.org/2000/svg\"";
 
-/// Returns the page; `figures` holds one set for each group.
+/// Returns the page of some flights; `figures` holds one set of figures per group.
 pub(super) fn page(groups: &[Group], figures: &[Vec<Picture>], claims: &[Claim]) -> String {
     let title = match groups {
         [only] => only.scenario.description.as_str(),
@@ -114,7 +114,7 @@ pub(super) fn page(groups: &[Group], figures: &[Vec<Picture>], claims: &[Claim])
     sheet(title, &body)
 }
 
-/// A whole page.
+/// Returns a whole page.
 pub(super) fn sheet(title: &str, body: &Markup) -> String {
     html! {
         (DOCTYPE)
@@ -136,7 +136,7 @@ pub(super) fn sheet(title: &str, body: &Markup) -> String {
     .into_string()
 }
 
-/// A figure with its caption.
+/// Returns a figure with its caption.
 pub(super) fn picture(figure: &Picture) -> Markup {
     html! {
         figure {
@@ -149,15 +149,15 @@ pub(super) fn picture(figure: &Picture) -> Markup {
     }
 }
 
-/// Points of a vehicle's way in space, on a page with many flights.
+/// Most points of a vehicle's track, on a page with many flights.
 const POINTS_OF_MANY: usize = 300;
 
-/// Flights in space, on a page with many.
+/// Returns an interactive view in space, reduced for a page with many flights.
 pub(super) fn space_of_many(scene: Option<ExplorableScene>) -> Markup {
     space(scene.map(|scene| scene.thinned(POINTS_OF_MANY)), "The flights in space.")
 }
 
-/// Flights in space without a picture: seen on a screen with JavaScript alone.
+/// Returns an interactive view in space without a still picture: it is only visible on a screen with JavaScript.
 pub(super) fn space(scene: Option<ExplorableScene>, caption: &str) -> Markup {
     html! {
         @if let Some(scene) = scene {
@@ -166,7 +166,7 @@ pub(super) fn space(scene: Option<ExplorableScene>, caption: &str) -> Markup {
     }
 }
 
-/// Returns the caption; what it says of a picture alone goes with the picture.
+/// Returns the caption. Its sentences about the still picture are hidden together with the picture.
 fn caption(figure: &Picture) -> Markup {
     match (&figure.explorable, figure.caption.split_once(". ")) {
         (Some(Explorable::Scene(_)), Some((both, picture))) => html! { (both) "." span.drawn { " " (picture) } },
@@ -386,7 +386,7 @@ fn by_name(law: &Law) -> Markup {
     } } } }
 }
 
-/// Returns key and value of each gain.
+/// Returns the name and value of each gain.
 fn listed(gains: &impl Declared) -> Vec<(String, f32)> {
     let mut list = Vec::new();
     let Ok(()) = gains.visit(&mut |declaration, value| {

@@ -1,4 +1,4 @@
-//! The results table of `docs/results.md`: the paper's flight in every reading, on both models, under both laws.
+//! The results table of `docs/results.md`: the paper's flight in every reading, on both plant models, under both laws.
 
 use crate::markers;
 use afbc_plant::PlantModel;
@@ -11,7 +11,7 @@ use afbc_sim::run::Run;
 use afbc_types::OutOfRange;
 use core::fmt::Write;
 
-/// Returns the rows, top to bottom: each reading of the experiment with a readable name.
+/// Returns the rows from top to bottom: each reading of the experiment with a readable name.
 pub fn cases() -> Vec<(String, Case)> {
     let case = |reading, uncertainty| Case { reading, uncertainty };
     let mut cases = vec![
@@ -31,7 +31,7 @@ pub fn cases() -> Vec<(String, Case)> {
     cases
 }
 
-/// Lines around the table in a page.
+/// Marker lines around the table in a page.
 pub const MARKERS: [&str; 2] = ["<!-- results: begin -->", "<!-- results: end -->"];
 
 /// Splits a page at its [`MARKERS`].
@@ -39,10 +39,10 @@ pub fn parts(page: &str) -> Option<(&str, &str, &str)> {
     markers::parts(page, MARKERS)
 }
 
-/// Returns the scenarios of the table, top to bottom, each with a readable name.
+/// Returns the scenarios of the table from top to bottom, each with a readable name.
 ///
 /// # Errors
-/// Does not occur: the paper's parameters are in range.
+/// Never fails in practice: the paper's parameters are in range.
 pub fn scenarios() -> Result<Vec<(String, Scenario)>, OutOfRange> {
     let models = [PlantModel::Simplified, PlantModel::RigidBody];
     let rows = cases().into_iter().flat_map(|(name, case)| models.map(|model| (name.clone(), model, case)));
@@ -52,7 +52,7 @@ pub fn scenarios() -> Result<Vec<(String, Scenario)>, OutOfRange> {
 /// Flies each of `scenarios` under each of its contenders; calls `progress` after each flight.
 ///
 /// # Errors
-/// The first parameter, gain or setting out of range.
+/// Fails with the first parameter, gain or setting out of range.
 pub fn fly(scenarios: Vec<(String, Scenario)>, progress: &dyn Fn()) -> Result<Vec<(String, Flown)>, OutOfRange> {
     let mut flown = Vec::new();
     for (name, scenario) in scenarios {

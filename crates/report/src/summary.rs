@@ -1,4 +1,4 @@
-//! `summary.json`: the figures of merit of each run.
+//! Writes `summary.json`: the figures of merit of each run.
 
 use afbc::Profile;
 use afbc_scenario::case::{Reading, Sign};
@@ -8,7 +8,7 @@ use nalgebra::Vector4;
 use serde::Serialize;
 use std::io::{self, Write};
 
-/// One run. A value that does not apply or could not be measured is null.
+/// Summary of one run. A value that does not apply or could not be measured is null.
 #[derive(Serialize)]
 struct Summary<'a> {
     scenario: &'a str,
@@ -18,12 +18,12 @@ struct Summary<'a> {
     plant: &'a str,
     contender: &'a str,
     controller: &'a str,
-    /// The profile whose gains and settings were flown, if any.
+    /// Profile whose gains and settings were flown, if any.
     profile: Option<&'a str>,
     duration_s: f64,
     lost_at_s: Option<f64>,
     lost_reason: Option<&'a str>,
-    /// Time at which AFBC's monitor switched to the fallback law, and why.
+    /// Time at which AFBC's monitor switched to the fallback law, and the reason.
     tripped_at_s: Option<f64>,
     tripped_reason: Option<&'a str>,
     seed: u64,
@@ -32,9 +32,9 @@ struct Summary<'a> {
     rmse: Option<Outputs>,
     max_abs: Option<Outputs>,
     final_error: Outputs,
-    /// Mean change of U1..U4 per control step.
+    /// Mean absolute change of U1..U4 per control step.
     mean_abs_delta_u_n: Option<[f64; 4]>,
-    /// The vehicle's own estimate.
+    /// Errors of the vehicle's own estimate.
     estimate: Option<Estimate>,
 }
 
@@ -136,10 +136,10 @@ fn summary(Flown { scenario, run }: &Flown) -> Summary<'_> {
     }
 }
 
-/// Writes an array with one object for each run.
+/// Writes an array with one object per run.
 ///
 /// # Errors
-/// If writing to `out` fails.
+/// Fails if writing to `out` fails.
 pub fn write(out: &mut dyn Write, flown: &[Flown]) -> io::Result<()> {
     let summaries: Vec<_> = flown.iter().map(summary).collect();
     serde_json::to_writer_pretty(&mut *out, &summaries)?;

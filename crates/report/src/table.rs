@@ -1,4 +1,4 @@
-//! The table for the terminal.
+//! Formats the table of flights for the terminal.
 
 use crate::claims::Claim;
 use crate::groups::{Group, groups};
@@ -8,23 +8,23 @@ use afbc_sim::metrics::{Metrics, SETTLED_S};
 use core::cell::Cell;
 use nalgebra::Vector4;
 
-/// Widest line of text in files, and where nobody knows better.
+/// Widest line of text in files, and on a terminal of unknown width.
 const WIDTH: usize = 100;
 
 thread_local! {
-    /// Widest line of text now.
+    /// Current widest line of text.
     static WIDTH_NOW: Cell<usize> = const { Cell::new(WIDTH) };
 }
 
-/// Width of a column of figures.
+/// Width of a column of numbers.
 const CELL: usize = 10;
 
-/// Returns the widest line of text now.
+/// Returns the current widest line of text.
 pub(super) fn line_width() -> usize {
     WIDTH_NOW.get()
 }
 
-/// Returns the table that `make` makes, its text wrapped for a terminal of so many columns.
+/// Returns the table that `make` makes, wrapped for a terminal with this many columns.
 pub fn for_terminal(columns: usize, make: impl FnOnce() -> String) -> String {
     WIDTH_NOW.set(columns.min(WIDTH));
     let table = make();
@@ -32,13 +32,13 @@ pub fn for_terminal(columns: usize, make: impl FnOnce() -> String) -> String {
     table
 }
 
-/// One block of figures: title, heads of its four columns, and values.
+/// One block of the table: title, heads of its four columns, and values.
 pub(super) struct Block {
     pub(super) title: &'static str,
     pub(super) columns: [&'static str; 4],
     pub(super) digits: usize,
     pub(super) values: fn(&Metrics) -> Vector4<f64>,
-    /// True if its figures need a flight beyond the settling time.
+    /// True if the values only exist for a flight beyond the settling time.
     pub(super) needs_settled: bool,
     /// True for the first block, which also lists lost flights; the others leave them out.
     pub(super) first: bool,
@@ -76,13 +76,13 @@ pub(super) const BLOCKS: [Block; 4] = [
 ];
 
 impl Block {
-    /// Returns the flights with a row in this block.
+    /// Returns the flights that have a row in this block.
     pub(super) fn rows<'a>(&self, group: &'a Group<'_>) -> impl Iterator<Item = &'a Flown> {
         let all = self.first;
         group.flights.iter().copied().filter(move |flight| all || flight.run.lost.is_none())
     }
 
-    /// Returns the four figures of a run, or dashes where there was nothing to measure.
+    /// Returns the four values of a run, or dashes if there was nothing to measure.
     pub(super) fn cells(&self, flight: &Flown) -> [String; 4] {
         let values: [f64; 4] = (self.values)(&flight.run.metrics).into();
         if self.needs_settled && !flight.run.is_settled() {
@@ -92,7 +92,8 @@ impl Block {
     }
 }
 
-/// Formats `value` with `digits` decimals, fewer if it is too wide for its column, and without "-0.000".
+/// Formats `value` with `digits` decimals, or in scientific notation if that is too wide for the column. Never gives
+/// "-0.000".
 fn number(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
     if text.len() >= CELL {
@@ -104,7 +105,7 @@ fn number(value: f64, digits: usize) -> String {
     }
 }
 
-/// Explains the figures in one sentence.
+/// Explains the values in one or two sentences.
 pub(super) fn legend() -> String {
     format!(
         "Error: reference minus vehicle, from {SETTLED_S} s to the end. Mean |dU|: mean absolute change of each input \
@@ -112,8 +113,8 @@ pub(super) fn legend() -> String {
     )
 }
 
-/// Formats flights and claims: for each scenario, law and axis the RMSE, largest and final error, and for each input
-/// its smoothness.
+/// Formats flights and claims. For each scenario and law there are the RMSE, largest and final error of each axis, and
+/// the smoothness of each input.
 pub fn table(flown: &[Flown], claims: &[Claim]) -> String {
     let mut lines = Vec::new();
     let groups = groups(flown);
@@ -143,7 +144,7 @@ fn flights(group: &Group, lines: &mut Vec<String>) {
     wrap(lines, "", &format!("{}: {}", group.scenario.name, words::conditions(group.scenario)));
     // Width of the longest printed name.
     let name_width = group.flights.iter().map(|flight| flight.run.contender.title().chars().count()).max().unwrap_or(0);
-    // Titles, names and figures fit a terminal of 80 columns.
+    // Titles, names and numbers fit a terminal of 80 columns.
     let title_width = BLOCKS.iter().map(|block| block.title.len() + 2).max().unwrap_or(0);
     let rule = "─".repeat(title_width + name_width + 4 * CELL);
     let (widths, mut head) = ([title_width, name_width], [""; 4]);
@@ -187,7 +188,7 @@ fn row(title: &str, name: &str, [title_width, name_width]: [usize; 2], cells: &[
     format!("{title:<title_width$}{name:<name_width$}{a:>CELL$}{b:>CELL$}{c:>CELL$}{d:>CELL$}")
 }
 
-/// Appends `text` behind `first`, wrapped; further lines are aligned with the text.
+/// Appends `text` after `first`, wrapped; further lines are aligned with the text.
 pub(super) fn wrap(lines: &mut Vec<String>, first: &str, text: &str) {
     let (width, mut line) = (line_width(), first.to_owned());
     let mut length = first.chars().count();

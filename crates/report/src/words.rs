@@ -12,14 +12,14 @@ use afbc_sim::metrics::{EstimateMetrics, Metrics};
 use afbc_sim::run::Tripped;
 use afbc_types::Axis;
 
-/// Returns a file name without extension: letters, digits, `-` and `_` of `name`, and `-` for anything else.
+/// Returns a file name without extension: letters, digits and `_` of `name`, and `-` for every other character.
 pub(super) fn slug(name: &str) -> String {
     let keep = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' };
     let slug: String = name.chars().take(80).map(keep).collect();
     if slug.is_empty() { "flight".into() } else { slug }
 }
 
-/// Returns the words that distinguish scenarios of one name in file names: reading, signs, plant, profile.
+/// Returns the words that distinguish scenarios of the same name in file names: reading, signs, plant, profile.
 pub(super) fn case_words(scenario: &Scenario) -> [String; 4] {
     let reading = scenario.case.and_then(|case| case.reading).map_or("still-air", Reading::name);
     let sign = |sign| match sign {
@@ -32,7 +32,7 @@ pub(super) fn case_words(scenario: &Scenario) -> [String; 4] {
     [reading.into(), signs, scenario.model.name().into(), profile(scenario).map_or("tuned", Profile::name).into()]
 }
 
-/// Returns the profile shared by all contenders, if any.
+/// Returns the profile that all contenders share, if any.
 fn profile(scenario: &Scenario) -> Option<Profile> {
     let mut profiles = scenario.contenders.iter().map(Contender::profile);
     let first = profiles.next()?;
@@ -58,8 +58,7 @@ pub(super) fn conditions(scenario: &Scenario) -> String {
     words.join(", ")
 }
 
-/// Names the non-ideal parts of a flight: "rotors", "battery", "drag", "wind", "ground", "payload", "sensors", "sensor
-/// fault", "own estimate", "instrument fault", "outages".
+/// Names the parts of a flight that are not ideal, such as "real rotors", "battery", "wind" or "own estimate".
 fn real(scenario: &Scenario) -> Vec<&'static str> {
     let Realism { rotors, drag, wind, contact, ground_effect, .. } = &scenario.realism;
     let (faults, battery) = (!rotors.faults.is_empty(), rotors.battery.is_some());
@@ -81,12 +80,12 @@ fn real(scenario: &Scenario) -> Vec<&'static str> {
     words.into_iter().filter_map(|(there, word)| there.then_some(word)).collect()
 }
 
-/// Example: "+0.2 kg".
+/// Formats a payload's mass: "+0.2 kg".
 pub(super) fn payload(payload: &Payload) -> String {
     format!("{:+} kg", payload.mass_kg)
 }
 
-/// Example: "0.05 m below", "0 m below, 0.1 m ahead, -0.02 m left".
+/// Formats a payload's place: "0.05 m below", "0 m below, 0.1 m ahead, -0.02 m left".
 pub(super) fn place(payload: &Payload) -> String {
     let Payload { below_m, ahead_m, left_m, .. } = payload;
     let beside =
@@ -94,12 +93,12 @@ pub(super) fn place(payload: &Payload) -> String {
     format!("{below_m} m below{beside}")
 }
 
-/// Example: "rotor 1 at 80 %".
+/// Formats a rotor fault: "rotor 1 at 80 %".
 pub(super) fn fault(fault: &RotorFault) -> String {
     format!("rotor {} at {} %", fault.rotor, (fault.efficiency * 1000.0).round() / 10.0)
 }
 
-/// Example: "inertia +75 %".
+/// Formats a parameter change: "inertia +75 %".
 pub(super) fn change(change: &ParameterChange) -> String {
     let quantity = match change.quantity {
         PlantParameter::Mass => "mass",
@@ -118,7 +117,7 @@ pub(super) fn change(change: &ParameterChange) -> String {
     format!("{quantity} {percent:+} %")
 }
 
-/// Example: "pitch frozen", "x times -1", "z off by 0.5 m", "all frozen".
+/// Formats a sensor fault: "pitch frozen", "x times -1", "z off by 0.5 m", "all frozen".
 pub(super) fn sensor_fault(fault: &SensorFault) -> String {
     let (name, unit) = match fault.axis {
         None => ("all", ""),
@@ -142,14 +141,14 @@ pub(super) fn gust(gust: &Gust) -> (&'static str, &'static str) {
     (letter, symbol(gust.axis))
 }
 
-/// Example: "wind (3, 0, −1) m/s".
+/// Formats a gust of wind: "wind (3, 0, −1) m/s".
 pub(super) fn wind_gust(gust: &CosineGust) -> String {
     let v = gust.velocity_m_s;
     format!("wind ({}, {}, {}) m/s", v.x, v.y, v.z).replace('-', "−")
 }
 
-/// Returns the label of a quantity drawn by a campaign, with its unit: "steady wind [m/s]". An unknown one is spelt
-/// out.
+/// Returns the label, with unit, of a quantity that a campaign draws: "steady wind [m/s]". For an unknown quantity it
+/// is the name with spaces.
 pub(super) fn drawn(name: &str) -> String {
     let words = match name {
         "mass_ratio" => "true over nominal mass",
@@ -214,17 +213,18 @@ pub(super) const fn symbol(axis: Axis) -> &'static str {
     }
 }
 
-/// Returns the cell of a figure from 5 s to the end: empty for a flight that was over before.
+/// Formats a figure that is evaluated from 5 s to the end; empty for a flight that ended earlier.
 pub(super) fn measured(metrics: &Metrics, figure: f64) -> String {
     metrics.measured(figure).map_or_else(String::new, |figure| figure.to_string())
 }
 
-/// Example: "lost at t = 15.625 s: tilted beyond 90 degrees".
+/// Formats a loss: "lost at t = 15.625 s: tilted beyond 90 degrees".
 pub(super) fn lost(lost: &afbc_sim::flight::Lost) -> String {
     format!("lost at t = {:.3} s: {}", lost.time_s, lost.reason)
 }
 
-/// Example: "its estimate is off by 0.0010 m, 0.018 m/s and 0.07 degrees (root mean squares), NEES 9.4 of 9".
+/// Formats the estimate's errors: "its estimate is off by 0.0010 m, 0.018 m/s and 0.07 degrees (root mean squares),
+/// NEES 9.4 of 9".
 pub(super) fn estimate(estimate: &EstimateMetrics) -> String {
     let EstimateMetrics { position_m, velocity_m_s, attitude_rad, nees, .. } = estimate;
     let (position_m, velocity_m_s, attitude_deg) =
@@ -235,7 +235,7 @@ pub(super) fn estimate(estimate: &EstimateMetrics) -> String {
     )
 }
 
-/// Example: "the monitor switched to backstepping at t = 15.625 s: rotors stay saturated".
+/// Formats a trip: "the monitor switched to backstepping at t = 15.625 s: rotors stay saturated".
 pub(super) fn tripped(tripped: &Tripped) -> String {
     let reason = tripped.reason;
     let reason = reason.strip_prefix("AFBC off: ").unwrap_or(reason);

@@ -1,4 +1,4 @@
-//! Contenders in figures: each has its colour in every report, and none hides behind another.
+//! Contenders in figures: each has the same colour in every report, and none hides another.
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "tests")]
 
 mod common;
@@ -11,7 +11,7 @@ use roxmltree::{Document, Node};
 use std::collections::{BTreeSet, HashMap};
 use std::fs;
 
-/// Returns stroke and dashes of the line before `name` in the legend.
+/// Returns stroke and dashes of the line in front of `name` in the legend.
 fn legend(svg: &str, name: &str) -> Option<(String, String)> {
     let svg = Document::parse(svg).unwrap();
     let entry = svg.descendants().find(|node| node.has_tag_name("text") && words(*node) == name)?;
@@ -37,7 +37,7 @@ fn a_contender_has_one_color_in_every_report() {
     let mut colors: HashMap<String, BTreeSet<String>> = HashMap::new();
     let title = |name: &str| named(name).title().to_owned();
 
-    // All together, in another order, and each alone; in a comparison; in a campaign.
+    // Reports of all contenders together, in another order, and each alone; of a comparison; and of a campaign.
     let mut reports = Vec::new();
     let mut sets: Vec<Vec<&str>> = vec![names.clone(), backwards.clone()];
     sets.extend(names.iter().map(|name| vec![*name]));
@@ -49,7 +49,7 @@ fn a_contender_has_one_color_in_every_report() {
     let scenario = Scenario { contenders: backwards.iter().map(|name| named(name)).collect(), ..hover(0.2) };
     let out = folder("colors-compare");
     report::compare::write(&open(&out), &compare::fly(vec![scenario], 2, 1, &|| ()).unwrap()).unwrap();
-    // Bars have no legend: the name is next to them.
+    // Bars have no legend; each has its contender's name next to it.
     let rmse = fs::read_to_string(out.join("rmse.svg")).unwrap();
     let rmse = Document::parse(&rmse).unwrap();
     for name in &names {
@@ -83,7 +83,7 @@ fn a_contender_has_one_color_in_every_report() {
     assert_eq!(known.len(), 10, "{known:?}");
 }
 
-/// Returns the position of 100 % in each panel of a figure of shares, top to bottom.
+/// Returns the position of 100 % in each panel of a figure of shares, from top to bottom.
 fn hundreds(svg: &Document<'_>) -> Vec<(f64, f64)> {
     labels(svg).into_iter().filter(|(text, ..)| text == "100").map(|(_, x, y)| (x, y)).collect()
 }
@@ -104,7 +104,8 @@ fn every_contender_shows_at_100_percent_with_its_interval() {
         let hundreds = hundreds(&success);
         assert_eq!(hundreds.len(), 2);
         for (left, top) in hundreds {
-            // Every contender flew in each tenth without a loss: that many marks in a row, at different places.
+            // Every contender flew in each tenth without a loss, so each has ten marks in this row, all at different
+            // positions.
             let middle = |node: &Node<'_, '_>| {
                 let points = points(*node);
                 let extent = |part: fn(&(f64, f64)) -> f64| {
@@ -125,7 +126,7 @@ fn every_contender_shows_at_100_percent_with_its_interval() {
                 let fellows = colors.iter().filter(|other| *other == color).count();
                 let own = row.iter().filter(|mark| mark.attribute("fill") == Some(color)).count();
                 assert_eq!(own, 10 * fellows);
-                // Interval bars extend down from the marks, to the lower bound for 20 flights without a loss.
+                // Interval bars go down from the marks, to the lower bound for 20 flights without a loss.
                 let is_bar = |line: &&Node<'_, '_>| {
                     let points = points(**line);
                     line.attribute("stroke") == Some(color)
@@ -138,7 +139,7 @@ fn every_contender_shows_at_100_percent_with_its_interval() {
             }
         }
 
-        // Equal curves lie within one another, and each ends in a mark of its own over its interval.
+        // Equal curves are drawn one inside the other, and each has its own end mark and interval.
         for name in ["position-error.svg", "smoothness.svg"] {
             let figure = Document::parse(&svgs[name]).unwrap();
             let long = |node: &Node<'_, '_>, tag| node.has_tag_name(tag) && points(*node).len() > 50;

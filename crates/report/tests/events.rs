@@ -1,4 +1,4 @@
-//! Events in figures: those that overlap are told apart.
+//! Events in figures: overlapping events can be told apart.
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "tests")]
 
 mod common;
@@ -13,7 +13,7 @@ use std::collections::BTreeSet;
 fn events_that_overlap_are_distinguished_and_each_has_its_label() {
     let out = folder("events");
     flights::write(&open(&out), &flown(&eventful(), &["afbc"]), &[]).unwrap();
-    // Start and end of each shaded event, in seconds.
+    // Label, start and end of each shaded event [s].
     let bands = [
         ("mass +10 %", 1.0, 8.0),
         ("inertia −10 %", 2.0, 9.0),
@@ -34,7 +34,7 @@ fn events_that_overlap_are_distinguished_and_each_has_its_label() {
         for label in onsets {
             assert_eq!(labels.iter().filter(|(text, ..)| text == label).count(), 1, "{name}: {label}");
         }
-        // The plot's scale, from its time axis.
+        // The plot's scale, read from its time axis.
         let tick = |text: &str| {
             let ticks = labels.iter().filter(|(label, ..)| label == text);
             ticks.max_by(|a, b| a.2.total_cmp(&b.2)).unwrap().1
@@ -51,7 +51,7 @@ fn events_that_overlap_are_distinguished_and_each_has_its_label() {
                 .enumerate()
                 .find(|(_, rect)| from_to(rect) && rect[3] < 80.0)
                 .unwrap_or_else(|| panic!("{name}: no band of {label} from {start_s} s"));
-            // Its label is in its row, on it or beside it.
+            // The label is in the band's row, on the band or next to it.
             let beside = |(text, at_x, at_y): &&(String, f64, f64)| {
                 text == label && strip[1] < *at_y && *at_y < strip[1] + strip[3] && (at_x - strip[0]).abs() < 2000.0
             };
@@ -94,7 +94,7 @@ fn two_of_the_same_that_overlap_are_distinguished() {
     flights::write(&open(&out), &flown(&two, &["afbc"]), &[]).unwrap();
     for (name, svg) in &svgs(&out) {
         let svg = Document::parse(svg).unwrap();
-        // Rows of tints on the time axis, and wide lines along the reference, one wider than the other.
+        // Bands on the time axis, and wide lines along the reference, one wider than the other.
         let is_band = |node: &Node<'_, '_>| node.has_tag_name("polyline") && number(*node, "stroke-width") > 30.0;
         let boxes = boxes(&svg);
         let rows = boxes.iter().filter(|(_, [.., height])| *height < 80.0).filter_map(|(row, _)| row.attribute("fill"));

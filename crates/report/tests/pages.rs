@@ -1,4 +1,4 @@
-//! Words and layout of pages: labels with units, captions that fit the figure, small and dark screens.
+//! Texts and layout of pages: labels with units, captions that fit the figure, small and dark screens.
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "tests")]
 
 mod common;
@@ -60,7 +60,7 @@ fn panels_of_a_campaign_have_words_with_units() {
     }
 }
 
-/// A page's text without its scripts and style.
+/// Returns a page's text without its scripts.
 fn words_of(folder: &Path) -> String {
     let page = page(folder);
     let mut words = String::new();
@@ -85,7 +85,7 @@ fn captions_explain_exactly_what_the_figure_shows() {
     assert_eq!((mentions(&events, "gust"), mentions(&events, "Shaded")), (5, 5), "{:?}", captions(&events));
     assert_eq!(mentions(&events, "Cross"), 0);
 
-    // Only a change, without a gust.
+    // Only a parameter change, without a gust.
     let mut changed = eventful();
     changed.environment = Environment::new(
         changed.vehicle,
@@ -98,19 +98,19 @@ fn captions_explain_exactly_what_the_figure_shows() {
     flights::write(&open(&only), &flown(&changed, &["afbc"]), &[]).unwrap();
     assert_eq!((mentions(&only, "gust"), mentions(&only, "Shaded")), (0, 5), "{:?}", captions(&only));
 
-    // A vehicle whose rotors fail.
+    // A vehicle with a failing rotor.
     let mut falling = hover(8.0);
     falling.realism.rotors.faults = vec![RotorFault { rotor: 1, efficiency: 0.0, start_s: 1.0 }];
     let lost = flown(&falling, &["afbc"]);
     assert!(lost[0].run.lost.is_some());
     let fallen = folder("captions-lost");
     flights::write(&open(&fallen), &lost, &[]).unwrap();
-    // A cross at the loss, or an arrow if it lies beyond the panel.
+    // The caption explains a cross at the loss, or an arrow if the loss lies outside the panel.
     assert_eq!(mentions(&fallen, "lost"), 5, "{:?}", captions(&fallen));
     let marked = |text: &String| text.contains("Cross:") || text.contains("Arrow:");
     assert!(captions(&fallen).iter().all(marked), "{:?}", captions(&fallen));
 
-    // The printed law chatters on the paper's vehicle.
+    // The law as printed in the paper chatters on the paper's vehicle.
     let paper = Scenario { duration_s: 30.0, ..built_in("paper").unwrap().read().unwrap() };
     let chatter = folder("captions-chatter");
     let contender = paper.contenders.iter().find(|contender| contender.name == "afbc").unwrap().clone();
@@ -119,7 +119,7 @@ fn captions_explain_exactly_what_the_figure_shows() {
     let said = captions(&chatter);
     assert_eq!(said.iter().filter(|text| text.contains("chatter")).count(), 1, "{said:?}");
 
-    // Comparisons: seeds are mentioned only if there are several, losses only if there are some.
+    // Comparisons: seeds are only mentioned if there are several, and losses only if there are some.
     for (seeds, loses) in [(1, false), (3, false), (1, true)] {
         let scenario = if loses { falling.clone() } else { hover(6.0) };
         let scenario = Scenario { contenders: vec![named("afbc")], ..scenario };
@@ -128,7 +128,7 @@ fn captions_explain_exactly_what_the_figure_shows() {
         let said = format!("{:?} {}", captions(&out)[0], words_of(&out));
         assert_eq!(said.contains("over all seeds"), seeds > 1, "{said}");
         assert_eq!(said.contains("lost a vehicle"), loses, "{said}");
-        // All fly backstepping.
+        // All contenders of this test fly backstepping, so there is a ratio.
         assert_eq!(said.contains("Ratio"), !loses, "{said}");
     }
     let scenario =
@@ -151,14 +151,14 @@ fn captions_explain_exactly_what_the_figure_shows() {
         assert_eq!(page(&out).contains("A lost flight ranks last"), loses);
         assert!(said[0].contains("95 %") && said[1].contains("95 %") && said[2].contains("95 %"), "{said:?}");
     }
-    // Without drawn quantities, or without measurements: no figure rather than an empty one.
+    // Without drawn quantities and measurements there are no figures, rather than empty ones.
     let out = folder("captions-none");
     report::campaign::write(&open(&out), &gone_alike(&["afbc"], &[], 3, |_, _| true)).unwrap();
     assert_eq!(captions(&out).len(), 0, "{:?}", captions(&out));
     assert!(!page(&out).contains("Drawn"));
 }
 
-/// Returns the names of a page's elements that are not within a scrolling one.
+/// Returns the names of a page's elements that are not inside a scrolling element.
 fn unscrolled(page: &str) -> Vec<String> {
     let mut open: Vec<(String, bool)> = Vec::new();
     let mut found = Vec::new();
@@ -180,7 +180,7 @@ fn unscrolled(page: &str) -> Vec<String> {
     found
 }
 
-/// A suite of one short flight, as flown.
+/// A suite of one short flight, with its results.
 struct Suited(Suite, Vec<Comparison>);
 
 impl Suited {
@@ -198,8 +198,8 @@ impl Suited {
     }
 }
 
-/// Of each vehicle's flights the one is told in which the contender was farthest behind, or which it lost alone; flown
-/// again, it is on the page in space.
+/// Per vehicle, the page shows in space the flight that the contender lost alone, or else the one in which it was
+/// farthest behind.
 #[test]
 fn the_flights_that_tell_most_are_told() {
     let vehicles = BUILT_IN.iter().take(2).map(|vehicle| vehicle.read().unwrap()).collect();
@@ -212,7 +212,7 @@ fn the_flights_that_tell_most_are_told() {
         Judged::new(&random, flown, "afbc").telling().iter().map(|scenario| scenario.name.clone()).collect()
     };
     let name = |place: usize, flown: &[FlownDraw]| flown[place].flight.scenario.name.clone();
-    // Alike, but for one flight of each vehicle.
+    // Make all results equal, except for one flight per vehicle.
     for one in flown.iter_mut().flat_map(|flown| &mut flown.outcomes) {
         (one.lost, one.metrics.rmse) = (None, Vector4::repeat(1.0));
     }
@@ -222,7 +222,7 @@ fn the_flights_that_tell_most_are_told() {
     assert_eq!(told(&flown), [name(1, &flown), name(5, &flown)]);
     let lost = Some(Lost { time_s: 1.0, reason: "it fell" });
     flown[2].outcomes[0].lost = lost;
-    // Nobody kept it: it tells nothing.
+    // A flight that every contender lost is not shown.
     flown[3].outcomes.iter_mut().for_each(|outcome| outcome.lost = lost);
     assert_eq!(told(&flown), [name(2, &flown), name(5, &flown)]);
 
@@ -233,15 +233,15 @@ fn the_flights_that_tell_most_are_told() {
     assert_eq!(page(&out).matches("data-explore=\"scene\"").count(), 2);
 }
 
-/// Returns the declarations of a part of a style for exactly this selector.
+/// Returns the declarations for exactly this selector in a part of a style sheet.
 fn declared(style: &str, selector: &str) -> String {
     let rules = style.split('}').filter_map(|rule| rule.rsplit_once('{'));
     let is_it = |names: &str| names.rsplit('{').next().unwrap().split(',').any(|name| name.trim() == selector);
     rules.filter(|(names, _)| is_it(names)).map(|(_, declarations)| declarations).collect()
 }
 
-/// A table is as wide as it needs up to the screen, then scrolls beside its first column, visibly; on paper, where
-/// nothing scrolls, its cells wrap.
+/// A table is as wide as it needs, up to the screen's width. A wider one scrolls visibly next to its fixed first
+/// column. In print, where nothing scrolls, its cells wrap.
 #[test]
 fn wide_tables_are_seen_whole() {
     let out = folder("wide-suite");
@@ -253,7 +253,7 @@ fn wide_tables_are_seen_whole() {
     let mut wide = 0;
     for (before, table) in body.match_indices("<table").map(|(at, _)| body.split_at(at)) {
         let table = table.split("</table>").next().unwrap();
-        // A child of the body, so that it may be wider than the text.
+        // The table is in a child of the body, so it may be wider than the text.
         assert!(before.ends_with("<div class=\"scroll\">"), "{table}");
         assert_eq!(before.matches("<div").count() - before.matches("</div>").count(), 1, "{table}");
         wide += usize::from(columns(table) >= OWN.len());
@@ -314,7 +314,7 @@ fn pages_fit_a_phone_and_have_a_dark_mode() {
                     assert!(style.contains(&rule), "{name}: {part} {color} of {:?} stays", node.tag_name());
                 }
             }
-            // The page has the file's figure, on its own background.
+            // The page shows the same figure as the file, on the figure's own background.
             let ground = svg.descendants().find(|node| node.has_tag_name("rect")).unwrap();
             assert_eq!(ground.attribute("fill"), Some("#ffffff"), "{name}");
         }

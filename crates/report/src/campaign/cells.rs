@@ -1,13 +1,13 @@
-//! Contents of a campaign's table, for the page and the terminal.
+//! Contents of a campaign's table, for the HTML page and the terminal.
 
 use afbc_campaign::statistics::{Share, percentile};
 use afbc_campaign::{Bad, Summary, Tally};
 use afbc_sim::metrics::SETTLED_S;
 
-/// Percentiles that are reported.
+/// Percentiles in the table.
 pub(super) const PERCENTS: [f64; 3] = [50.0, 90.0, 99.0];
 
-/// Head of the table: groups of columns, each with its columns.
+/// Column heads of the table, in groups.
 pub(super) const HEADS: [(&str, &[&str]); 5] = [
     ("not lost", &["of all", "95 % interval"]),
     ("RMS distance [m]", &["median", "90 %", "99 %"]),
@@ -16,7 +16,7 @@ pub(super) const HEADS: [(&str, &[&str]); 5] = [
     ("fell back", &["of all"]),
 ];
 
-/// Returns one line of the table, with as many cells as [`HEADS`] has columns.
+/// Returns one row of the table, with one cell per column of [`HEADS`].
 pub(super) fn cells(tally: &Tally) -> Vec<String> {
     let Share { value, low, high } = tally.count.share();
     let at = |values: &[f64], percent: f64, scale: f64, digits: usize| match percentile(values, percent) {
@@ -32,12 +32,12 @@ pub(super) fn cells(tally: &Tally) -> Vec<String> {
     cells
 }
 
-/// Formats a share as a percentage; "-" if there is none.
+/// Formats a share as a percentage; "-" for NaN.
 pub(super) fn percent(share: f64) -> String {
     if share.is_nan() { "-".into() } else { format!("{:.2} %", 100.0 * share) }
 }
 
-/// Returns the number of flights of each contender, for a shard only its own.
+/// Returns the number of flights per contender; in a shard, the number of the shard.
 pub(super) fn flights(summary: &Summary) -> u64 {
     summary.tallies.first().map_or(0, |tally| tally.count.flights)
 }
@@ -54,7 +54,7 @@ pub(super) fn legend(summary: &Summary) -> String {
     )
 }
 
-/// Describes a bad flight and the command that flies it again; `target` is the campaign's name for `sitl campaign`.
+/// Describes a bad flight and the command that repeats it. `target` is the campaign's name for `sitl campaign`.
 pub(super) fn bad(target: &str, tally: &Tally, bad: &Bad) -> [String; 2] {
     let how = match &bad.lost {
         Some((time_s, reason)) => format!("lost at t = {time_s:.3} s: {reason}"),

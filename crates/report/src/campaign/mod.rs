@@ -1,4 +1,4 @@
-//! Results of a campaign: table, summary, figures, report.
+//! Results of a campaign: table, summary, figures, HTML page.
 
 mod cells;
 mod page;
@@ -13,15 +13,15 @@ use afbc_campaign::Summary;
 use afbc_files::{Error, Folder};
 use std::path::PathBuf;
 
-/// Writes everything about a campaign except its rows into `folder`, and returns the paths written:
+/// Writes all results of a campaign except its rows into `folder`. Returns the paths written:
 ///
 /// * `position-error.svg`, `smoothness.svg`: distributions over all flights;
-/// * `success.svg`: losses against each drawn quantity;
-/// * `summary.json`: the figures as numbers;
-/// * `report.html`: everything on one self-contained page.
+/// * `success.svg`: losses against each randomly drawn quantity;
+/// * `summary.json`: the results as numbers;
+/// * `report.html`: all results on one self-contained page.
 ///
 /// # Errors
-/// The first file that could not be written, or is not the command's.
+/// Fails at the first file that cannot be written, or that another command has written.
 pub fn write(folder: &Folder, summary: &Summary) -> Result<Vec<PathBuf>, Error> {
     let figures = figures::campaign::draw(summary);
     let svgs = figures.iter().map(|figure| format!("{}.svg", figure.name));

@@ -1,4 +1,4 @@
-//! The report of a campaign.
+//! The HTML page of a campaign.
 
 use super::cells::{HEADS, bad, cells, flights, legend, percent};
 use crate::figures::Picture;
@@ -51,7 +51,7 @@ fn results(summary: &Summary) -> Markup {
     }
 }
 
-/// Formats the share of flights not lost, with its 95 % interval.
+/// Formats the share of flights that were not lost, with its 95 % interval.
 fn not_lost(count: &Count) -> Markup {
     let Share { value, low, high } = count.share();
     html! {

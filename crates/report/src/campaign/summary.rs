@@ -20,23 +20,23 @@ struct Contender<'a> {
     all: Success,
     tripped: u64,
     by_trajectory: BTreeMap<&'a str, Success>,
-    /// Null where the percentile is a lost flight.
+    /// Percentile; null if the flight at that rank was lost.
     rmse_position_m: Percentiles,
     max_position_m: Percentiles,
-    /// Over flights that were not lost.
+    /// Percentiles over flights that were not lost.
     mean_abs_du4_n: Percentiles,
     saturated_ratio: Percentiles,
-    /// Worst first.
+    /// Numbers of the worst flights, worst first.
     worst_flights: Vec<u64>,
 }
 
-/// Flights that were not lost.
+/// Number and share of flights that were not lost.
 #[derive(Serialize)]
 struct Success {
     flights: u64,
     kept: u64,
     success_ratio: f64,
-    /// Wilson's score interval.
+    /// Wilson's score interval of the share.
     success_interval_95: [f64; 2],
 }
 
@@ -52,7 +52,7 @@ impl From<&Count> for Success {
     }
 }
 
-/// Percentiles by nearest rank.
+/// Percentiles by the nearest-rank method.
 #[derive(Serialize)]
 struct Percentiles {
     p50: Option<f64>,
@@ -82,10 +82,10 @@ fn contender<'a>(manifest: &'a Manifest, tally: &'a Tally) -> Contender<'a> {
     }
 }
 
-/// Writes one object.
+/// Writes the summary as one JSON object.
 ///
 /// # Errors
-/// If writing to `out` fails.
+/// Fails if writing to `out` fails.
 pub fn write(out: &mut dyn Write, summary: &Summary) -> io::Result<()> {
     let contender = |tally| contender(&summary.manifest, tally);
     let page = Page { campaign: &summary.manifest, contenders: summary.tallies.iter().map(contender).collect() };

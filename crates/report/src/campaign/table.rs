@@ -1,4 +1,4 @@
-//! A campaign's table for the terminal.
+//! Formats a campaign's table for the terminal.
 
 use super::cells::{HEADS, bad, cells, flights, legend};
 use crate::table::{line_width, wrap};
@@ -7,12 +7,12 @@ use afbc_campaign::Summary;
 /// Space between columns.
 const GAP: usize = 2;
 
-/// A group of columns.
+/// A group of columns with a common title.
 struct Group {
     title: &'static str,
     heads: &'static [&'static str],
     widths: Vec<usize>,
-    /// Place of its first cell in a row.
+    /// Index of the group's first cell in a row.
     first: usize,
 }
 
@@ -21,7 +21,7 @@ impl Group {
         self.widths.iter().map(|width| width + GAP).sum()
     }
 
-    /// Returns its part of a row.
+    /// Returns the group's part of a row.
     fn cells<'a>(&self, cells: impl IntoIterator<Item = &'a str>) -> String {
         cells.into_iter().zip(&self.widths).map(|(cell, width)| right(cell, width + GAP)).collect()
     }
@@ -35,7 +35,7 @@ fn right(text: &str, to: usize) -> String {
     " ".repeat(to.saturating_sub(width(text))) + text
 }
 
-/// Returns the groups with their columns as wide as heads and cells are.
+/// Returns the groups; each column is as wide as its widest cell or head.
 fn groups(body: &[Vec<String>]) -> Vec<Group> {
     let mut first = 0;
     let mut groups = Vec::new();
@@ -52,7 +52,7 @@ fn groups(body: &[Vec<String>]) -> Vec<Group> {
     groups
 }
 
-/// Divides the groups into tables that are no wider than a line.
+/// Divides the groups into tables that fit the width of a line.
 fn parts(groups: Vec<Group>, name_width: usize) -> Vec<Vec<Group>> {
     let mut parts: Vec<Vec<Group>> = Vec::new();
     for group in groups {
@@ -65,8 +65,8 @@ fn parts(groups: Vec<Group>, name_width: usize) -> Vec<Vec<Group>> {
     parts
 }
 
-/// Formats the results of every contender, and each one's worst flight with the command that flies it again; `target`
-/// is the campaign's name for `sitl campaign`.
+/// Formats the results of every contender, and the worst flight of each with the command that repeats it. `target` is
+/// the campaign's name for `sitl campaign`.
 pub fn table(summary: &Summary, target: &str) -> String {
     let manifest = &summary.manifest;
     let mut lines = vec![format!("{}: {} flights each", manifest.name, flights(summary))];

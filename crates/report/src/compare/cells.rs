@@ -1,4 +1,4 @@
-//! Contents of a comparison's table, for the page and the terminal.
+//! Contents of a comparison's table, for the HTML page and the terminal.
 
 use crate::differences::{self, number};
 use crate::grid::{Grid, GridCell};
@@ -7,15 +7,16 @@ use afbc_campaign::compare::{Comparison, Entry, MEASURES, Measure};
 use afbc_campaign::statistics::Median;
 use afbc_sim::metrics::SETTLED_S;
 
-/// How medians are shown.
+/// Function that formats a median.
 type Shown = fn(&Median, &Measure) -> String;
 
-/// Shows a median alone.
+/// Formats a median without its interval.
 pub(super) fn alone(median: &Median, measure: &Measure) -> String {
     number(median.value, measure)
 }
 
-/// Returns the medians of one contender, and whether each is the best of its column; none if that is a lost flight.
+/// Returns the medians of one contender, and whether each is the best of its column; `None` if a median is a lost
+/// flight's.
 pub(super) fn cells(comparison: &Comparison, entry: &Entry, shown: Shown) -> Option<Vec<GridCell>> {
     let cell = |figure: &Measure| {
         let text = shown(&entry.median(figure.value)?, figure);
@@ -28,7 +29,7 @@ pub(super) fn cells(comparison: &Comparison, entry: &Entry, shown: Shown) -> Opt
     Some(cells)
 }
 
-/// Returns the tables for a paper: medians of every figure, and differences of the distance.
+/// Returns the tables for a paper: the medians of all figures of merit, and the differences in distance.
 pub(super) fn grids(comparison: &Comparison) -> Vec<Grid> {
     let row = |entry: &Entry| {
         let cells = cells(comparison, entry, differences::median);
@@ -42,12 +43,12 @@ pub(super) fn grids(comparison: &Comparison) -> Vec<Grid> {
     [Grid { caption, heads, rows, note }].into_iter().chain(differences::grid(comparison)).collect()
 }
 
-/// True if backstepping flew, to compare others with.
+/// Returns true if backstepping flew, so that ratios to it exist.
 pub(super) fn has_ratio(comparison: &Comparison) -> bool {
     comparison.entries.iter().any(|entry| comparison.ratio(entry).is_some())
 }
 
-/// Returns the heads of the columns.
+/// Returns the column heads.
 pub(super) fn heads(comparison: &Comparison) -> Vec<&'static str> {
     MEASURES.iter().map(|figure| figure.title).chain(has_ratio(comparison).then_some("ratio")).collect()
 }

@@ -1,4 +1,4 @@
-//! `comparison.csv` and `comparison.json`.
+//! Writes `comparison.csv` and `comparison.json`.
 
 use crate::differences::{self, FigureOverSeeds};
 use crate::words::measured;
@@ -7,12 +7,12 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
-/// The figures of `comparison.csv`, `comparison.json` and `statistics.csv`.
+/// Returns the figures of merit in `comparison.csv`, `comparison.json` and `statistics.csv`.
 pub(super) fn measures() -> Vec<&'static Measure> {
     [&DISTANCE].into_iter().chain(&MEASURES).collect()
 }
 
-/// Writes a row for each flight. A lost flight's figures cover the time until the loss; none are measured before 5 s.
+/// Writes one row per flight. A lost flight's figures cover the time until the loss. Figures only count from 5 s on.
 pub(super) fn csv(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     let measures = measures();
@@ -45,7 +45,7 @@ struct Contender<'a> {
     controller: &'a str,
     seeds: Vec<u64>,
     lost: usize,
-    /// Null if a vehicle was lost.
+    /// Mean of each figure; null if a vehicle was lost.
     mean: BTreeMap<&'a str, Option<f64>>,
     standard_deviation: BTreeMap<&'a str, Option<f64>>,
     /// Root mean square distance divided by backstepping's.
@@ -53,10 +53,10 @@ struct Contender<'a> {
     figures: Vec<FigureOverSeeds>,
 }
 
-/// Writes an array with one object for each scenario: means, medians and differences over the seeds.
+/// Writes an array with one object per scenario: means, medians and differences over the seeds.
 ///
 /// # Errors
-/// If writing to `out` fails.
+/// Fails if writing to `out` fails.
 pub fn json(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result<()> {
     let compared = comparisons.iter().map(|comparison| {
         let figures = differences::figures(comparison, measures());

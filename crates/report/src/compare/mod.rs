@@ -1,4 +1,4 @@
-//! Results of a comparison: table, CSV, JSON, figures, report.
+//! Results of a comparison: table, CSV, JSON, figures, HTML page.
 
 mod cells;
 mod files;
@@ -17,20 +17,20 @@ use afbc_files::{Error, Folder};
 use afbc_sim::flown::Flown;
 use std::path::PathBuf;
 
-/// Writes everything about `comparisons` into `folder`, replacing all earlier files of its command, and returns the
+/// Writes all results of `comparisons` into `folder`, and removes all earlier files of the same command. Returns the
 /// paths written:
 ///
-/// * `comparison.csv`: a row for each flight;
+/// * `comparison.csv`: one row per flight;
 /// * `comparison.json`: means, medians and differences over the seeds;
-/// * `statistics.csv`: a row for each figure of each contender: its median, how it differs from another's, and whether
-///   by chance;
-/// * `tables.md`, `tables.tex`: the tables for a paper;
-/// * `errors.svg`, `rmse.svg`, `trajectory.svg`: errors over time, their root mean squares, and the flights in space;
+/// * `statistics.csv`: one row per figure of each contender: its median, its difference to the reference contender's,
+///   and the significance of that difference;
+/// * `tables.md`, `tables.tex`: tables for a paper;
+/// * `errors.svg`, `rmse.svg`, `trajectory.svg`: errors over time, root mean square errors, and the flights in space;
 ///   with several scenarios, `<scenario>-errors.svg` etc. for each;
-/// * `report.html`: everything on one self-contained page.
+/// * `report.html`: all results on one self-contained page.
 ///
 /// # Errors
-/// The first file that could not be written, or is not the command's.
+/// Fails at the first file that cannot be written, or that another command has written.
 pub fn write(folder: &Folder, comparisons: &[Comparison]) -> Result<Vec<PathBuf>, Error> {
     let flown: Vec<Flown> =
         comparisons.iter().flat_map(|comparison| &comparison.entries).map(|entry| entry.first.clone()).collect();
@@ -61,8 +61,8 @@ pub fn write(folder: &Folder, comparisons: &[Comparison]) -> Result<Vec<PathBuf>
     Ok(paths)
 }
 
-/// Formats the tables for a paper: of each scenario the medians of every figure and, with several seeds, how the
-/// distances differ from one contender's.
+/// Formats the tables for a paper. Per scenario these are the medians of all figures and, with several seeds, the
+/// differences in distance to the reference contender.
 pub fn tables(comparisons: &[Comparison], format: TableFormat) -> String {
     let of = |comparison: &Comparison| grid::tables(&cells::grids(comparison), &comparison.scenario.name, format);
     comparisons.iter().map(of).collect::<Vec<_>>().join("\n")

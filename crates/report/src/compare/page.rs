@@ -1,4 +1,4 @@
-//! The report of a comparison.
+//! The HTML page of a comparison.
 
 use super::cells::{cells, heads, legend, lost};
 use crate::differences;

@@ -1,4 +1,4 @@
-//! The comparison's table for the terminal.
+//! Formats a comparison's table for the terminal.
 
 use super::cells::{alone, cells, heads, legend, lost};
 use crate::differences;
@@ -7,7 +7,7 @@ use crate::table::wrap;
 use crate::words;
 use afbc_campaign::compare::{Comparison, Entry};
 
-/// Formats one block for each scenario with one line for each contender.
+/// Formats one block per scenario, with one line per contender.
 pub fn table(comparisons: &[Comparison]) -> String {
     let mut lines = Vec::new();
     for comparison in comparisons {
@@ -38,7 +38,7 @@ fn block(comparison: &Comparison, lines: &mut Vec<String>) {
         for (entry, line) in comparison.entries.iter().zip(figures.into_iter().skip(1)) {
             match cells(comparison, entry, alone) {
                 Some(_) => lines.push(line),
-                // Once: it has no figures below, either.
+                // Describe the loss once: the contender has no numbers in the parts below, either.
                 None if index == 0 => {
                     let name = format!("{:<1$}  ", entry.contender().title(), names.unwrap_or_default());
                     wrap(lines, &name, &lost(entry));

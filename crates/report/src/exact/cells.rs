@@ -1,4 +1,4 @@
-//! Numbers and words about an exact log, for page and terminal.
+//! Texts and numbers about a replayed exact log, for the HTML page and the terminal.
 
 use super::replayed::ReplayedLog;
 use crate::table::wrap;
@@ -7,26 +7,26 @@ use afbc_replay::exact::{
     ReplayQuantity, SettingChange,
 };
 
-/// Heads of the columns.
+/// Column heads.
 pub(super) const HEADS: [&str; 3] = ["RMS", "largest", "at"];
-/// Largest number of parameters that are listed.
+/// Most parameters that are listed.
 const LISTED_MAX: usize = 40;
 /// Ticks per second.
 const RATE_HZ: f64 = 1000.0;
 
-/// A quantity's difference.
+/// Difference of one quantity between the two settings.
 pub(super) struct Row {
     pub(super) name: &'static str,
     pub(super) cells: [String; 3],
 }
 
-/// Returns the quantities of this vehicle with their places in [`QUANTITIES`].
+/// Returns the quantities that this vehicle has, with their indices in [`QUANTITIES`].
 pub(crate) fn quantities(replay: &ExactReplay) -> impl Iterator<Item = (usize, &'static ReplayQuantity)> {
     let rotors = replay.rotors;
     QUANTITIES.iter().enumerate().filter(move |(_, quantity)| quantity.rotor.is_none_or(|rotor| rotor < rotors))
 }
 
-/// Returns the differences that other settings make; "-" where nothing could be compared.
+/// Returns how far each quantity differs under the changed settings; "-" if nothing could be compared.
 pub(super) fn rows(replay: &ExactReplay, comparison: &ChangeComparison) -> Vec<Row> {
     let row = |(index, quantity): (usize, &ReplayQuantity)| {
         let figure = comparison.figures.get(index).copied().unwrap_or_default();
@@ -51,7 +51,7 @@ pub(super) fn conditions(replay: &ExactReplay) -> String {
     format!("{vehicle} under {law}, {ticks} ticks ({:.1} s), {per_tick:.0} bytes per tick", *ticks as f64 / RATE_HZ)
 }
 
-/// Says what is in the log, a sentence each.
+/// Describes the contents of the log, one sentence per fact.
 pub(super) fn contents(replay: &ExactReplay) -> Vec<String> {
     let ExactReplay { starts, armed_ticks, flights, lost_ticks, messages, parameters, damaged, cut_bytes, .. } = replay;
     let armed_s = *armed_ticks as f64 / RATE_HZ;
@@ -97,7 +97,7 @@ fn listed(parameters: &[&LoggedParameter]) -> String {
     format!("{}{more}", all.join(", "))
 }
 
-/// Says whether the log gives the same again.
+/// Says whether the replay gives the same results as the log.
 pub(super) fn verdict(replay: &ExactReplay) -> String {
     match &replay.first_difference {
         None if replay.damaged.0 > 0 => {
@@ -111,7 +111,7 @@ pub(super) fn verdict(replay: &ExactReplay) -> String {
     }
 }
 
-/// Returns what differs first, and where.
+/// Describes the first difference and its place in the log.
 fn different(replay: &ExactReplay, first: &FirstDifference) -> String {
     let FirstDifference { start, tick, at_s, byte, finding } = first;
     let start = if replay.starts > 1 { format!(" of start {start}") } else { String::new() };
@@ -140,7 +140,7 @@ fn signal(signal: &GivenSignal) -> String {
     }
 }
 
-/// Returns what is wrong with the log and what to do, in one line; none if every tick gives the same again.
+/// Returns a line that says what is wrong with the log and what to do; `None` if every tick gives the same results.
 #[must_use]
 pub fn problem(log: &ReplayedLog<'_>) -> Option<String> {
     let replay = log.replay;
@@ -163,7 +163,7 @@ pub fn problem(log: &ReplayedLog<'_>) -> Option<String> {
     Some(format!("{damage}{what}; {cure}"))
 }
 
-/// Says what was changed, and how far.
+/// Says which settings were changed, and how the flight core's mode differs.
 pub(super) fn changed(comparison: &ChangeComparison) -> Vec<String> {
     let changes: Vec<_> = comparison.changes.iter().map(SettingChange::to_string).collect();
     let mut said = vec![format!(
@@ -177,7 +177,7 @@ pub(super) fn changed(comparison: &ChangeComparison) -> Vec<String> {
     said
 }
 
-/// Formats everything for the terminal.
+/// Formats the whole result for the terminal.
 #[must_use]
 pub fn table(log: &ReplayedLog<'_>) -> String {
     let replay = log.replay;
@@ -199,7 +199,7 @@ pub fn table(log: &ReplayedLog<'_>) -> String {
     lines.join("\n")
 }
 
-/// Returns the lines of a table.
+/// Returns the lines of the table.
 fn columns(rows: &[Row]) -> Vec<String> {
     let width = |text: &str| text.chars().count();
     let first = rows.iter().map(|row| width(row.name)).max().unwrap_or_default();

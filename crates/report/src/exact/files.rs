@@ -1,4 +1,4 @@
-//! `change.csv` and `summary.json`.
+//! Writes `change.csv` and `summary.json`.
 
 use super::cells::{problem, quantities};
 use super::replayed::ReplayedLog;
@@ -6,7 +6,7 @@ use afbc_replay::exact::{ChangeComparison, ExactReplay, SettingChange};
 use serde::Serialize;
 use std::io::{self, Write};
 
-/// Writes what was commanded and what would have been, over time; a field is empty where there is none.
+/// Writes the commands over time, as flown and under the changed settings; a field without a value is empty.
 pub(super) fn csv(out: &mut dyn Write, replay: &ExactReplay) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     let columns: Vec<_> = quantities(replay).collect();
@@ -74,10 +74,10 @@ struct Difference {
     largest_at_s: Option<f64>,
 }
 
-/// Writes one object.
+/// Writes the summary as one JSON object.
 ///
 /// # Errors
-/// If writing to `out` fails.
+/// Fails if writing to `out` fails.
 pub fn json(out: &mut dyn Write, log: &ReplayedLog<'_>) -> io::Result<()> {
     let ReplayedLog { name, replay } = log;
     let first = replay.first_difference.as_ref();

@@ -1,5 +1,5 @@
-//! Results of an exact log: what is in it, whether it gives the same again, and what other settings would have
-//! commanded.
+//! Results of an exact log's replay: its contents, whether the replay gives the same results, and the commands that
+//! other settings would have given.
 
 mod cells;
 mod files;
@@ -14,16 +14,16 @@ use crate::figures;
 use afbc_files::{Error, Folder};
 use std::path::PathBuf;
 
-/// Writes what other settings would have commanded into `folder`, replacing all earlier files of its command, and
-/// returns the paths written:
+/// Writes the effect of the changed settings into `folder`, and removes all earlier files of the same command. Returns
+/// the paths written:
 ///
-/// * `change.csv`: what was commanded, and what would have been, over time;
-/// * `summary.json`: what is in the log, and the differences;
+/// * `change.csv`: commands over time, as flown and under the changed settings;
+/// * `summary.json`: contents of the log, and the differences;
 /// * `motors.svg`, `demands.svg`, `estimate.svg`: figures;
-/// * `report.html`: everything on one self-contained page.
+/// * `report.html`: all results on one self-contained page.
 ///
 /// # Errors
-/// The first file that could not be written, or is not the command's.
+/// Fails at the first file that cannot be written, or that another command has written.
 pub fn write(folder: &Folder, log: &ReplayedLog<'_>) -> Result<Vec<PathBuf>, Error> {
     let pictures = figures::exact::draw(log.replay);
     let svgs: Vec<_> = pictures.iter().map(|picture| format!("{}.svg", picture.name)).collect();

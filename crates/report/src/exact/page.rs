@@ -1,4 +1,4 @@
-//! The report of an exact log under other settings.
+//! The HTML page of an exact log under changed settings.
 
 use super::cells;
 use super::replayed::ReplayedLog;

@@ -3,33 +3,33 @@
 use super::packed::deltas;
 use serde::Serialize;
 
-/// Steps of the time axis, and of a panel's value axis.
+/// Grid steps along the time axis, and along a panel's value axis.
 const TIME_STEPS: f64 = 1e6;
 const VALUE_STEPS: f64 = 16_384.0;
 
-/// A chart over time, as the script draws it.
+/// A chart over time, in the form that the page's script reads.
 #[derive(Serialize)]
 pub(crate) struct ExplorableChart {
     pub(crate) title: String,
     pub(crate) end_s: f64,
     pub(crate) legend: Vec<LegendEntry>,
     pub(crate) panels: Vec<TracePanel>,
-    /// Events: shaded intervals, or moments if both ends are the same.
+    /// Events: shaded intervals, or instants if both ends are equal.
     pub(crate) spans: Vec<Span>,
 }
 
-/// A line's style.
+/// Style of a line.
 #[derive(Clone, PartialEq, Serialize)]
 pub(crate) struct Pen {
-    /// Colour on white, and in the dark.
+    /// Colour on white, and in dark mode.
     pub(crate) colors: [String; 2],
     pub(crate) width_px: f64,
     pub(crate) opacity: f64,
-    /// Lengths on and off; solid if empty.
+    /// Lengths of dashes and gaps; empty for a solid line.
     pub(crate) dash_px: Vec<f64>,
 }
 
-/// A name, and the style of its lines; `⟨d⟩` is a subscript.
+/// Name of a legend entry, with the style of its lines; `⟨d⟩` is a subscript.
 #[derive(Serialize)]
 pub(crate) struct LegendEntry {
     pub(crate) name: String,
@@ -37,7 +37,7 @@ pub(crate) struct LegendEntry {
     pub(crate) pen: Pen,
 }
 
-/// An interval with its label.
+/// A time interval with its label.
 #[derive(Serialize)]
 pub(crate) struct Span {
     pub(crate) label: String,
@@ -49,19 +49,19 @@ pub(crate) struct Span {
 /// A panel with one quantity.
 #[derive(Serialize)]
 pub(crate) struct TracePanel {
-    /// `⟨d⟩` is a subscript.
+    /// Label of the panel; `⟨d⟩` is a subscript.
     pub(crate) label: String,
-    /// Range of the axis while all of the time is seen.
+    /// Ends of the value axis while the whole time range is visible.
     pub(crate) low: f64,
     pub(crate) high: f64,
     pub(crate) traces: Vec<Trace>,
 }
 
-/// A line: points as differences on a grid, time in millionths of the chart's duration, values in 2^-14 of the
-/// panel's range, from its low end.
+/// A line. Its points are stored as differences on a grid: times in millionths of the chart's duration, values in 2^-14
+/// of the panel's range, counted from its lower end.
 #[derive(Serialize)]
 pub(crate) struct Trace {
-    /// Index of its entry in the legend, by which it is hidden.
+    /// Index of the legend entry that hides and shows the line.
     entry: Option<usize>,
     #[serde(flatten)]
     pen: Pen,
@@ -70,7 +70,7 @@ pub(crate) struct Trace {
 }
 
 impl TracePanel {
-    /// Adds a line over a time axis from 0 to `end_s`.
+    /// Adds a line on a time axis from 0 to `end_s`.
     pub(crate) fn add(&mut self, entry: Option<usize>, pen: Pen, points: &[(f64, f64)], end_s: f64) {
         self.traces.push(Trace {
             entry,

@@ -1,7 +1,7 @@
-//! Figures to explore: what the script of a page (`assets/explore.js`) draws anew in place of a figure, so that readers
-//! zoom, pan, hide contenders, read values under the cursor, and see flights again in space.
+//! Interactive figures: the script of a page (`assets/explore.js`) redraws them, so that readers can zoom, pan, hide
+//! contenders, read values under the cursor, and replay flights in space.
 //!
-//! Each figure carries its data, packed, beside its SVG, which is what is seen on paper and without JavaScript.
+//! Each figure stores its packed data next to its SVG. The SVG is shown on paper and without JavaScript.
 
 mod chart;
 mod packed;
@@ -15,7 +15,7 @@ pub(crate) use scene::{ExplorableScene, Place, rotors_on_a_circle_m};
 use maud::{Markup, PreEscaped, html};
 use serde::Serialize;
 
-/// What a page's script draws in place of a figure.
+/// Data of an interactive figure.
 #[derive(Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub(crate) enum Explorable {
@@ -26,27 +26,27 @@ pub(crate) enum Explorable {
 }
 
 const SCRIPT: &str = include_str!("../../assets/explore.js");
-/// Style of what the script draws.
+/// Style sheet of the interactive figures.
 pub(crate) const STYLE: &str = include_str!("../../assets/explore.css");
 
-/// Attributes by which the script finds what it needs.
+/// Attributes by which the script finds the data.
 const CHART: &str = "data-explore=\"chart\"";
 const SCENE: &str = "data-explore=\"scene\"";
 
 impl Explorable {
-    /// Returns the data of the figure, to be put beside its picture.
+    /// Returns the figure's data as an element to put next to its picture.
     pub(crate) fn markup(&self) -> Markup {
         let kind = match self {
             Explorable::Chart(_) => "chart",
             Explorable::Scene(_) => "scene",
         };
-        // What is made of numbers and text alone can always be written.
+        // A structure of only numbers and text can always be serialized.
         let json = serde_json::to_vec(self).unwrap_or_default();
         html! { script type="text/plain" data-explore=(kind) { (PreEscaped(packed::text(&json))) } }
     }
 }
 
-/// Returns the scripts that a page with this body needs: none without a figure to explore.
+/// Returns the scripts that a page with this body needs; none without an interactive figure.
 pub(crate) fn scripts(body: &Markup) -> Markup {
     let (charts, scenes) = (body.0.contains(CHART), body.0.contains(SCENE));
     let library = |name: &str, text: &str| {

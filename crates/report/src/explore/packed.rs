@@ -1,18 +1,19 @@
-//! Numbers and text made small.
+//! Compression of numbers and text.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-/// Compression level of zlib, 0 to 10: beyond 6 little is gained.
+/// Compression level of zlib, 0 to 10; levels above 6 gain little.
 const LEVEL: u8 = 6;
 
-/// Returns `bytes` compressed (zlib) in Base64, which a browser unpacks by itself (`DecompressionStream("deflate")`).
+/// Compresses `bytes` with zlib and encodes them in Base64. Browsers unpack this without a library
+/// (`DecompressionStream("deflate")`).
 pub(super) fn text(bytes: &[u8]) -> String {
     STANDARD.encode(miniz_oxide::deflate::compress_to_vec_zlib(bytes, LEVEL))
 }
 
-/// Returns the values on a grid of `steps` from `low` to `high`, each less the one before: whole numbers that compress
-/// well. Values that are not finite count as `low`.
+/// Rounds the values to a grid of `steps` from `low` to `high`, and returns the difference of each to the one before:
+/// integers that compress well. NaN counts as `low`; infinities give huge integers.
 pub(super) fn deltas(values: impl Iterator<Item = f64>, low: f64, high: f64, steps: f64) -> Vec<i64> {
     let span = high - low;
     let grid = |value: f64| if span > 0.0 { ((value - low) / span * steps).round() as i64 } else { 0 };

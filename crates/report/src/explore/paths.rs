@@ -1,14 +1,14 @@
-//! Pictures made smaller for a page.
+//! Shortens the SVG pictures of a page.
 
 use core::fmt::Write;
 
-/// Returns `svg` with its lines as paths of differences, which take half of the room of points.
+/// Returns `svg` with polylines as paths of relative steps, which take half the space.
 pub(crate) fn with_short_paths(svg: &str) -> String {
     let lines = svg.split_inclusive('\n').map(|line| short(line).unwrap_or_else(|| line.to_owned()));
     lines.collect()
 }
 
-/// Returns a line of a picture that is a polyline of whole numbers as a path; none for any other.
+/// Converts one line of a picture; returns `None` unless it is a polyline of integers.
 fn short(line: &str) -> Option<String> {
     let attributes = line.strip_prefix("<polyline ")?;
     let (before, rest) = attributes.split_once("points=\"")?;
@@ -18,7 +18,7 @@ fn short(line: &str) -> Option<String> {
     for point in points.split_ascii_whitespace() {
         let (x, y) = point.split_once(',')?;
         let point @ [x, y]: [i32; 2] = [x.parse().ok()?, y.parse().ok()?];
-        // Writing to a String cannot fail. A minus sign separates by itself.
+        // Writing to a String cannot fail. A minus sign also separates numbers.
         let _ = match last {
             None => write!(path, "M{x} {y}l"),
             Some([from_x, from_y]) => {

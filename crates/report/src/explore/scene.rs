@@ -1,23 +1,23 @@
-//! Flights in space.
+//! Interactive view of flights in space.
 
 use super::chart::Pen;
 use super::packed::deltas;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-/// Largest number of points of a track.
+/// Most points of a track.
 const POINTS_MAX: usize = 1500;
-/// Steps of the time axis, along an edge of the box, and in a whole turn.
+/// Grid steps along the time axis, along an edge of the box, and in a full turn.
 const TIME_STEPS: f64 = 1e6;
 const BOX_STEPS: f64 = 65_536.0;
 const TURN_STEPS: f64 = 65_536.0;
 
-/// Flights in space, in a frame with x forward (or north), y left (or west), z up, as the script draws them.
+/// Flights in space, in the form that the page's script reads. Axes: x forward (or north), y left (or west), z up.
 #[derive(Serialize)]
 pub(crate) struct ExplorableScene {
     pub(crate) title: String,
     pub(crate) end_s: f64,
-    /// Corners of the box in which the tracks are \[m\].
+    /// Corners of the box that contains the tracks \[m\].
     pub(crate) low_m: [f64; 3],
     pub(crate) high_m: [f64; 3],
     /// Positions of the rotors in the body frame \[m\].
@@ -25,8 +25,8 @@ pub(crate) struct ExplorableScene {
     pub(crate) tracks: Vec<Track>,
 }
 
-/// Where a vehicle was, as differences on a grid: time in millionths of the scene's duration, positions in 2^-16 of
-/// the box's edges from its low corner, angles in 2^-16 of a turn.
+/// The path of a vehicle, stored as differences on a grid: times in millionths of the scene's duration, positions in
+/// 2^-16 of the box's edges from its lower corner, angles in 2^-16 of a turn.
 #[derive(Serialize)]
 pub(crate) struct Track {
     name: String,
@@ -34,14 +34,14 @@ pub(crate) struct Track {
     pen: Pen,
     times: Vec<i64>,
     position: [Vec<i64>; 3],
-    /// Roll, pitch, yaw; none of a reference.
+    /// Roll, pitch and yaw; `None` for a reference.
     attitude: Option<[Vec<i64>; 3]>,
 }
 
-/// Time \[s\], position \[m\], roll, pitch and yaw \[rad\].
+/// Time \[s\], position \[m\], and roll, pitch and yaw \[rad\].
 pub(crate) type Place = (f64, Vector3<f64>, Vector3<f64>);
 
-/// Rotors of a vehicle of which nothing is known but how many it has: on a circle \[m\].
+/// Returns made-up rotor positions on a circle \[m\], for a vehicle of which only the number of rotors is known.
 pub(crate) fn rotors_on_a_circle_m(count: usize) -> Vec<[f64; 2]> {
     let rotor = |i: usize| {
         let (sin, cos) = libm::sincos(core::f64::consts::TAU * (i as f64 + 0.5) / count as f64);
@@ -51,7 +51,7 @@ pub(crate) fn rotors_on_a_circle_m(count: usize) -> Vec<[f64; 2]> {
 }
 
 impl ExplorableScene {
-    /// Returns a scene around all of these places, without a track yet; none if there are fewer than two.
+    /// Returns a scene whose box contains all these places, still without tracks; `None` for fewer than two places.
     pub(crate) fn around<'a>(places: impl Iterator<Item = &'a Place> + Clone, rotors_m: Vec<[f64; 2]>) -> Option<Self> {
         places.clone().nth(1)?;
         let end_s = places.clone().map(|place| place.0).fold(0.0, f64::max);
@@ -72,7 +72,7 @@ impl ExplorableScene {
         })
     }
 
-    /// Returns it with so many points of each track, at most, beside its last one: for pages with many flights.
+    /// Reduces each track to at most `points` points plus its last one, for pages with many flights.
     pub(crate) fn thinned(mut self, points: usize) -> Self {
         for track in &mut self.tracks {
             let stride = track.times.len().div_ceil(points.max(1)).max(1);
@@ -84,10 +84,10 @@ impl ExplorableScene {
         self
     }
 
-    /// Adds the way of a vehicle, or of its reference, which has no attitude.
+    /// Adds the path of a vehicle, or of its reference, which has no attitude.
     pub(crate) fn add(&mut self, name: String, pen: Pen, places: &[Place], is_reference: bool) {
         let stride = places.len().div_ceil(POINTS_MAX).max(1);
-        // The last place is not lost where the stride steps over it.
+        // Keep the last place even if the stride skips it.
         let last = places.last().filter(|_| places.len() % stride != 1 && stride > 1);
         let few: Vec<&Place> = places.iter().step_by(stride).chain(last).collect();
         let (low, high) = (Vector3::from(self.low_m), Vector3::from(self.high_m));
@@ -110,7 +110,7 @@ impl ExplorableScene {
     }
 }
 
-/// Returns the differences of every `stride`-th value, and of the last one.
+/// Returns the differences between every `stride`-th value, including the last one.
 fn strided(deltas: &[i64], stride: usize) -> Vec<i64> {
     let mut sum = 0;
     let step = |(place, delta): (usize, &i64)| {

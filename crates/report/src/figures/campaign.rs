@@ -1,4 +1,4 @@
-//! Figures of a campaign: distributions over its flights, and losses against drawn quantities.
+//! Figures of a campaign: distributions over its flights, and losses against the drawn quantities.
 
 use super::canvas::{self, Canvas, Ink, WIDTH_PX};
 use super::panel::{BOTTOM_PX, Frame};
@@ -9,9 +9,9 @@ use afbc_campaign::{BINS, Count, Drawn, Summary, Tally};
 use afbc_drawing::{PlotAxis, Point, Ticks};
 use core::ops::Range;
 
-/// Largest number of points of a curve.
+/// Most points of a curve.
 const POINTS: usize = 400;
-/// Largest number of ticks along a distribution, and on each other axis.
+/// Most ticks on the value axis of a distribution, and on each other axis.
 const X_TICKS: usize = 12;
 const Y_TICKS: usize = 6;
 const LINE_PX: f64 = 1.6;
@@ -24,17 +24,17 @@ const WIDE_PX: f64 = 330.0;
 const PANEL_PX: f64 = 200.0;
 /// Size of a distribution's marks.
 const MARK_PX: f64 = 4.0;
-/// Distance between marks at the same position, and below which lines count as coincident.
+/// Least distance between marks, and distance below which lines count as coincident.
 const APART_PX: f64 = 8.0;
 const SAME_PX: f64 = 1.0;
-/// Opacity of an interval.
+/// Opacity of one interval's area.
 const INTERVAL_OPACITY: f64 = 0.15;
-/// Approximate opacity of all intervals together.
+/// Approximate opacity of all intervals' areas together.
 const INTERVALS_OPACITY: f64 = 0.6;
-/// Top of the axis of shares \[%\], so that marks at 100 are not cut off.
+/// Upper end of the axis of shares \[%\], so that marks at 100 are not cut off.
 const TOP: f64 = 104.0;
 
-/// Draws every figure of a campaign; none without flights.
+/// Draws all figures of a campaign; figures without data are left out.
 pub(crate) fn draw(summary: &Summary) -> Vec<Picture> {
     let flights = summary.tallies.first().map_or(0, |tally| tally.count.flights);
     let conditions = format!("{}: {flights} flights each", summary.manifest.name);
@@ -79,13 +79,13 @@ fn is_spread(drawn: &Drawn) -> bool {
     drawn.ends[0] < drawn.ends[1]
 }
 
-/// Returns names with their lines, in the campaign's order.
+/// Returns the contenders' names with their line styles, in the campaign's order.
 fn legend(summary: &Summary) -> Vec<(String, Ink)> {
     let names: Vec<&str> = summary.tallies.iter().map(|tally| tally.contender.as_str()).collect();
     names.iter().map(|name| (*name).to_owned()).zip(canvas::inks(&names, LINE_PX)).collect()
 }
 
-/// Begins a figure, its legend with each contender's mark.
+/// Starts a figure whose legend shows each contender's mark.
 fn begun(title: &'static str, conditions: &str, legend: &[(String, Ink)]) -> Canvas {
     let mut canvas = Canvas::new(title, conditions, legend);
     for (index, ((_, ink), (x_px, y_px))) in legend.iter().zip(canvas::places(legend)).enumerate() {
@@ -94,18 +94,18 @@ fn begun(title: &'static str, conditions: &str, legend: &[(String, Ink)]) -> Can
     canvas
 }
 
-/// Cumulative distribution over a logarithmic axis.
+/// A figure of cumulative distributions with a logarithmic value axis.
 struct Distribution {
     title: &'static str,
     label: &'static str,
     values: fn(&Tally) -> &[f64],
 }
 
-/// One contender's part of a distribution: value and share of flights \[%\] below it, with the ends of its interval.
+/// One contender's distribution: a value, and the share of flights below it with the ends of its interval \[%\].
 type Curve = Vec<(f64, [f64; 3])>;
 
 impl Distribution {
-    /// Draws the figure, if any flight has a value.
+    /// Draws the figure; `None` if no flight has a value.
     fn draw(&self, summary: &Summary, conditions: &str) -> Option<String> {
         let range = self.range(summary)?;
         let curves: Vec<Curve> = summary.tallies.iter().map(|tally| curve((self.values)(tally), &range)).collect();
@@ -124,7 +124,7 @@ impl Distribution {
             canvas.area(high.chain(low).collect::<Vec<_>>(), ink.color, opacity);
         }
         for (index, (curve, (_, ink))) in curves.iter().zip(&legend).enumerate() {
-            // A line hidden by later ones is wider, to be visible on both sides of them.
+            // A line that later lines cover is wider, so that it stays visible on both sides of them.
             let hidden = curves.iter().skip(index + 1).filter(|later| coincide(curve, later, &frame.x)).count();
             let ink = Ink { width_px: ink.width_px.max(LINE_PX * (1.0 + 1.5 * hidden as f64)), ..*ink };
             canvas.line(curve.iter().map(|(value, [share, _, _])| frame.at((*value, *share))).collect::<Vec<_>>(), ink);
@@ -142,7 +142,7 @@ impl Distribution {
         Some(canvas.svg(top_px + WIDE_PX))
     }
 
-    /// Returns the range from the smallest value to a high percentile: the worst few would squeeze the rest.
+    /// Returns the range from the smallest value to a high percentile; the worst few flights would squeeze the rest.
     fn range(&self, summary: &Summary) -> Option<Range<f64>> {
         let finite = |tally| (self.values)(tally).iter().filter(is_shown).copied();
         let low = summary.tallies.iter().flat_map(finite).fold(f64::INFINITY, f64::min);
@@ -168,7 +168,7 @@ fn curve(values: &[f64], range: &Range<f64>) -> Curve {
     points.collect()
 }
 
-/// True if one curve hides another: they coincide at half of its points or more.
+/// Returns true if one curve hides another: they coincide at half of its points or more.
 fn coincide(curve: &Curve, other: &Curve, axis: &PlotAxis) -> bool {
     let at = |share: f64| other.iter().find(|(_, [of, ..])| *of >= share).map(|(value, _)| axis.at(*value));
     let same =
@@ -176,11 +176,11 @@ fn coincide(curve: &Curve, other: &Curve, axis: &PlotAxis) -> bool {
     !curve.is_empty() && 2 * curve.iter().filter(same).count() >= curve.len()
 }
 
-/// Draws the share of flights not lost against each drawn quantity, a panel for each.
+/// Draws the share of flights not lost against each drawn quantity, one panel per quantity.
 fn success(summary: &Summary, conditions: &str) -> String {
     let legend = legend(summary);
     let panels: Vec<_> = summary.manifest.drawn.iter().enumerate().filter(|(_, drawn)| is_spread(drawn)).collect();
-    // Many contenders side by side need more room.
+    // Many contenders side by side need wider panels.
     let columns = if legend.len() > 6 { 1 } else { 2 };
     let rows = panels.len().div_ceil(columns);
     let head_px = canvas::head_px(&legend);
@@ -197,14 +197,14 @@ fn success(summary: &Summary, conditions: &str) -> String {
     canvas.svg(head_px + rows as f64 * PANEL_PX + 8.0)
 }
 
-/// Returns the lower end of the axis of shares \[%\]: below all intervals.
+/// Returns the lower end of the axis of shares \[%\], below all intervals.
 fn lowest(summary: &Summary) -> f64 {
     let counts = summary.tallies.iter().flat_map(|tally| tally.by_draw.iter().flatten());
     let low = counts.filter(|count| count.flights > 0).map(|count| count.share().low).fold(1.0, f64::min);
     (10.0 * low).floor().min(9.0) * 10.0
 }
 
-/// Draws one panel between two corners, with `bottom` as the lower end of its axis.
+/// Draws one panel between two corners; `bottom` is the lower end of its axis.
 fn success_panel(
     canvas: &mut Canvas,
     place_px: [Point; 2],
@@ -213,12 +213,12 @@ fn success_panel(
     bottom: f64,
 ) {
     let [low, high] = drawn.ends;
-    // As much room above 100 as with an axis from 0.
+    // Leave the same room above 100 as with an axis from 0.
     let top = 100.0 + (TOP - 100.0) * (1.0 - bottom / 100.0);
     let frame = frame_in(place_px, low..high, bottom..top);
     let (values, shares) = (frame.x.ticks(Y_TICKS), Ticks::linear(bottom, 100.0, Y_TICKS));
     mesh(canvas, &frame, [&values, &shares], [&words::drawn(&drawn.name), "not lost [%]"]);
-    // Side by side within a tenth of the range, with a gap to the next.
+    // The contenders are side by side within each tenth of the range, with a gap to the next tenth.
     let bin_px = (frame.x.to - frame.x.from) / BINS as f64;
     let apart_px = bin_px / (contenders.len() as f64 + 2.0);
     let mark_px = (0.55 * apart_px).clamp(1.5, MARK_PX);
@@ -244,7 +244,7 @@ fn success_panel(
     }
 }
 
-/// Creates a frame between two corners, with room for labels on its left and below.
+/// Creates a frame between two corners, with room for labels on the left and below.
 fn frame_in([(left, top), (right, bottom)]: [Point; 2], x: Range<f64>, y: Range<f64>) -> Frame {
     Frame::new([(left + LEFT_PX, top), (right, bottom - BOTTOM_PX)], x, y)
 }
@@ -256,7 +256,7 @@ fn mesh(canvas: &mut Canvas, frame: &Frame, [x_ticks, y_ticks]: [&Ticks; 2], [x_
     frame.left(canvas, y_ticks, y_title, frame.x.from - LEFT_PX + FREE_PX);
 }
 
-/// Returns a number without trailing zeros.
+/// Removes trailing zeros after the decimal point.
 fn short(number: String) -> String {
     if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.').into() } else { number }
 }

@@ -1,4 +1,4 @@
-//! What a figure is drawn on: shapes in pixels, and what all figures have in common.
+//! Drawing surface of a figure, in pixels, and the elements that all figures share.
 
 use super::palette::{self, BLACK, GREY};
 use crate::explore::Pen;
@@ -9,9 +9,9 @@ pub(super) const WIDTH_PX: f64 = 900.0;
 
 /// Smallest width of the lines in a legend.
 const LEGEND_PX: f64 = 2.5;
-/// Width of the outline that separates type from what lies below it.
+/// Width of the outline that separates text from the shapes below it.
 const HALO_PX: f64 = 2.5;
-/// How far the base line of type lies below its middle, of its size.
+/// Distance from the middle of a text down to its base line, relative to the font size.
 const MIDDLE: f64 = 0.26;
 
 /// Style of a line.
@@ -19,19 +19,19 @@ const MIDDLE: f64 = 0.26;
 pub(super) struct Ink {
     pub(super) color: Rgb,
     pub(super) width_px: f64,
-    /// 0 for a solid line, any other number for its own dash pattern.
+    /// Number of the dash pattern; 0 is a solid line.
     pub(super) dash: usize,
     /// Opacity, 0 to 1.
     pub(super) opacity: f64,
 }
 
 impl Ink {
-    /// Creates a solid line.
+    /// Creates a solid, opaque style.
     pub(super) const fn new(color: Rgb, width_px: f64) -> Self {
         Ink { color, width_px, dash: 0, opacity: 1.0 }
     }
 
-    /// Returns lengths on and off in pixels, longer for higher numbers; none for a solid line.
+    /// Returns lengths of dashes and gaps in pixels, longer for higher numbers; empty for a solid line.
     fn dashes_px(self) -> Vec<f64> {
         const PATTERNS: [&[f64]; 5] = [&[7.0, 3.0], &[2.0, 3.0], &[10.0, 3.0, 2.0, 3.0], &[14.0, 5.0], &[4.0, 7.0]];
         let Some(place) = self.dash.checked_sub(1) else { return Vec::new() };
@@ -44,24 +44,24 @@ impl Ink {
         Stroke { color: self.color, width: self.width_px, opacity: self.opacity, dashes: self.dashes_px() }
     }
 
-    /// Returns the number of columns that a line over an axis of `axis_px` is reduced to: each as wide as the line, and
-    /// at least a pixel.
+    /// Returns the number of columns to which a line on an axis of `axis_px` is reduced. A column is as wide as the
+    /// line, and at least one pixel.
     pub(super) fn columns(self, axis_px: f64) -> f64 {
         axis_px / self.width_px.max(1.0)
     }
 
-    /// Returns the same style for a page's script.
+    /// Returns the same style for the page's script.
     pub(super) fn pen(self) -> Pen {
         let (colors, width_px) = (palette::both(self.color), self.width_px);
         Pen { colors, width_px, opacity: self.opacity, dash_px: self.dashes_px() }
     }
 }
 
-/// AFBC's line is wider than the others by this factor: it is seen on both sides of a line that lies on it.
+/// Factor by which AFBC's line is wider than the others, so that it stays visible on both sides of a line on top of it.
 const PROMINENT: f64 = 1.4;
 
-/// Returns a line for each of the contenders `names`: AFBC's is the widest; of two that share a colour, the second is
-/// dashed.
+/// Returns a line style for each contender in `names`. AFBC's line is the widest. If two contenders share a colour, the
+/// second one is dashed.
 pub(super) fn inks(names: &[&str], width_px: f64) -> Vec<Ink> {
     let ink = |(name, dash): (&&str, usize)| {
         let width_px = if *name == "afbc" { PROMINENT * width_px } else { width_px };
@@ -70,22 +70,22 @@ pub(super) fn inks(names: &[&str], width_px: f64) -> Vec<Ink> {
     names.iter().zip(palette::repeats(names)).map(ink).collect()
 }
 
-/// Estimates the width of text, without a font to measure.
+/// Estimates the width of a text without a font.
 pub(super) fn text_width_px(text: &str, size_px: f64) -> f64 {
     0.5 * size_px * text.chars().filter(|c| !matches!(c, '⟨' | '⟩')).count() as f64
 }
 
-/// Number of corners, direction of the first in turns, and relative radius of every second one.
+/// A polygon: number of corners, direction of the first corner in turns, and relative radius of every second corner.
 type Polygon = (usize, f64, f64);
 
-/// A picture as it is drawn, from back to front.
+/// A picture that is being drawn; shapes are listed from back to front.
 pub(super) struct Canvas {
     title: &'static str,
     shapes: Vec<Shape>,
 }
 
 impl Canvas {
-    /// Begins a picture with its title, conditions and legend.
+    /// Starts a picture with its title, conditions and legend.
     pub(super) fn new(title: &'static str, conditions: &str, legend: &[(String, Ink)]) -> Self {
         let mut canvas = Canvas { title, shapes: Vec::new() };
         canvas.write(title, (14.0, 18.0), 15.0, TextAnchor::Start, BLACK, true);
@@ -98,7 +98,7 @@ impl Canvas {
         canvas
     }
 
-    /// Draws a line through points, if there are two.
+    /// Draws a line if there are at least two points.
     pub(super) fn line(&mut self, points: impl Into<Vec<Point>>, ink: Ink) {
         let points = points.into();
         if points.len() > 1 {
@@ -106,7 +106,7 @@ impl Canvas {
         }
     }
 
-    /// Fills an area.
+    /// Fills a polygon.
     pub(super) fn area(&mut self, points: impl Into<Vec<Point>>, color: Rgb, opacity: f64) {
         self.shapes.push(Shape::Area { points: points.into(), color, opacity, within: None });
     }
@@ -128,7 +128,7 @@ impl Canvas {
         self.polygon(place, radius_px, (24, 0.0, 1.0), color);
     }
 
-    /// Draws the mark of contender number `index`: marks distinguish contenders without colours.
+    /// Draws the mark of contender number `index`. The shapes of marks tell contenders apart without colours.
     pub(super) fn mark(&mut self, place: Point, index: usize, px: f64, color: Rgb) {
         const SHAPES: [Polygon; 6] =
             [(16, 0.0, 0.85), (4, 0.125, 1.0), (3, -0.25, 1.0), (4, 0.0, 1.0), (8, 0.0, 0.35), (3, 0.25, 1.0)];
@@ -145,7 +145,7 @@ impl Canvas {
         self.area((0..corners).map(corner).collect::<Vec<_>>(), color, 1.0);
     }
 
-    /// Writes text whose middle is at the height of `place`. `⟨d⟩` gives a subscript.
+    /// Writes a text that is vertically centred at `place`. `⟨d⟩` gives a subscript.
     pub(super) fn text(&mut self, text: &str, place: Point, size_px: f64, anchor: TextAnchor, color: Rgb) {
         self.write(text, place, size_px, anchor, color, false);
     }
@@ -155,7 +155,7 @@ impl Canvas {
         self.shapes.push(Shape::Text { text: text.to_owned(), place, size, anchor, color, upwards: false, is_bold });
     }
 
-    /// Writes text that runs upwards, its middle at `place`.
+    /// Writes a text that runs upwards, centred at `place`.
     pub(super) fn upright(&mut self, text: &str, (x, y): Point, size: f64, color: Rgb) {
         let (text, place, anchor) = (text.to_owned(), (x + MIDDLE * size, y), TextAnchor::Middle);
         self.shapes.push(Shape::Text { text, place, size, anchor, color, upwards: true, is_bold: false });
@@ -174,7 +174,7 @@ pub(super) fn head_px(legend: &[(String, Ink)]) -> f64 {
     places(legend).last().map_or(42.0, |(_, y)| *y) + 12.0
 }
 
-/// Returns the position of each entry of the legend, line by line.
+/// Returns the position of each legend entry, line by line.
 pub(super) fn places(legend: &[(String, Ink)]) -> Vec<Point> {
     let (mut x, mut y) = (14.0, 42.0);
     let place = |(name, _): &(String, Ink)| {

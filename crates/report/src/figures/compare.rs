@@ -1,4 +1,4 @@
-//! Root mean square errors as bars.
+//! Bar charts of root mean square errors.
 
 use super::canvas::{Canvas, Ink, WIDTH_PX, text_width_px};
 use super::palette::{BLACK, GREY, color};
@@ -10,16 +10,16 @@ use afbc_campaign::compare::{Comparison, Entry, MEASURES};
 use afbc_drawing::TextAnchor;
 use afbc_sim::metrics::SETTLED_S;
 
-/// Number of panels: the errors are the first of [`MEASURES`].
+/// Number of panels: the first [`MEASURES`] are errors.
 const PANELS: usize = 4;
 const BAR_PX: f64 = 18.0;
-/// Height above the bars of one panel.
+/// Height of the title above a panel's bars.
 const TITLE_PX: f64 = 26.0;
 const MARGIN_PX: f64 = 14.0;
-/// Width right of the longest bar, for its number.
+/// Width on the right of the longest bar, for its number.
 const NUMBER_PX: f64 = 60.0;
 
-/// Draws bars of every contender's errors, two panels side by side; none without contenders.
+/// Draws the errors of every contender as bars, two panels side by side; `None` without contenders.
 pub(crate) fn draw(comparison: &Comparison) -> Option<Picture> {
     if comparison.entries.is_empty() {
         return None;
@@ -44,7 +44,7 @@ pub(crate) fn draw(comparison: &Comparison) -> Option<Picture> {
     Some(Picture { name: "rmse", caption, svg, explorable: None })
 }
 
-/// Draws one error of every contender, with the given top left corner.
+/// Draws one error of every contender; the last argument is the panel's top left corner.
 fn panel(canvas: &mut Canvas, comparison: &Comparison, index: usize, (left_px, top_px): (f64, f64)) {
     let Some(figure) = MEASURES.get(index) else { return };
     let median = |entry: &Entry| entry.median(figure.value);

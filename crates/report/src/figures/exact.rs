@@ -1,4 +1,4 @@
-//! What was commanded, and what other settings would have commanded.
+//! Figures of an exact log's replay: quantities as flown, and under the changed settings.
 
 use super::canvas::Ink;
 use super::marks::moments;
@@ -10,7 +10,7 @@ use crate::explore::{ExplorableScene, Place, rotors_on_a_circle_m};
 use afbc_replay::exact::{ChangeRow, ExactReplay, QUANTITIES};
 use nalgebra::Vector3;
 
-/// A panel: its label, the column's name, and the factor to its unit.
+/// A panel: its label, the name of its quantity, and the factor to the panel's unit.
 type Pane = (&'static str, &'static str, f64);
 
 const DEGREES: f64 = 180.0 / core::f64::consts::PI;
@@ -42,7 +42,7 @@ const ESTIMATE: [Pane; 6] = [
     ("ψ [°]", "yaw_rad", DEGREES),
 ];
 
-/// Draws every figure that has something to show.
+/// Draws every figure that has data.
 pub(crate) fn draw(replay: &ExactReplay) -> Vec<Picture> {
     let Some(comparison) = &replay.comparison else { return Vec::new() };
     let rows = &comparison.rows;
@@ -90,7 +90,7 @@ pub(crate) fn draw(replay: &ExactReplay) -> Vec<Picture> {
     pictures
 }
 
-/// The estimate in space, as flown and under the changed settings.
+/// Returns the estimate in space, as flown and under the changed settings.
 pub(crate) fn space(replay: &ExactReplay) -> Option<ExplorableScene> {
     let rows = &replay.comparison.as_ref()?.rows;
     let index = |name: &str| QUANTITIES.iter().position(|quantity| quantity.name == name);

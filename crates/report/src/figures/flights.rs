@@ -1,4 +1,4 @@
-//! Counterparts of the paper's Figs. 4 to 8, with all contenders of one scenario overlaid.
+//! Counterparts of the paper's Figs. 4 to 8, with all contenders of one scenario in the same figure.
 
 use super::marks::marks;
 use super::picture::Picture;
@@ -23,12 +23,12 @@ const OUTPUTS: [(&str, Value, Value); 4] = [
     ("z [m]", |s| s.motion.position_m.z, |s| s.reference.position_m.z),
     ("ψ [rad]", |s| s.motion.attitude_rad.z, |s| s.reference.yaw_rad),
 ];
-/// Fig. 6: label, actual value, and the angle demanded by each law.
+/// Fig. 6: label, actual value, and the angle that the law demands.
 const ATTITUDE: [(&str, Value, Value); 2] = [
     ("φ [rad]", |s| s.motion.attitude_rad.x, |s| s.trace.filtered[0].angle.into()),
     ("θ [rad]", |s| s.motion.attitude_rad.y, |s| s.trace.filtered[1].angle.into()),
 ];
-/// Fig. 7. A no-break space survives next to a subscript.
+/// Fig. 7: label, error. No-break spaces keep the space next to a subscript.
 const ERRORS: [(&str, Value); 4] = [
     ("x⟨d⟩\u{a0}− x [m]", |s| tracking_error(s).x),
     ("y⟨d⟩\u{a0}− y [m]", |s| tracking_error(s).y),
@@ -38,7 +38,7 @@ const ERRORS: [(&str, Value); 4] = [
 /// A coordinate of the vehicle's own estimate: label, error and standard deviation.
 type Coordinate = (&'static str, fn(&Estimated) -> f32, fn(&Estimated) -> f32);
 
-/// The estimate's errors: in centimetres and degrees, since they are small.
+/// Errors of the estimate, which are small: in centimetres and degrees.
 const ESTIMATE: [Coordinate; 9] = [
     ("x [cm]", |e| 100.0 * e.position_error_m.x, |e| 100.0 * e.position_sigma_m.x),
     ("y [cm]", |e| 100.0 * e.position_error_m.y, |e| 100.0 * e.position_sigma_m.y),
@@ -50,10 +50,10 @@ const ESTIMATE: [Coordinate; 9] = [
     ("about y [°]", |e| e.attitude_error_rad.y.to_degrees(), |e| e.attitude_sigma_rad.y.to_degrees()),
     ("about z [°]", |e| e.attitude_error_rad.z.to_degrees(), |e| e.attitude_sigma_rad.z.to_degrees()),
 ];
-/// Fig. 8.
+/// Fig. 8: label, input.
 const INPUTS: [(&str, Input); 4] = [("U₁ [N]", |u| u.x), ("U₂ [N]", |u| u.y), ("U₃ [N]", |u| u.z), ("U₄ [N]", |u| u.w)];
 
-/// The figures of some names, in their order, each under the name after it.
+/// Draws the figures in `names`, in that order. Each pair is a figure's name and its new name.
 pub(crate) fn named(flights: &[&Flown], names: &[(&str, &'static str)]) -> Vec<Picture> {
     let mut figures = draw(flights);
     let take = |(figure, name): &(&str, &'static str)| {
@@ -63,9 +63,9 @@ pub(crate) fn named(flights: &[&Flown], names: &[(&str, &'static str)]) -> Vec<P
     names.iter().filter_map(take).collect()
 }
 
-/// Draws every figure of one scenario's flights; none without flights.
+/// Draws all figures of one scenario's flights; none without flights.
 pub(crate) fn draw(flights: &[&Flown]) -> Vec<Picture> {
-    // The longest flight covers the most of the reference.
+    // The longest flight covers most of the reference.
     let Some(longest) = flights.iter().max_by_key(|flight| flight.run.log.len()) else { return Vec::new() };
     let scenario = &longest.scenario;
     let last_s = longest.run.log.last().map_or(0.0, |last| last.time_s);
@@ -73,7 +73,7 @@ pub(crate) fn draw(flights: &[&Flown]) -> Vec<Picture> {
     let names: Vec<&str> = flights.iter().map(|flight| flight.run.contender.name.as_str()).collect();
     let inks = canvas::inks(&names, LINE_PX);
     let laws: Vec<Plotted> = flights.iter().zip(inks).map(|(flight, ink)| Plotted { flight, ink }).collect();
-    // The roughest lines are drawn first, so that they hide nothing.
+    // Draw the roughest lines first, so that they hide nothing.
     let mut rough_first: Vec<&Plotted> = laws.iter().collect();
     let roughness = |law: &Plotted| law.flight.run.metrics.mean_abs_delta_u.sum();
     rough_first.sort_by(|a, b| roughness(b).total_cmp(&roughness(a)));

@@ -6,19 +6,19 @@ use crate::words;
 use afbc_drawing::Rgb;
 use afbc_scenario::Scenario;
 
-/// An event with a label, at a time or over an interval.
+/// An event with a label, at an instant or over an interval.
 #[derive(Clone, Debug)]
 pub(super) struct Mark {
     pub(super) label: String,
     pub(super) start_s: f64,
     pub(super) end_s: f64,
-    /// Whether the interval is shaded; for permanent changes only the onset is shown.
+    /// Whether the interval is shaded. For permanent changes only the onset is shown.
     pub(super) is_band: bool,
-    /// Tint of the band, different from those of bands that it overlaps.
+    /// Tint of the band; overlapping bands have different tints.
     pub(super) tint: Rgb,
-    /// Largest number of bands below this one, which determines its width along the trajectory.
+    /// Number of bands below this one, which determines its width along the trajectory.
     pub(super) depth: usize,
-    /// Row of label and band, 0 at the bottom; rows do not overlap in time.
+    /// Row of the label and band, 0 at the bottom. Marks in one row do not overlap in time.
     pub(super) lane: usize,
     /// Position of the label's centre along the axis.
     pub(super) label_px: f64,
@@ -37,16 +37,16 @@ pub(super) const LABEL_PX: f64 = 11.0;
 pub(super) struct Marks {
     /// Changes of the vehicle or its sensors: parameters, payloads, rotor faults, outages.
     pub(super) changes: Vec<Mark>,
-    /// Gusts, of force and of wind.
+    /// Gusts of force and of wind.
     pub(super) gusts: Vec<Mark>,
     /// Number of rows of labels.
     pub(super) lanes: usize,
-    /// What a thin line means.
+    /// Explanation of the thin lines, for the caption.
     pub(super) onset: &'static str,
 }
 
-/// Returns the marks of `scenario` on a time axis from 0 to `end_s`, `width_px` wide. Events with the same start and
-/// end share a mark.
+/// Returns the marks of `scenario` on a time axis from 0 to `end_s` that is `width_px` wide. Events with the same start
+/// and end share a mark.
 pub(super) fn marks(scenario: &Scenario, end_s: f64, width_px: f64) -> Marks {
     let (environment, realism) = (&scenario.environment, &scenario.realism);
     let forces = environment.gusts().iter().map(|gust| {
@@ -72,7 +72,7 @@ pub(super) fn marks(scenario: &Scenario, end_s: f64, width_px: f64) -> Marks {
     placed(changes, gusts, end_s, width_px, " Thin line: onset of a gust.")
 }
 
-/// Returns the marks of moments, each with its label and time, on the same axis; `onset` says what they are.
+/// Returns marks at instants, each with a label and a time; `onset` explains them in the caption.
 pub(super) fn moments(
     moments: impl Iterator<Item = (String, f64)>,
     end_s: f64,
@@ -84,9 +84,9 @@ pub(super) fn moments(
     placed(Vec::new(), moments, end_s, width_px, onset)
 }
 
-/// Returns the marks, each in its row.
+/// Assigns each mark its row.
 fn placed(mut changes: Vec<Mark>, mut gusts: Vec<Mark>, end_s: f64, width_px: f64, onset: &'static str) -> Marks {
-    // Intervals taken in each row.
+    // Occupied intervals of each row.
     let mut lanes = Vec::new();
     for mark in gusts.iter_mut().chain(&mut changes) {
         place(mark, width_px / end_s, width_px, &mut lanes);
@@ -94,7 +94,8 @@ fn placed(mut changes: Vec<Mark>, mut gusts: Vec<Mark>, end_s: f64, width_px: f6
     Marks { changes, gusts, lanes: lanes.len(), onset }
 }
 
-/// Returns sorted marks within the axis, one for each interval unless its label would exceed `longest_px`.
+/// Returns sorted marks within the axis. Events with equal intervals share a mark unless its label would exceed
+/// `longest_px`.
 fn merged(intervals: impl Iterator<Item = (String, f64, f64)>, axis_end_s: f64, longest_px: f64) -> Vec<Mark> {
     let mut marks: Vec<Mark> = Vec::new();
     for (label, start_s, end_s) in intervals {
@@ -123,8 +124,8 @@ fn merged(intervals: impl Iterator<Item = (String, f64, f64)>, axis_end_s: f64, 
     marks
 }
 
-/// Assigns tints to bands: the same tint for the same label, different ones for different labels as far as possible,
-/// and never the same for two that overlap unless there are too few tints.
+/// Assigns tints to bands. Equal labels get equal tints, and different labels different tints as far as possible.
+/// Overlapping bands never share a tint unless there are too few tints.
 fn separate(marks: &mut dyn Iterator<Item = &mut Mark>) {
     let mut labels: Vec<String> = Vec::new();
     let mut done: Vec<Mark> = Vec::new();
@@ -143,7 +144,7 @@ fn separate(marks: &mut dyn Iterator<Item = &mut Mark>) {
     }
 }
 
-/// Finds the lowest row with room for band and label of `mark`; the label is on its band, or beside a short one.
+/// Puts `mark` into the lowest row with room for its band and label. The label is on its band, or next to a short band.
 fn place(mark: &mut Mark, px_per_s: f64, width_px: f64, lanes: &mut Vec<Vec<(f64, f64)>>) {
     let half = (0.5 * text_width_px(&mark.label, LABEL_PX) + 3.0).min(0.5 * width_px);
     let (start_px, end_px) = (mark.start_s * px_per_s, mark.end_s * px_per_s);

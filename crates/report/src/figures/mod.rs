@@ -1,4 +1,4 @@
-//! Figures, as SVG: of flights, comparisons, campaigns and recorded flights.
+//! Figures as SVG: of flights, comparisons, campaigns and replays.
 //!
 //! Onsets of gusts are marked, and intervals with a fault or changed parameters are shaded. A contender has the same
 //! colour in every figure.
@@ -24,7 +24,7 @@ mod trajectory;
 
 pub(super) use picture::Picture;
 
-/// Returns the colour of a contender on white paper, the same in every figure: red, green, blue.
+/// Returns a contender's colour on white (red, green, blue); it is the same in every figure.
 pub fn contender_color(name: &str) -> [u8; 3] {
     palette::color(name)
 }

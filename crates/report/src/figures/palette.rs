@@ -1,10 +1,10 @@
-//! Colours: one for each controller, the same in every report, each in a light and a dark variant.
+//! Colours of the figures, each in a light and a dark variant. A contender has the same colour in every report.
 
 use afbc_drawing::{PAPER, Rgb, hex};
 use core::hash::Hasher;
 use twox_hash::XxHash64;
 
-/// A colour for white paper, and its variant for a dark screen.
+/// A colour on white, and its variant in dark mode.
 pub(super) type Shades = [Rgb; 2];
 
 const fn shades(light: u32, dark: u32) -> Shades {
@@ -22,9 +22,9 @@ pub(super) const GRID: Rgb = rgb(0xE2E2E2);
 pub(super) const FRAME: Rgb = rgb(0x969696);
 /// Colour of the reference.
 pub(super) const WANTED: Rgb = rgb(0xB0B0B0);
-/// Colour of onsets and ends.
+/// Colour of the lines at onsets and at ends of bands.
 pub(super) const EDGE: Rgb = rgb(0x828282);
-/// Tints of events: overlapping ones differ.
+/// Tints of events; overlapping events have different tints.
 pub(super) const TINTS: [Rgb; 5] = [rgb(0xF7EED4), rgb(0xD5E5F2), rgb(0xF6DCDC), rgb(0xDAEFD8), rgb(0xE6DDF4)];
 
 /// All colours that belong to no contender.
@@ -43,8 +43,9 @@ const ROLES: [Shades; 12] = [
     [TINTS[4], rgb(0x3D2E5A)],
 ];
 
-/// Colours of the built-in contenders. Any two differ to everyone, the colour-blind, too, on white (contrast 3 : 1 or
-/// more) and in the dark (4 : 1 or more), and none is so dark or pale that a thin line looks black or white.
+/// Colours of the built-in contenders. Everyone can tell any two of them apart, including colour-blind people. The
+/// contrast is at least 3 : 1 on white and 4 : 1 in dark mode. No colour is so dark or pale that a thin line looks
+/// black or white.
 const KNOWN: [(&str, Shades); 10] = [
     ("afbc", shades(0x0072B2, 0x4DA6FF)),
     ("backstepping", shades(0xA90045, 0xFF0700)),
@@ -58,7 +59,7 @@ const KNOWN: [(&str, Shades); 10] = [
     ("afbc-monitored", shades(0x001DEE, 0xAEFFE1)),
 ];
 
-/// Colours of all others, chosen by a hash of the name.
+/// Colours of all other contenders, chosen by a hash of the name.
 const OTHERS: [Shades; 10] = [
     shades(0x696C8C, 0xA1A5C7),
     shades(0x885B34, 0xDCB282),
@@ -72,10 +73,10 @@ const OTHERS: [Shades; 10] = [
     shades(0x760A03, 0xCA8E79),
 ];
 
-/// Seed of the hash, with which no two contenders of a built-in campaign share a colour.
+/// Seed of the hash. With this seed, no two contenders of a built-in campaign share a colour.
 const SEED: u64 = 203;
 
-/// Returns the colour of the contender `name`, independent of other contenders.
+/// Returns the colour of contender `name`; it does not depend on other contenders.
 pub(super) fn color(name: &str) -> Rgb {
     if let Some((_, [light, _])) = KNOWN.iter().find(|(known, _)| *known == name) {
         return *light;
@@ -86,18 +87,18 @@ pub(super) fn color(name: &str) -> Rgb {
     OTHERS.get(choice as usize).map_or(BLACK, |[light, _]| *light)
 }
 
-/// Returns for each of `names` how many before it have the same colour, to choose a dash pattern.
+/// Returns for each name how many names before it have the same colour; this number chooses the dash pattern.
 pub(super) fn repeats(names: &[&str]) -> Vec<usize> {
     let before = |(index, name): (usize, &&str)| names.iter().take(index).filter(|n| color(n) == color(name)).count();
     names.iter().enumerate().map(before).collect()
 }
 
-/// Returns every colour with its variant in the dark.
+/// Returns every colour with its variant in dark mode.
 pub(super) fn all() -> Vec<Shades> {
     ROLES.iter().chain(KNOWN.iter().map(|(_, shades)| shades)).chain(&OTHERS).copied().collect()
 }
 
-/// Returns the colour as attributes: on white, and its variant in the dark.
+/// Returns a colour on white and its variant in dark mode, as SVG attributes.
 pub(super) fn both(color: Rgb) -> [String; 2] {
     let known = all().into_iter().find(|[light, _]| *light == color);
     known.unwrap_or([color; 2]).map(hex)
@@ -121,14 +122,14 @@ mod tests {
         m.map(|row| row.iter().zip(v).map(|(a, b)| a * b).sum())
     }
 
-    /// Contrast ratio of WCAG 2.
+    /// Returns the contrast ratio of WCAG 2.
     fn contrast(a: Rgb, b: Rgb) -> f64 {
         let luminance = |color| times(&[[0.2126, 0.7152, 0.0722], [0.0; 3], [0.0; 3]], linear(color))[0] + 0.05;
         let (a, b) = (luminance(a), luminance(b));
         a.max(b) / a.min(b)
     }
 
-    /// Normal sight, protanopia, deuteranopia, tritanopia (Machado, Oliveira and Fernandes 2009).
+    /// Colour vision matrices: normal, protanopia, deuteranopia, tritanopia (Machado, Oliveira and Fernandes 2009).
     const SIGHTS: [[[f64; 3]; 3]; 4] = [
         [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
@@ -136,7 +137,7 @@ mod tests {
         [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
     ];
 
-    /// Smallest distance over all sights, in hundredths of Oklab.
+    /// Returns the smallest distance over all types of colour vision, in hundredths of Oklab.
     fn distance(a: Rgb, b: Rgb) -> f64 {
         let lab = |color, sight| {
             let seen = times(sight, linear(color)).map(|part| part.clamp(0.0, 1.0));
@@ -164,7 +165,7 @@ mod tests {
         SIGHTS.iter().map(apart).fold(f64::INFINITY, f64::min)
     }
 
-    /// L*, a*, b* of what somebody with this sight sees, under daylight (D65).
+    /// Returns L*, a*, b* of a colour as seen with this colour vision, under daylight (D65).
     fn lab(color: Rgb, sight: &[[f64; 3]; 3]) -> [f64; 3] {
         let seen = times(sight, linear(color)).map(|part| part.clamp(0.0, 1.0));
         let xyz = times(
@@ -180,7 +181,7 @@ mod tests {
         [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
     }
 
-    /// Colour difference CIEDE2000 (Sharma, Wu and Dalal 2005).
+    /// Returns the colour difference CIEDE2000 (Sharma, Wu and Dalal 2005).
     fn ciede2000([l1, a1, b1]: [f64; 3], [l2, a2, b2]: [f64; 3]) -> f64 {
         let seventh = |chroma: f64| {
             let power = libm::pow(chroma, 7.0);
@@ -221,7 +222,7 @@ mod tests {
         }
     }
 
-    /// Neighbours in Okabe and Ito's palette are 20 apart to the normal eye; from 10 on nobody confuses two lines.
+    /// With normal vision, neighbours in Okabe and Ito's palette are 20 apart. From 10 on nobody confuses two lines.
     #[test]
     fn no_two_laws_have_colors_that_look_alike() {
         for shade in [0, 1] {
@@ -249,7 +250,7 @@ mod tests {
                 let least = [3.0, 4.0][shade];
                 assert!(contrast(a[shade], paper) >= least, "{name}: {}", contrast(a[shade], paper));
                 for (other, b) in &KNOWN[..i] {
-                    // Okabe and Ito's palette of six reaches 6.
+                    // Okabe and Ito's palette of six colours reaches 6.
                     assert!(distance(a[shade], b[shade]) >= 8.0, "{name}, {other}: {}", distance(a[shade], b[shade]));
                 }
             }

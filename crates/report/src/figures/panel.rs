@@ -1,25 +1,25 @@
-//! A panel: its axes, and where values lie between them.
+//! A panel: its axes, and the positions of values between them.
 
 use super::canvas::{Canvas, Ink};
 use super::palette::{BLACK, FRAME, GREY, GRID};
 use afbc_drawing::{PlotAxis, Point, TextAnchor, Ticks};
 use core::ops::Range;
 
-/// Height below a panel for numbers and title of its x-axis.
+/// Height below a panel for the numbers and title of its x-axis.
 pub(super) const BOTTOM_PX: f64 = 42.0;
 /// Length of a tick, and distance of its label.
 const TICK_PX: f64 = 3.0;
 const APART_PX: f64 = 6.0;
-/// Sizes of numbers and titles.
+/// Font sizes of numbers and titles.
 const NUMBER_PX: f64 = 11.0;
 const TITLE_PX: f64 = 12.0;
-/// Line of frame and ticks, and of the grid.
+/// Line styles of axes with ticks, and of the grid.
 pub(super) const FRAME_INK: Ink = Ink::new(FRAME, 0.75);
 const GRID_INK: Ink = Ink::new(GRID, 0.75);
-/// The box is fainter than its axes.
+/// Line style of the box, fainter than the axes.
 const BOX_INK: Ink = Ink::new(FRAME, 0.25);
 
-/// Where a panel's plot lies, and its axes.
+/// Position of a panel's plot, and its axes.
 #[derive(Clone, Copy)]
 pub(super) struct Frame {
     pub(super) x: PlotAxis,
@@ -27,7 +27,7 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// Creates a frame between corners, top left and bottom right.
+    /// Creates a frame between its top left and bottom right corner.
     pub(super) fn new([(left, top), (right, bottom)]: [Point; 2], x: Range<f64>, y: Range<f64>) -> Self {
         Frame {
             x: PlotAxis { low: x.start, high: x.end, from: left, to: right, is_logarithmic: false },
@@ -35,17 +35,17 @@ impl Frame {
         }
     }
 
-    /// Returns where a point lies.
+    /// Returns the position of a point.
     pub(super) fn at(&self, (x, y): (f64, f64)) -> Point {
         (self.x.at(x), self.y.at(y))
     }
 
-    /// Returns where points lie.
+    /// Returns the positions of points.
     pub(super) fn all(&self, points: &[(f64, f64)]) -> Vec<Point> {
         points.iter().map(|point| self.at(*point)).collect()
     }
 
-    /// Draws the grid, below what is shown.
+    /// Draws the grid; call this before drawing the lines.
     pub(super) fn grid(&self, canvas: &mut Canvas, x_ticks: &Ticks, y_ticks: &Ticks) {
         for x in x_ticks.at.iter().map(|tick| self.x.at(*tick)) {
             canvas.line([(x, self.y.from), (x, self.y.to)], GRID_INK);
@@ -61,7 +61,7 @@ impl Frame {
         canvas.line([(x.from, y.to), (x.to, y.to), (x.to, y.from), (x.from, y.from), (x.from, y.to)], BOX_INK);
     }
 
-    /// Draws line, ticks and title of the x-axis, within [`BOTTOM_PX`].
+    /// Draws the line, ticks and title of the x-axis, within [`BOTTOM_PX`].
     pub(super) fn bottom(&self, canvas: &mut Canvas, marks: impl Iterator<Item = (f64, String)>, title: &str) {
         let axis_px = self.y.from;
         canvas.line([(self.x.from, axis_px), (self.x.to, axis_px)], FRAME_INK);
@@ -74,7 +74,7 @@ impl Frame {
         canvas.text(title, (middle_px, axis_px + BOTTOM_PX - 0.5 * TITLE_PX), TITLE_PX, TextAnchor::Middle, BLACK);
     }
 
-    /// Draws line, ticks and title of the y-axis; the title begins at `left_px`.
+    /// Draws the line, ticks and title of the y-axis; the title's left edge is at `left_px`.
     pub(super) fn left(&self, canvas: &mut Canvas, ticks: &Ticks, title: &str, left_px: f64) {
         let axis_px = self.x.from;
         canvas.line([(axis_px, self.y.to), (axis_px, self.y.from)], FRAME_INK);

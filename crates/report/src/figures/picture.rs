@@ -6,16 +6,16 @@ use crate::explore::{Explorable, ExplorableScene};
 pub(crate) struct Picture {
     /// File name without `.svg`.
     pub(crate) name: &'static str,
-    /// Caption in one sentence or a few.
+    /// Caption in one or a few sentences.
     pub(crate) caption: String,
     /// The picture as SVG.
     pub(crate) svg: String,
-    /// The same to be explored on a page.
+    /// Data of the interactive version.
     pub(crate) explorable: Option<Explorable>,
 }
 
 impl Picture {
-    /// Returns the flights in space alone; none of another figure.
+    /// Returns the interactive view of flights in space; `None` for other figures.
     pub(crate) fn into_scene(self) -> Option<ExplorableScene> {
         match self.explorable? {
             Explorable::Scene(scene) => Some(scene),

@@ -9,12 +9,12 @@ use afbc_sim::flown::Flown;
 use afbc_sim::metrics::inputs;
 use nalgebra::Vector4;
 
-/// Line of the reference.
+/// Line style of the reference.
 pub(super) const REFERENCE: Ink = Ink::new(palette::WANTED, 4.0);
 /// Width of a law's line.
 pub(super) const LINE_PX: f64 = 1.3;
 
-/// One law's flight, with the style of its lines.
+/// A law's flight, with the style of its lines.
 pub(super) struct Plotted<'a> {
     pub(super) flight: &'a Flown,
     pub(super) ink: Ink,
@@ -29,7 +29,7 @@ impl Plotted<'_> {
         self.ink.color
     }
 
-    /// Returns the wide and pale style for what this law demands, drawn behind its actual line.
+    /// Returns the wide and pale style of values that this law demands, which are drawn behind its actual values.
     pub(super) fn pale(&self) -> Ink {
         Ink { opacity: 1.0 / 3.0, ..Ink::new(self.color(), REFERENCE.width_px) }
     }
@@ -47,12 +47,12 @@ impl Plotted<'_> {
         self.flight.run.lost.map(|lost| lost.time_s)
     }
 
-    /// Returns a value over time; `end_s` is the end of the time axis.
+    /// Returns a line of a value over time; `end_s` is the end of the time axis.
     pub(super) fn line(&self, ink: Ink, end_s: f64, value: impl Fn(&Sample) -> f64) -> Line {
         self.drawn(ink, end_s, self.flight.run.log.iter().map(|sample| (sample.time_s, value(sample))))
     }
 
-    /// Returns one of U1..U4 over time, including its extremes between the rows of the log.
+    /// Returns a line of one of U1..U4 over time, including its extremes between the rows of the log.
     pub(super) fn input(&self, end_s: f64, input: impl Fn(&Vector4<f64>) -> f64) -> Line {
         let rows = self.flight.run.log.iter().zip(&self.flight.run.input_extremes);
         let values = rows.flat_map(|(sample, [low, high])| {

@@ -1,10 +1,10 @@
 //! Reduction of the number of points without a visible change.
 
-/// Returns the extremes of each column of the time axis 0 to `end_s`, in time order, between the first and the last
-/// point: chatter within a column keeps its height. Values that are not finite are left out.
+/// Reduces points on a time axis from 0 to `end_s` to the extremes in each of `columns` columns, plus the first and the
+/// last point, in order of time. Chatter within a column keeps its height. Values that are not finite are left out.
 pub(super) fn envelope(values: impl Iterator<Item = (f64, f64)>, end_s: f64, columns: f64) -> Vec<(f64, f64)> {
     let mut points = Vec::new();
-    // Index, lowest and highest point of the column, and the line's last point.
+    // Index, lowest and highest point of the current column; and the last point of the line.
     let mut column: Option<(f64, [(f64, f64); 2])> = None;
     let mut last = None;
     for point in values.filter(|(t, v)| t.is_finite() && v.is_finite()) {
@@ -27,7 +27,7 @@ pub(super) fn envelope(values: impl Iterator<Item = (f64, f64)>, end_s: f64, col
     }
     points.extend(column.into_iter().flat_map(|(_, extremes)| in_time(extremes)));
     points.extend(last);
-    // Both extremes of a column may be one point, and so may the last one and an extreme.
+    // Both extremes of a column may be the same point, and the last point may be an extreme.
     points.dedup();
     points
 }
@@ -36,8 +36,8 @@ fn in_time([a, b]: [(f64, f64); 2]) -> [(f64, f64); 2] {
     if a.0 <= b.0 { [a, b] } else { [b, a] }
 }
 
-/// Simplifies a line: it deviates by at most `tolerance` after both coordinates are multiplied by `scale` (Ramer,
-/// Douglas, Peucker).
+/// Simplifies a line by the Ramer-Douglas-Peucker algorithm. After both coordinates are multiplied by `scale`, it
+/// deviates by at most `tolerance`.
 pub(super) fn simplify(points: &[(f64, f64)], scale: (f64, f64), tolerance: f64) -> Vec<(f64, f64)> {
     let place = |p: &(f64, f64)| (p.0 * scale.0, p.1 * scale.1);
     let mut kept = Vec::new();
@@ -53,7 +53,7 @@ pub(super) fn simplify(points: &[(f64, f64)], scale: (f64, f64), tolerance: f64)
             .max_by(|x, y| x.1.total_cmp(&y.1))
             .filter(|(_, far)| *far > tolerance);
         match farthest.and_then(|(i, _)| Some((part.get(..=i)?, part.get(i..)?))) {
-            // The part before on top, so that points are kept in their order.
+            // The first half is on top of the stack, so that points are kept in their order.
             Some((before, after)) => open.extend([after, before]),
             None => kept.push(*last),
         }
@@ -69,7 +69,7 @@ fn distance(p: (f64, f64), a: (f64, f64), b: (f64, f64)) -> f64 {
     libm::hypot(p.0 - a.0 - along * dx, p.1 - a.1 - along * dy)
 }
 
-/// Returns the pieces of a line within `low..=high`, cut where it crosses the limits.
+/// Returns the pieces of a line within `low..=high`, cut at the limits.
 pub(super) fn clip(points: &[(f64, f64)], low: f64, high: f64) -> Vec<Vec<(f64, f64)>> {
     let inside = |p: &(f64, f64)| p.1 >= low && p.1 <= high;
     let mut pieces: Vec<Vec<(f64, f64)>> = Vec::new();

@@ -1,4 +1,4 @@
-//! A replayed log: both estimates, and their difference.
+//! Figures of a replayed log: its estimate, ours, and the difference.
 
 use super::canvas::Ink;
 use super::marks::moments;
@@ -12,10 +12,10 @@ use afbc_replay::{LoggedState, Recording, ReplayRow, Replayed};
 use afbc_types::State;
 use nalgebra::{Quaternion, Vector3};
 
-/// Largest number of resets that are marked.
+/// Most resets that are marked.
 const MARKS_MAX: usize = 10;
 
-/// A panel's label, our value and the log's.
+/// A panel's label, our value, and the log's value.
 type Pair = (&'static str, fn(&Estimate) -> f32, fn(&LoggedState) -> Option<f32>);
 
 const ATTITUDE: [Pair; 3] = [
@@ -34,7 +34,7 @@ const POSITION: [Pair; 3] = [
     ("z [m]", |e| e.state.position_m.z, |l| l.position_m.map(|p| p.z)),
 ];
 
-/// A panel's label, the log's value less ours, our standard deviation, and whether our value is valid.
+/// A panel's label, the log's value minus ours, our standard deviation, and whether our value is valid.
 type Difference = (&'static str, fn(&ReplayRow, &Estimate) -> Option<f64>, fn(&Estimate) -> f32, fn(&Estimate) -> bool);
 
 const DIFFERENCE: [Difference; 9] = [
@@ -67,7 +67,7 @@ fn turn(row: &ReplayRow, of: fn(&Vector3<f64>) -> f64) -> Option<f64> {
     row.turn_rad().map(|turn| of(&turn).to_degrees())
 }
 
-/// Draws every figure that has something to show.
+/// Draws every figure that has data.
 pub(crate) fn draw(recording: &Recording, replayed: &Replayed) -> Vec<Picture> {
     let rows = &replayed.rows;
     let end_s = rows.last().map_or(0.0, |row| row.time_s);
@@ -132,7 +132,7 @@ pub(crate) fn draw(recording: &Recording, replayed: &Replayed) -> Vec<Picture> {
     pictures
 }
 
-/// The log's estimate and ours in space, where both have a position.
+/// Returns the log's estimate and ours in space, as far as they have a position.
 pub(crate) fn space(replayed: &Replayed) -> Option<ExplorableScene> {
     let ours = |row: &ReplayRow| {
         let ours = row.ours.as_ref().filter(|ours| ours.validity.position && ours.validity.height)?;

@@ -1,4 +1,4 @@
-//! Panels above each other with a common time axis.
+//! Figures of panels above each other with a common time axis.
 
 use super::canvas::{self, Canvas, Ink, WIDTH_PX};
 use super::marks::{LABEL_PX, Mark, Marks};
@@ -10,9 +10,9 @@ use crate::explore::{Explorable, ExplorableChart, LegendEntry, Span, TracePanel}
 use afbc_drawing::TextAnchor;
 use core::ops::Range;
 
-/// Width left of the panels, for label and numbers.
+/// Width on the left of the panels, for labels and numbers.
 const LEFT_PX: f64 = 74.0;
-/// Free part of that width.
+/// Part of [`LEFT_PX`] that stays free.
 const MARGIN_PX: f64 = 6.0;
 const RIGHT_PX: f64 = 16.0;
 /// Height of one panel, including the space between panels.
@@ -22,18 +22,18 @@ const LANE_PX: f64 = 16.0;
 /// Width of a panel's plot.
 pub(super) const PLOT_PX: f64 = WIDTH_PX - LEFT_PX - RIGHT_PX;
 
-/// Largest number of ticks on each axis.
+/// Most ticks on each axis.
 const T_TICKS: usize = 13;
 const Y_TICKS: usize = 6;
 
-/// How far a page's reader can zoom until points become visible.
+/// Factor by which a reader can zoom in before single points become visible.
 const ZOOM: f64 = 2.0;
-/// Width that lines are reduced for.
+/// Width in pixels for which lines are reduced.
 pub(super) const FINE_PX: f64 = ZOOM * PLOT_PX;
 
-/// Smallest room below and above the values, in the panel's unit.
+/// Smallest margin below and above the values, in the panel's unit.
 const LEAST_ROOM: f64 = 5e-3;
-/// Line of a gust's onset, and of the ends of a band.
+/// Line styles of a gust's onset, and of the ends of a band.
 const ONSET: Ink = Ink::new(EDGE, 0.75);
 const BAND_END: Ink = Ink { opacity: 0.5, ..ONSET };
 /// Opacity of a band.
@@ -46,7 +46,7 @@ pub(super) struct Line {
     pub(super) points: Vec<(f64, f64)>,
     /// Time at which the vehicle was lost, if it was.
     pub(super) lost_s: Option<f64>,
-    /// True for a reference, which does not extend the axis by itself.
+    /// True for a reference: it does not count as a surviving vehicle and never gets a cross.
     pub(super) is_reference: bool,
 }
 
@@ -60,7 +60,8 @@ pub(super) struct Panel {
 }
 
 impl Panel {
-    /// True if a line fills a band: in at least a twentieth of the columns it oscillates by several of its own widths.
+    /// Returns true if a line chatters so much that it fills a band: in at least a twentieth of the columns, its height
+    /// is several line widths.
     pub(super) fn has_chatter(&self, end_s: f64) -> bool {
         let range = range(&self.lines, LEAST_ROOM);
         let tall = 4.0 / (PANEL_PX - GAP_PX) * (range.end - range.start);
@@ -82,7 +83,7 @@ impl Panel {
 pub(super) struct Chart<'a> {
     pub(super) title: &'static str,
     pub(super) conditions: &'a str,
-    /// Events that are marked, for the width of a plot.
+    /// Events to mark, laid out for the width of a plot.
     pub(super) marks: Marks,
     pub(super) end_s: f64,
     pub(super) legend: Vec<(String, Ink)>,
@@ -90,14 +91,14 @@ pub(super) struct Chart<'a> {
 }
 
 impl Chart<'_> {
-    /// Returns the figure; to its caption, what is in it besides lines is added.
+    /// Returns the figure; its caption is completed by an explanation of the marks.
     pub(super) fn picture(&self, name: &'static str, caption: &str) -> Picture {
         let (svg, words) = (self.svg(), self.words());
         let explorable = Some(Explorable::Chart(self.explorable()));
         Picture { name, caption: format!("{caption}{words}"), svg, explorable }
     }
 
-    /// Explains everything in the figure besides lines.
+    /// Explains everything in the figure except lines.
     fn words(&self) -> String {
         let marks = &self.marks;
         let mut all = marks.gusts.iter().chain(&marks.changes);
@@ -124,7 +125,7 @@ impl Chart<'_> {
         words
     }
 
-    /// Returns the same chart for a page's script.
+    /// Returns the same chart for the page's script.
     fn explorable(&self) -> ExplorableChart {
         let legend = self.legend.iter().map(|(name, ink)| LegendEntry { name: name.clone(), pen: ink.pen() });
         let panel = |panel: &Panel| {
@@ -133,7 +134,7 @@ impl Chart<'_> {
             let mut traced = TracePanel { label, low: range.start, high: range.end, traces: Vec::new() };
             let scale = (ZOOM * PLOT_PX / self.end_s, ZOOM * (PANEL_PX - GAP_PX) / (range.end - range.start));
             for line in &panel.lines {
-                // A pale line without a name of its own belongs to the law of its colour.
+                // A pale line without its own legend entry belongs to the law with the same colour.
                 let entry = self.legend.iter().position(|(_, ink)| *ink == line.ink);
                 let entry = entry.or_else(|| self.legend.iter().position(|(_, ink)| ink.color == line.ink.color));
                 traced.add(entry, line.ink.pen(), &simplify(&line.points, scale, 0.2), self.end_s);
@@ -166,7 +167,7 @@ impl Chart<'_> {
         canvas.svg(bottom_px + BOTTOM_PX)
     }
 
-    /// Draws one panel with its top at `y_px`; the last one carries the time axis.
+    /// Draws one panel with its top at `y_px`; the last panel has the time axis.
     fn panel(&self, canvas: &mut Canvas, panel: &Panel, y_px: f64, is_last: bool) {
         let (marks, end_s) = (&self.marks, self.end_s);
         let plot_height_px = PANEL_PX - GAP_PX;
@@ -204,7 +205,7 @@ impl Chart<'_> {
                 canvas.line(frame.all(&simplify(piece, scale, 0.2)), *ink);
             }
             if let (Some(_), false, Some(&(t, v))) = (lost_s, is_reference, points.last()) {
-                // Beyond the panel the position is written: a cross at the edge would mark a wrong one.
+                // Outside the panel, write the value: a cross at the edge would mark a wrong position.
                 let mut beyond = |arrow, y| {
                     let words = format!("{arrow} {} ", values.label(v));
                     canvas.text(&words, (frame.x.at(t), y), LABEL_PX, TextAnchor::End, ink.color);
@@ -218,7 +219,7 @@ impl Chart<'_> {
         }
     }
 
-    /// Draws the labels of the marks on their bands, above the panels.
+    /// Draws the marks' labels on their bands, above the panels.
     fn labels(&self, canvas: &mut Canvas, top_px: f64) {
         for mark in self.marks.gusts.iter().chain(&self.marks.changes) {
             let bottom_px = top_px - 3.0 - mark.lane as f64 * LANE_PX;
@@ -233,8 +234,9 @@ impl Chart<'_> {
     }
 }
 
-/// Returns the range of a panel: all of every flight. A lost flight extends it to at most three times the others'
-/// range, and counts until shortly before its end; if all are lost, their range is not limited.
+/// Returns the value range of a panel: all values of the references and the surviving flights. A lost flight counts
+/// until shortly before its end, and extends the range to at most three times the others' range. If all vehicles are
+/// lost, the range is not limited.
 pub(super) fn range(lines: &[Line], least_room: f64) -> Range<f64> {
     let all = extent(lines.iter());
     let survived = lines.iter().any(|line| line.lost_s.is_none() && !line.is_reference);
@@ -246,7 +248,7 @@ pub(super) fn range(lines: &[Line], least_room: f64) -> Range<f64> {
         }
         (all, _) => all.unwrap_or_default(),
     };
-    // Room above and below, also for a constant.
+    // Leave a margin above and below, also for a constant.
     let room = (0.06 * (high - low)).max(1e-3 * low.abs().max(high.abs())).max(least_room);
     low - room..high + room
 }
@@ -255,7 +257,7 @@ pub(super) fn range(lines: &[Line], least_room: f64) -> Range<f64> {
 fn extent<'a>(lines: impl Iterator<Item = &'a Line>) -> Option<(f64, f64)> {
     let mut extent = None;
     for line in lines {
-        // Until one second before the end, or a tenth for a short flight.
+        // A lost flight counts until one second before its end, or 90 % of a flight shorter than 10 s.
         let until_s = line.lost_s.map_or(f64::INFINITY, |lost_s| lost_s - (0.1 * lost_s).min(1.0));
         for &(_, v) in line.points.iter().filter(|(t, _)| *t <= until_s) {
             let (low, high) = extent.unwrap_or((v, v));

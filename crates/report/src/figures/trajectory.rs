@@ -1,4 +1,4 @@
-//! The flights in space: a box seen from above its front right corner.
+//! A figure of the flights in space: a box seen from above its front right corner.
 
 use super::canvas::{self, Canvas, Ink, WIDTH_PX};
 use super::marks::{LABEL_PX, Mark, marks};
@@ -15,9 +15,9 @@ use nalgebra::Vector3;
 use std::collections::HashSet;
 
 const HEIGHT_PX: f64 = 660.0;
-/// Room for the box, below a legend of one line: left, top, width, height.
+/// Area of the box, below a legend of one line: left, top, width, height.
 const ROOM_PX: [f64; 4] = [110.0, 70.0, WIDTH_PX - 220.0, HEIGHT_PX - 70.0 - 62.0];
-/// Largest number of ticks along an edge.
+/// Most ticks along an edge.
 const TICKS: usize = 7;
 /// Width of a band along the reference.
 const BAND_PX: f64 = 13.0;
@@ -38,8 +38,8 @@ struct View {
 }
 
 impl View {
-    /// Creates a view of the box between two corners, moved down by `below_px`. The floor is true to scale unless it
-    /// would become too narrow.
+    /// Creates a view of the box between two corners, moved down by `below_px`. The floor is true to scale unless an
+    /// edge would become too short.
     fn new(low_m: Vector3<f64>, high_m: Vector3<f64>, below_px: f64) -> Self {
         let span = high_m - low_m;
         let longer = span.x.max(span.y);
@@ -47,13 +47,13 @@ impl View {
         let [left, top, width, height] = ROOM_PX;
         let view =
             View { low_m, high_m, edges, px: 1.0, middle_px: (left + 0.5 * width, top + below_px + 0.5 * height) };
-        // The far corners of the outline, relative to the centre.
+        // Outermost corners of the outline, relative to the centre.
         let (right, _) = view.direction(Vector3::new(0.5, 0.5, 0.0));
         let (_, down) = view.direction(Vector3::new(0.5, -0.5, -0.5));
         View { px: (0.5 * width / right).min(0.5 * height / down), ..view }
     }
 
-    /// Projects a vector, in edges of the box, to the picture: right and down.
+    /// Projects a vector, given in edges of the box, to the picture: right and down.
     fn direction(&self, v: Vector3<f64>) -> (f64, f64) {
         let v = v.component_mul(&self.edges) * self.px;
         let ((sin_a, cos_a), (sin_e, cos_e)) = (libm::sincos(AZIMUTH_RAD), libm::sincos(ELEVATION_RAD));
@@ -61,10 +61,10 @@ impl View {
         (cos_a * v.y - sin_a * v.x, sin_e * toward - cos_e * v.z)
     }
 
-    /// Returns the pixel of a point.
+    /// Returns the position of a point in the picture.
     fn at(&self, p: Vector3<f64>) -> Point {
         let middle = 0.5 * (self.low_m + self.high_m);
-        // No edge is zero: there is room around a constant, too.
+        // No edge has length zero: there is a margin even around a constant.
         let (right, down) = self.direction((p - middle).component_div(&(self.high_m - self.low_m)));
         (self.middle_px.0 + right, self.middle_px.1 + down)
     }
@@ -74,7 +74,7 @@ impl View {
     }
 }
 
-/// Draws the flights of `laws` and the reference of the longest.
+/// Draws the flights of `laws`, and the reference of the longest flight.
 pub(super) fn picture(laws: &[Plotted], longest: &Flown, conditions: &str, mut legend: Vec<(String, Ink)>) -> Picture {
     let scenario = &longest.scenario;
     let end_s = longest.run.log.last().map_or(0.0, |last| last.time_s);
@@ -89,7 +89,7 @@ pub(super) fn picture(laws: &[Plotted], longest: &Flown, conditions: &str, mut l
     };
     let ranges = [Vector3::x(), Vector3::y(), Vector3::z()].map(range_along);
     let marks = marks(scenario, end_s, PLOT_PX);
-    // Wider bands below narrower ones, where several overlap.
+    // Where bands overlap, the lower ones are wider.
     let band = |change: &Mark| Ink::new(change.tint, BAND_PX + 6.0 * change.depth as f64);
     let mut changes: Vec<&Mark> = marks.changes.iter().collect();
     for (i, change) in changes.iter().enumerate() {
@@ -144,7 +144,7 @@ pub(super) fn picture(laws: &[Plotted], longest: &Flown, conditions: &str, mut l
     Picture { name: "fig4-trajectory", caption, svg, explorable }
 }
 
-/// The same flights for a page's script.
+/// Returns the same flights for the page's script.
 fn scene(laws: &[Plotted], longest: &Flown, view: &View) -> ExplorableScene {
     let scenario = &longest.scenario;
     let arm_m = scenario.vehicle.arm_m;
@@ -168,8 +168,8 @@ fn scene(laws: &[Plotted], longest: &Flown, view: &View) -> ExplorableScene {
     scene
 }
 
-/// Draws labelled dots at the `places` that are in the box; labels of dots at the same place form a row. Returns the
-/// number of places.
+/// Draws labelled dots at the `places` that are in the box. Dots at the same position share one label. Returns the
+/// number of places in the box.
 fn dot_all<'a>(canvas: &mut Canvas, view: &View, places: impl Iterator<Item = (Vector3<f64>, &'a str)>) -> usize {
     let mut dots: Vec<(Point, String)> = Vec::new();
     let mut count = 0;
@@ -196,8 +196,8 @@ fn dot(canvas: &mut Canvas, view: &View, (x, y): Point, label: &str) {
     canvas.text(label, (x + dx * away * 0.7, y + dy * away), LABEL_PX, side, BLACK);
 }
 
-/// Draws a path through the box up to where it first leaves it, and returns whether any of it is within. Repeated laps
-/// are drawn once.
+/// Draws a path up to where it first leaves the box. Repeated laps are drawn once. Returns whether any of it is in the
+/// box.
 fn path(canvas: &mut Canvas, view: &View, places: impl Iterator<Item = Vector3<f64>>, ink: Ink) -> bool {
     let mut inked = HashSet::new();
     let mut pieces = Vec::new();
@@ -225,14 +225,14 @@ fn path(canvas: &mut Canvas, view: &View, places: impl Iterator<Item = Vector3<f
     last.is_some()
 }
 
-/// Draws floor and back walls with grid, numbers and names of the axes.
+/// Draws the floor and the back walls with grid, numbers and names of the axes.
 fn furniture(canvas: &mut Canvas, view: &View) {
     let (low, high) = (view.low_m, view.high_m);
     let line = |canvas: &mut Canvas, a: Vector3<f64>, b: Vector3<f64>, color: Rgb| {
         canvas.line([view.at(a), view.at(b)], Ink::new(color, 0.75));
     };
-    // For each axis: the edge with the numbers and the parallel one behind it, each as the point at the axis's zero and
-    // the direction of grid lines on floor or wall; and the position of the numbers.
+    // Each axis has a front edge with the numbers and a parallel back edge. An edge is given by its point at the axis's
+    // zero and the direction of its grid lines. The last vector points from the edge to the numbers.
     let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
     let near = |axis: Vector3<f64>| low - axis.component_mul(&low);
     let right = Vector3::new(high.x, 0.0, low.z);
@@ -256,7 +256,7 @@ fn furniture(canvas: &mut Canvas, view: &View) {
                 let from = edge + axis * value;
                 line(canvas, from, from + way.component_mul(&span), GRID);
             }
-            // The left corner is labelled by the height.
+            // The left corner has the number of the z-axis.
             if axis != x || value - first > 0.04 * (last - first) {
                 canvas.text(&label, beside(value, 16.0), LABEL_PX, TextAnchor::Middle, GREY);
             }

@@ -1,4 +1,4 @@
-//! Results of flights: table, CSV, summary, figures, page.
+//! Results of flights: table, CSV, summary, figures, HTML page.
 
 #[cfg(test)]
 mod tests;
@@ -13,21 +13,21 @@ use afbc_files::{Error, Folder};
 use afbc_sim::flown::Flown;
 use std::path::PathBuf;
 
-/// Writes everything about `flown` into `folder`, replacing all earlier files of its command, and returns the paths
+/// Writes all results of `flown` into `folder`, and removes all earlier files of the same command. Returns the paths
 /// written:
 ///
 /// * `<stem>-<contender>.csv`: each run's log;
-/// * `fig4-trajectory.svg`, `fig5-outputs.svg`, `fig6-attitude.svg`, `fig7-errors.svg`, `fig8-inputs.svg`: the
-///   counterparts of the paper's figures, all contenders overlaid; with several scenarios, `<stem>-fig4-trajectory.svg`
-///   etc. for each; `fig9-estimate.svg` for vehicles that estimate their own state;
+/// * `fig4-trajectory.svg`, `fig5-outputs.svg`, `fig6-attitude.svg`, `fig7-errors.svg`, `fig8-inputs.svg`: counterparts
+///   of the paper's figures, with all contenders; with several scenarios, `<stem>-fig4-trajectory.svg` etc. for each;
+///   `fig9-estimate.svg` for vehicles that estimate their own state;
 /// * `summary.json`: the figures of merit of each run;
-/// * `report.html`: everything on one self-contained page.
+/// * `report.html`: all results on one self-contained page.
 ///
-/// The stem is the scenario's name. Scenarios of the same name are distinguished by reading, signs, plant, profile, or
-/// else a number. A file appears whole or not at all: each is written under a temporary name first.
+/// The stem is the scenario's name. For scenarios of the same name it also contains the reading, signs, plant, profile,
+/// or else a number. Each file is written under a temporary name first, so that it appears complete or not at all.
 ///
 /// # Errors
-/// The first file that could not be written, or is not the command's.
+/// Fails at the first file that cannot be written, or that another command has written.
 pub fn write(folder: &Folder, flown: &[Flown], claims: &[Claim]) -> Result<Vec<PathBuf>, Error> {
     let groups = groups::groups(flown);
     let sets: Vec<_> = groups.iter().map(|group| figures::flights::draw(&group.flights)).collect();

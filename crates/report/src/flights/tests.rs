@@ -21,12 +21,12 @@ impl Scratch {
         Scratch(std::env::temp_dir().join(format!("sitl-output-{name}-{}", std::process::id())))
     }
 
-    /// Opens it as a command's own.
+    /// Opens the folder as a command's own.
     fn open(&self) -> Folder {
         Folder::open(&self.0, "test", "it", false).unwrap()
     }
 
-    /// Returns every file by name, except the marker of the folder's owner.
+    /// Returns every file by name, except the file that marks the folder's owner.
     fn files(&self) -> BTreeMap<String, Vec<u8>> {
         let entries = fs::read_dir(&self.0).unwrap().map(|entry| entry.unwrap());
         let named = entries.map(|entry| (entry.file_name().into_string().unwrap(), entry.path()));
@@ -61,7 +61,7 @@ fn claims() -> Vec<Claim> {
     ]
 }
 
-/// Checks that every SVG is well-formed and small, and returns their number.
+/// Checks that every SVG is well-formed and small; returns their number.
 fn check_svgs(files: &BTreeMap<String, Vec<u8>>) -> usize {
     let svgs = files.iter().filter(|(name, _)| name.ends_with(".svg"));
     svgs.inspect(|(name, bytes)| {
@@ -80,7 +80,7 @@ fn writes_everything_twice_the_same() {
     let (first, second) = (Scratch::new("first"), Scratch::new("second"));
     let paths = write(&first.open(), &flown, &claims()).unwrap();
     write(&second.open(), &flown, &claims()).unwrap();
-    // The second time over existing files.
+    // Write a second time over existing files.
     write(&second.open(), &flown, &claims()).unwrap();
     let files = first.files();
     assert_eq!(files, second.files());
@@ -172,7 +172,7 @@ fn table_fits_and_says_who_was_lost() {
 #[test]
 fn unusual_flights_have_figures() {
     let calm = Scenario { name: "".into(), ..paper(Reading::Persistent, 0.1) };
-    // Many events at once, under a name that needs escapes in files and markup.
+    // Many events at once, under a name that must be escaped in file names and markup.
     let gust = |axis, size| Gust { axis, kind: GustKind::Force, size, start_s: 1.0, end_s: 1.5 };
     let gusts = afbc_types::Axis::ALL.map(|axis| gust(axis, 0.001)).to_vec();
     let change = ParameterChange { quantity: PlantParameter::Mass, factor: 1.013, start_s: 0.5, end_s: f64::INFINITY };
@@ -183,7 +183,7 @@ fn unusual_flights_have_figures() {
     };
     let mut flown = vec![fly(&calm, ControllerKind::Afbc), fly(&stormy, ControllerKind::Backstepping)];
     flown.extend(both(&paper(Reading::Forces, 20.0)));
-    // A vehicle without thrust.
+    // A vehicle whose log contains NaN and infinity.
     let mut broken = fly(&Scenario { name: "broken".into(), ..calm.clone() }, ControllerKind::Afbc);
     for sample in broken.run.log.iter_mut().skip(2) {
         sample.motion.position_m = Vector3::repeat(f64::NAN);
@@ -201,9 +201,9 @@ fn unusual_flights_have_figures() {
     assert!(table(&flown, &[]).contains("mass +1.3 %"));
 }
 
-/// The law as printed climbs away from its hover and is lost 52 m up, while backstepping stays 50 m below it in the
-/// same panel. The figure states this, and marks no other place. In the panels of x, y and psi the cross is at the
-/// loss.
+/// The law as printed in the paper climbs away from its hover and is lost 52 m up, while backstepping stays 50 m below
+/// it in the same panel. The figure writes this height and does not mark another place. In the panels of x, y and psi
+/// the cross is at the loss.
 #[test]
 fn a_loss_beyond_a_panel_is_reported_and_not_marked_elsewhere() {
     let contenders = ControllerKind::PAPER.map(|kind| Contender::of(kind, Profile::Paper)).to_vec();
@@ -261,14 +261,14 @@ fn an_error_names_the_path_and_the_cure() {
     assert!(error.contains("file: ") && error.contains("--out"), "{error}");
 }
 
-/// Whatever library writes, the message contains the system's error.
+/// The message contains the system's error, whichever library writes the file.
 #[test]
 fn a_full_disk_says_free_some_space() {
     let scratch = Scratch::new("full");
     let folder = scratch.open();
     let flown = fly(&paper(Reading::Persistent, 0.1), ControllerKind::Afbc);
     let full = || fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-    // Writes through a file on a full disk, with the error wrapped as the library wraps it.
+    // Write to a full disk; `wrap` wraps the error as the library does.
     let fill = |name: &str, wrap: &dyn Fn(&mut dyn io::Write) -> io::Result<()>| {
         let mut disk = afbc_files::Disk { file: full(), failure: None };
         let failed = wrap(&mut disk).unwrap_err();
@@ -283,7 +283,7 @@ fn a_full_disk_says_free_some_space() {
     }
 }
 
-/// Earlier files of the command are removed, files of others stay.
+/// Earlier files of the same command are removed; other files stay.
 #[test]
 fn stale_files_are_removed_and_foreign_ones_kept() {
     let scratch = Scratch::new("stale");
@@ -297,7 +297,7 @@ fn stale_files_are_removed_and_foreign_ones_kept() {
     assert_eq!(one["notes.csv"], b"mine");
     assert_eq!(one.len(), both.len());
 
-    // Somebody else's file, here a link, with the name of a result.
+    // A file of somebody else, here a link, with the name of a result.
     fs::remove_file(scratch.0.join("paper-afbc.csv")).unwrap();
     write(&scratch.open(), &[], &[]).unwrap();
     std::os::unix::fs::symlink("nowhere", scratch.0.join("paper-afbc.csv")).unwrap();
@@ -308,7 +308,7 @@ fn stale_files_are_removed_and_foreign_ones_kept() {
     assert!(fs::symlink_metadata(scratch.0.join("paper-afbc.csv")).unwrap().is_file());
     assert!(!scratch.0.join("nowhere").exists());
 
-    // A folder of another command; and a marker with any bit flipped.
+    // A folder of another command; and a marker file with any single bit flipped.
     let refused = || Folder::open(&scratch.0, "other", "that", false).unwrap_err().to_string();
     assert!(refused().contains("holds what `sitl test` made of it;"), "{}", refused());
     let marker = scratch.0.join(".sitl.json");

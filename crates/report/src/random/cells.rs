@@ -1,13 +1,13 @@
-//! Contents of the tables, and what they mean.
+//! Contents of the tables, and their explanation.
 
 use super::judged::{Group, Judged};
 use afbc_campaign::random::{Difference, RESAMPLES, Ranking};
 use afbc_sim::metrics::SETTLED_S;
 
-/// Heads of the columns beside the contender's, the last for what the others are compared with.
+/// Column heads without the contender's; the reference contender's name is appended to the last one.
 pub(super) const HEADS: [&str; 6] = ["best or level", "lost", "alone", "median [m]", "geometric [m]", "over"];
 
-/// Returns the heads.
+/// Returns the column heads.
 pub(super) fn heads(judged: &Judged<'_>) -> [String; HEADS.len()] {
     let mut heads = HEADS.map(String::from);
     if let Some(last) = heads.last_mut() {
@@ -38,7 +38,7 @@ fn ratio(difference: &Difference) -> String {
     of(difference.mean) + &interval
 }
 
-/// Says what the columns are.
+/// Explains the columns.
 pub(super) fn legend(judged: &Judged<'_>) -> String {
     let against = judged.against();
     format!(
@@ -51,7 +51,8 @@ pub(super) fn legend(judged: &Judged<'_>) -> String {
     )
 }
 
-/// Returns what is said below a group: which flights nobody kept, and which the law compared with should have.
+/// Returns the notes below a group: the flights that every law loses, and those that only the reference contender
+/// loses.
 pub(super) fn notes(judged: &Judged<'_>, group: &Group<'_>) -> Vec<String> {
     let against = judged.against();
     [(&group.lost_by_all, "Every law loses".into()), (&group.lost_alone, format!("{against} loses, another law keeps"))]
@@ -61,7 +62,7 @@ pub(super) fn notes(judged: &Judged<'_>, group: &Group<'_>) -> Vec<String> {
         .collect()
 }
 
-/// Names flights, up to twenty.
+/// Names up to twenty flights.
 fn named(flights: &[&str]) -> String {
     const SOME: usize = 20;
     let names = flights.iter().take(SOME).copied().collect::<Vec<_>>().join(", ");

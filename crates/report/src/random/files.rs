@@ -1,4 +1,4 @@
-//! `flights.csv` and `random.json`.
+//! Writes `flights.csv` and `random.json`.
 
 use super::Judged;
 use super::judged::Group;
@@ -8,7 +8,7 @@ use afbc_campaign::random::{Ranking, is_level};
 use serde::Serialize;
 use std::io::{self, Write};
 
-/// Columns of a row that say what was flown.
+/// Columns that describe the flight.
 const FLIGHT: [&str; 10] = [
     "flight",
     "vehicle",
@@ -21,7 +21,7 @@ const FLIGHT: [&str; 10] = [
     "change",
     "description",
 ];
-/// Columns that say who flew it how.
+/// Columns that describe the contender and its result.
 const FLOWN: [&str; 10] = [
     "contender",
     "controller",
@@ -35,7 +35,7 @@ const FLOWN: [&str; 10] = [
     "trip",
 ];
 
-/// Writes a row for each flight of each contender. A lost flight's figures cover the time until the loss.
+/// Writes one row per flight of each contender. A lost flight's figures cover the time until the loss.
 pub(super) fn csv(out: &mut dyn Write, judged: &Judged<'_>) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     csv.write_record(FLIGHT.into_iter().chain(FLOWN))?;
@@ -91,7 +91,7 @@ struct Whole<'a> {
 
 #[derive(Serialize)]
 struct GroupWords<'a> {
-    /// Null for all.
+    /// Name of the vehicle; null for all vehicles together.
     vehicle: Option<&'a str>,
     flights: usize,
     lost_by_all: &'a [&'a str],
@@ -121,10 +121,10 @@ struct Paired {
     rank_biserial: f64,
 }
 
-/// Writes one object: how the contenders stand on each vehicle and in all.
+/// Writes one JSON object: the contenders' ranking on each vehicle and on all together.
 ///
 /// # Errors
-/// If writing to `out` fails.
+/// Fails if writing to `out` fails.
 pub fn json(out: &mut dyn Write, judged: &Judged<'_>) -> io::Result<()> {
     let random = judged.random;
     let whole = Whole {

@@ -1,11 +1,11 @@
-//! How the contenders stand, for a paper.
+//! Tables of the contenders' ranking, for a paper.
 
 use super::Judged;
 use super::cells::{cells, heads, legend};
 use crate::differences::{TEST, TEST_LEGEND, test};
 use crate::grid::{Grid, GridCell};
 
-/// Returns a table for each vehicle and one for all.
+/// Returns one table per vehicle, and one for all vehicles together.
 pub(super) fn grids(judged: &Judged<'_>) -> Vec<Grid> {
     let heads: Vec<String> = ["law".into()].into_iter().chain(heads(judged)).chain(TEST.map(String::from)).collect();
     let grid = |group: &super::judged::Group<'_>| {

@@ -1,38 +1,38 @@
-//! Flights that were drawn and flown, and how the contenders stand.
+//! The flown random flights, and the ranking of the contenders.
 
 use afbc_campaign::random::{FlownDraw, Random, Ranking, Score, Seen, rankings};
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
 
-/// Flights that were drawn and flown, and how the contenders stand in them.
+/// The flown random flights, and the ranking of the contenders in them.
 #[derive(Clone, Debug)]
 pub struct Judged<'a> {
-    /// What was drawn.
+    /// Settings from which the flights were drawn.
     pub random: &'a Random,
-    /// The flights.
+    /// The flights with their results.
     pub flown: &'a [FlownDraw],
-    /// Place of the contender that the others are compared with.
+    /// Index of the reference contender, with which the others are compared.
     against: usize,
-    /// Each vehicle's flights and, if there are several vehicles, all.
+    /// One group per vehicle and, if there are several vehicles, one of all flights.
     pub(super) groups: Vec<Group<'a>>,
 }
 
-/// The flights of one vehicle, or all.
+/// The flights of one vehicle, or of all vehicles.
 #[derive(Clone, Debug)]
 pub(super) struct Group<'a> {
-    /// The vehicle; none for all.
+    /// Name of the vehicle; `None` for all vehicles.
     pub(super) vehicle: Option<&'a str>,
     pub(super) flights: usize,
     /// Names of the flights that every contender lost.
     pub(super) lost_by_all: Vec<&'a str>,
-    /// Names of the flights that the contender with which the others are compared lost, and another kept.
+    /// Names of the flights that the reference contender lost and another contender kept.
     pub(super) lost_alone: Vec<&'a str>,
-    /// One for each contender.
+    /// Ranking of each contender.
     pub(super) rankings: Vec<Ranking>,
 }
 
 impl<'a> Judged<'a> {
-    /// Judges the flights; the contenders are compared with the one called `against`, or the first.
+    /// Ranks the contenders. The reference contender is the one called `against`, or else the first.
     pub fn new(random: &'a Random, flown: &'a [FlownDraw], against: &str) -> Self {
         let mut judged = Judged { random, flown, against: 0, groups: Vec::new() };
         let contenders = judged.contenders();
@@ -45,8 +45,8 @@ impl<'a> Judged<'a> {
         judged
     }
 
-    /// Returns of each vehicle the flight that tells most of the contender with which the others are compared: one that
-    /// it lost and another kept, or else the one in which it was farthest behind the best.
+    /// Returns the reference contender's worst flight on each vehicle: one that it lost and another contender kept, or
+    /// else the one in which it was farthest behind the best.
     pub fn telling(&self) -> Vec<&'a Scenario> {
         let behind = |score: &Score| match (score.of(self.against), score.best_m()) {
             (Some(own), Some(best)) => own / best,
@@ -56,7 +56,7 @@ impl<'a> Judged<'a> {
             let flown = self.flown.iter().filter(|flown| flown.flight.vehicle == vehicle);
             let judged =
                 flown.filter_map(|flown| Some((flown, flown.score())).filter(|(_, score)| score.best_m().is_some()));
-            // Of several alike, the first.
+            // The first one of several equals counts.
             let worst = judged.reduce(|worst, next| if behind(&next.1) > behind(&worst.1) { next } else { worst });
             worst.map(|(flown, _)| &flown.flight.scenario)
         };
@@ -68,17 +68,17 @@ impl<'a> Judged<'a> {
         self.flown.first().map_or(&[], |first| first.flight.scenario.contenders.as_slice())
     }
 
-    /// Returns the title of the contender that the others are compared with.
+    /// Returns the title of the reference contender.
     pub(super) fn against(&self) -> &'a str {
         self.contenders().get(self.against).map_or("", Contender::title)
     }
 
-    /// Returns its name.
+    /// Returns the name of the reference contender.
     pub(super) fn against_name(&self) -> &'a str {
         self.contenders().get(self.against).map_or("", |contender| contender.name.as_str())
     }
 
-    /// Says what was flown: "seeds 1 to 20, 12 flights of each vehicle and seed, on the truth".
+    /// Describes the flights: "seeds 1 to 20, 12 flights of each vehicle and seed, on the truth".
     pub(super) fn words(&self) -> String {
         let (first, last) = (self.random.seeds.start, self.random.seeds.end.saturating_sub(1));
         let seeds = if first == last { format!("seed {first}") } else { format!("seeds {first} to {last}") };
@@ -91,12 +91,12 @@ impl<'a> Judged<'a> {
 }
 
 impl Group<'_> {
-    /// Name of the group.
+    /// Returns the name of the group.
     pub(super) fn name(&self) -> &str {
         self.vehicle.unwrap_or("all vehicles")
     }
 
-    /// Number of flights that some contender kept.
+    /// Returns the number of flights that at least one contender kept.
     pub(super) fn kept(&self) -> usize {
         self.flights - self.lost_by_all.len()
     }

@@ -1,11 +1,12 @@
-//! How the contenders stand, for a document.
+//! The contenders' ranking as Markdown, for a document.
 
 use super::Judged;
 use super::cells::{cells, heads, legend, notes};
 use crate::table::wrap;
 use core::fmt::Write;
 
-/// Formats as Markdown: what was drawn, a table for each vehicle and one for all, what the columns are.
+/// Formats as Markdown: the settings, one table per vehicle and one for all vehicles, and an explanation of the
+/// columns.
 pub fn markdown(judged: &Judged<'_>) -> String {
     let mut page = paragraph(&format!("Drawn from {}.", judged.words()));
     let escaped = |cell: &str| cell.replace('[', "\\[").replace(']', "\\]");

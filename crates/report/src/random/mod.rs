@@ -1,4 +1,4 @@
-//! Results of the suite `random`: how the contenders stand on each vehicle and in all, and every flight.
+//! Results of the suite `random`: the contenders' ranking per vehicle and overall, and every flight.
 
 mod cells;
 mod files;
@@ -20,16 +20,16 @@ use afbc_files::{Error, Folder};
 use shown::Shown;
 use std::path::PathBuf;
 
-/// Writes everything about the flights into `folder`, replacing all earlier files of its command, and returns the paths
-/// written:
+/// Writes all results into `folder`, and removes all earlier files of the same command. Returns the paths written:
 ///
-/// * `flights.csv`: a row for each flight of each contender;
-/// * `random.json`: how the contenders stand;
-/// * `tables.md`, `tables.tex`: the tables for a paper;
-/// * `report.html`: the same on one self-contained page, with the [telling](Judged::telling) flights, flown `again`.
+/// * `flights.csv`: one row per flight of each contender;
+/// * `random.json`: the contenders' ranking;
+/// * `tables.md`, `tables.tex`: tables for a paper;
+/// * `report.html`: the same on one self-contained page, plus an interactive view of the [telling](Judged::telling)
+///   flights, from their repetitions in `again`.
 ///
 /// # Errors
-/// The first file that could not be written, or is not the command's.
+/// Fails at the first file that cannot be written, or that another command has written.
 pub fn write(folder: &Folder, judged: &Judged<'_>, again: &[Comparison]) -> Result<Vec<PathBuf>, Error> {
     folder.only(&["flights.csv", "random.json", "tables.md", "tables.tex", "report.html"])?;
     let page = page::page(judged, again.iter().map(Shown::of).collect());
@@ -43,7 +43,7 @@ pub fn write(folder: &Folder, judged: &Judged<'_>, again: &[Comparison]) -> Resu
     ])
 }
 
-/// Formats the tables for a paper: how the contenders stand on each vehicle, and on all.
+/// Formats the tables for a paper: the contenders' ranking per vehicle, and over all vehicles.
 pub fn tables(judged: &Judged<'_>, format: TableFormat) -> String {
     grid::tables(&grids::grids(judged), "random", format)
 }

@@ -1,4 +1,4 @@
-//! The report.
+//! The HTML page of the suite `random`.
 
 use super::Judged;
 use super::cells::{cells, heads, legend, notes};
@@ -38,7 +38,7 @@ pub(super) fn page(judged: &Judged<'_>, shown: Vec<Shown>) -> String {
     )
 }
 
-/// A row for each contender.
+/// Returns a table with one row per contender.
 fn rankings(judged: &Judged<'_>, group: &Group<'_>) -> Markup {
     html! {
         table {

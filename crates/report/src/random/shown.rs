@@ -1,11 +1,11 @@
-//! Flights that are shown in space.
+//! Flights that the page shows in space.
 
 use crate::explore::ExplorableScene;
 use crate::figures::{self, Picture};
 use crate::words;
 use afbc_campaign::compare::Comparison;
 
-/// A flight that is shown in space.
+/// A flight that the page shows in space.
 pub(super) struct Shown {
     pub(super) name: String,
     pub(super) conditions: String,

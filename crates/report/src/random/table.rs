@@ -1,11 +1,11 @@
-//! How the contenders stand, for the terminal.
+//! Formats the contenders' ranking for the terminal.
 
 use super::Judged;
 use super::cells::{cells, heads, legend, notes};
 use crate::grid::parts;
 use crate::table::wrap;
 
-/// Formats how the contenders stand: a block for each vehicle and one for all, and what the columns are.
+/// Formats the contenders' ranking: one block per vehicle and one for all vehicles, and an explanation of the columns.
 pub fn table(judged: &Judged<'_>) -> String {
     let mut rows: Vec<(String, Vec<String>)> = Vec::new();
     for group in &judged.groups {

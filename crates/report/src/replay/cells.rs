@@ -1,21 +1,21 @@
-//! Numbers and words about a replay, for page and terminal.
+//! Texts and numbers about a replay, for the HTML page and the terminal.
 
 use super::Replay;
 use afbc_estimator::{Aid, Resets};
 use afbc_replay::{ErrorFigure, EstimatorStart, SampleSource};
 
-/// Heads of the columns.
+/// Column heads.
 pub(super) const HEADS: [&str; 4] = ["RMS", "largest", "within 3σ", "valid"];
-/// Largest number of the log's resets that are spelt out.
+/// Most resets of the log that are listed.
 const RESETS_MAX: usize = 12;
 
-/// A quantity's differences.
+/// Differences of one quantity.
 pub(super) struct Row {
     pub(super) name: &'static str,
     pub(super) cells: [String; 4],
 }
 
-/// Returns the differences; "-" where nothing could be compared.
+/// Returns the differences; "-" if nothing could be compared.
 pub(super) fn rows(replay: &Replay<'_>) -> Vec<Row> {
     let f = &replay.replayed.figures;
     let number = |value: Option<f64>, unit: &str| value.map_or("-".into(), |value| format!("{value:.3} {unit}"));
@@ -47,7 +47,7 @@ pub(super) fn conditions(replay: &Replay<'_>) -> String {
     format!("{}, {length_s:.1} s, inertial sensor at {rate_hz:.0} Hz", recording.format)
 }
 
-/// Says what was used and what happened, a sentence each.
+/// Describes the data used and the course of the replay, one sentence per fact.
 pub(super) fn sentences(replay: &Replay<'_>) -> Vec<String> {
     let (recording, replayed) = (replay.recording, replay.replayed);
     let used = recording.sources.iter().filter(|source| source.used > 0).map(|source| {
@@ -113,7 +113,7 @@ pub(super) fn sentences(replay: &Replay<'_>) -> Vec<String> {
     said
 }
 
-/// The names of what is measured.
+/// Names of the measurements.
 pub(super) const AIDS: [(&str, Aid); 5] = [
     ("gnss-position", Aid::GnssPosition),
     ("gnss-height", Aid::GnssHeight),

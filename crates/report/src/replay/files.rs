@@ -1,4 +1,4 @@
-//! `replay.csv` and `summary.json`.
+//! Writes `replay.csv` and `summary.json`.
 
 use super::{Replay, cells};
 use afbc_estimator::Estimate;
@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
-/// Columns of an estimate, ours and the log's.
+/// Columns of an estimate, ours or the log's.
 const PARTS: [&str; 9] = ["x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s", "roll_rad", "pitch_rad", "yaw_rad"];
 /// Columns of our standard deviations: position, velocity, rotation about the axes of the earth frame.
 const SIGMAS: [&str; 9] = [
@@ -24,19 +24,19 @@ const SIGMAS: [&str; 9] = [
     "rz_sigma_rad",
 ];
 
-/// Names of the columns beside the time: ours, its standard deviations, the log's.
+/// Returns the column names after the time: our estimate, its standard deviations, the log's estimate.
 fn head() -> impl Iterator<Item = String> {
     let logged = PARTS.iter().map(|part| format!("logged_{part}"));
     PARTS.iter().chain(&SIGMAS).map(|name| (*name).to_owned()).chain(logged)
 }
 
-/// The values under them.
+/// Returns a row's values, in the order of [`head`].
 fn fields(row: &ReplayRow) -> impl Iterator<Item = Option<f32>> {
     let ours = row.ours.as_ref();
     ours_of(ours).into_iter().chain(sigmas_of(ours)).chain(logged_of(&row.logged))
 }
 
-/// Returns the columns of the CSV file, names and values: NaN where there is none.
+/// Returns the columns of the CSV file with their values; NaN marks a missing value.
 pub fn columns(rows: &[ReplayRow]) -> Vec<(String, Vec<f64>)> {
     let time_s = ("time_s".to_owned(), rows.iter().map(|row| row.time_s).collect());
     let column = |(i, name)| {
@@ -46,7 +46,7 @@ pub fn columns(rows: &[ReplayRow]) -> Vec<(String, Vec<f64>)> {
     std::iter::once(time_s).chain(head().enumerate().map(column)).collect()
 }
 
-/// Writes both estimates over time; a field is empty where there is none.
+/// Writes both estimates over time; a missing value gives an empty field.
 pub(super) fn csv(out: &mut dyn Write, replay: &Replay<'_>) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     csv.write_record(std::iter::once("time_s".to_owned()).chain(head()))?;
@@ -170,10 +170,10 @@ struct LoggedReset {
     unit: &'static str,
 }
 
-/// Writes one object.
+/// Writes the summary as one JSON object.
 ///
 /// # Errors
-/// If writing to `out` fails.
+/// Fails if writing to `out` fails.
 pub fn json(out: &mut dyn Write, replay: &Replay<'_>) -> io::Result<()> {
     let Replay { name, recording, replayed } = replay;
     let (start, started_at_s, start_reason) = match replayed.start {

@@ -1,14 +1,14 @@
-//! What is replayed.
+//! The input of a replay's report.
 
 use afbc_replay::{Recording, Replayed};
 
-/// A log and what the estimator made of it.
+/// A log with the result of its replay.
 #[derive(Clone, Copy, Debug)]
 pub struct Replay<'a> {
     /// Name of the log.
     pub name: &'a str,
-    /// What it holds.
+    /// Contents of the log.
     pub recording: &'a Recording,
-    /// Our estimate beside its own.
+    /// Our estimate and the log's, compared.
     pub replayed: &'a Replayed,
 }

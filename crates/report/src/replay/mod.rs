@@ -1,4 +1,4 @@
-//! Results of a replayed log: table, CSV, JSON, figures, page.
+//! Results of a replayed log: table, CSV, JSON, figures, HTML page.
 
 mod cells;
 mod files;
@@ -14,22 +14,22 @@ use crate::words::slug;
 use afbc_files::{Error, Folder};
 use std::path::PathBuf;
 
-/// Returns the name of a log as that of a folder.
+/// Returns the name of the results folder for a log.
 #[must_use]
 pub fn folder_name(name: &str) -> String {
     format!("replay-{}", slug(name))
 }
 
-/// Writes everything about a replay into `folder`, replacing all earlier files of its command, and returns the paths
+/// Writes all results of a replay into `folder`, and removes all earlier files of the same command. Returns the paths
 /// written:
 ///
 /// * `replay.csv`: both estimates over time;
-/// * `summary.json`: their differences, and what was used;
+/// * `summary.json`: their differences, and the data used;
 /// * `attitude.svg`, `velocity.svg`, `position.svg`, `difference.svg`: figures;
-/// * `report.html`: everything on one self-contained page.
+/// * `report.html`: all results on one self-contained page.
 ///
 /// # Errors
-/// The first file that could not be written, or is not the command's.
+/// Fails at the first file that cannot be written, or that another command has written.
 pub fn write(folder: &Folder, replay: &Replay<'_>) -> Result<Vec<PathBuf>, Error> {
     let pictures = figures::replay::draw(replay.recording, replay.replayed);
     let svgs: Vec<_> = pictures.iter().map(|picture| format!("{}.svg", picture.name)).collect();

@@ -1,4 +1,4 @@
-//! The report of a replay.
+//! The HTML page of a replay.
 
 use super::{Replay, cells};
 use crate::figures::{self, Picture};

@@ -1,4 +1,4 @@
-//! Contents of the table, and what they mean.
+//! Contents of the table, and their explanation.
 
 use super::judged::RoughResults;
 use crate::grid::GridCell;
@@ -7,7 +7,7 @@ use afbc_scenario::contender::Contender;
 use afbc_sim::metrics::SETTLED_S;
 use maud::{Markup, html};
 
-/// Heads of the columns beside the class's.
+/// Column heads without the class's.
 pub(super) const HEADS: [&str; 10] =
     ["known", "flights", "NEES", "worst", "within 3 sigma", "valid", "coasted", "descended", "handed over", "lost"];
 
@@ -33,17 +33,17 @@ fn error(nees: f64) -> String {
     }
 }
 
-/// Returns the name of a row: its class, or all.
+/// Returns the name of a row: its class, or "all".
 pub(super) fn name(row: &ClassRow) -> &'static str {
     row.class.unwrap_or("all")
 }
 
-/// Returns the contender.
+/// Returns the contender that flew.
 pub(super) fn contender<'a>(results: &RoughResults<'a>) -> Option<&'a Contender> {
     results.flown.first().and_then(|first| first.flight.scenario.contenders.first())
 }
 
-/// Says what was flown, without a full stop.
+/// Describes the flights, without a full stop.
 pub(super) fn words(results: &RoughResults<'_>) -> String {
     let rough = results.rough;
     let (first, last) = (rough.seeds.start, rough.seeds.end.saturating_sub(1));
@@ -61,7 +61,7 @@ pub(super) fn words(results: &RoughResults<'_>) -> String {
     )
 }
 
-/// Says what the columns are.
+/// Explains the columns.
 pub(super) fn legend() -> String {
     format!(
         "known: what data sheets, stamps or silence tell the vehicle. Of the estimate while it was valid, from \
@@ -73,7 +73,7 @@ pub(super) fn legend() -> String {
     )
 }
 
-/// What the classes are, for the page.
+/// Returns the meanings of the classes, for the HTML page.
 pub(super) fn meanings() -> Markup {
     html! {
         dl {

@@ -1,4 +1,4 @@
-//! `flights.csv` and `rough-estimate.json`.
+//! Writes `flights.csv` and `rough-estimate.json`.
 
 use super::cells;
 use super::judged::RoughResults;
@@ -6,7 +6,7 @@ use afbc_campaign::rough::{CLASSES, ClassRow, MIXTURE_MEANING, NAME};
 use serde::Serialize;
 use std::io::{self, Write};
 
-/// Columns of a flight.
+/// Columns of `flights.csv`.
 const HEADS: [&str; 20] = [
     "flight",
     "vehicle",
@@ -30,7 +30,7 @@ const HEADS: [&str; 20] = [
     "description",
 ];
 
-/// Writes a row for each flight.
+/// Writes one row per flight.
 pub(super) fn csv(out: &mut dyn Write, results: &RoughResults<'_>) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     csv.write_record(HEADS)?;
@@ -81,7 +81,7 @@ struct Whole<'a> {
 
 #[derive(Serialize)]
 struct Words {
-    /// Null for all flights.
+    /// Name of the class; null for all flights.
     class: Option<&'static str>,
     meaning: Option<&'static str>,
     known: Option<bool>,
@@ -96,10 +96,10 @@ struct Words {
     lost: usize,
 }
 
-/// Writes one object: a row for each class.
+/// Writes one JSON object with a row for each class.
 ///
 /// # Errors
-/// If writing to `out` fails.
+/// Fails if writing to `out` fails.
 pub fn json(out: &mut dyn Write, results: &RoughResults<'_>) -> io::Result<()> {
     let rough = results.rough;
     let whole = Whole {

@@ -1,19 +1,19 @@
-//! Flights that were drawn and flown, by their classes.
+//! The flown flights, grouped by class.
 
 use afbc_campaign::rough::{ClassRow, FlownRough, Rough, rows};
 
-/// Flights that were drawn and flown, and a row for each class.
+/// The flown flights, and a row of results per class.
 #[derive(Clone, Debug)]
 pub struct RoughResults<'a> {
-    /// The suite as it was drawn.
+    /// Settings from which the flights were drawn.
     pub rough: &'a Rough,
-    /// The flights.
+    /// The flights with their results.
     pub flown: &'a [FlownRough],
     pub(super) rows: Vec<ClassRow>,
 }
 
 impl<'a> RoughResults<'a> {
-    /// Judges the flights by their classes.
+    /// Summarises the flights by class.
     pub fn new(rough: &'a Rough, flown: &'a [FlownRough]) -> Self {
         RoughResults { rough, flown, rows: rows(flown) }
     }

@@ -1,4 +1,4 @@
-//! Results of the suite `rough-estimate`: how good the estimate is in each class, and every flight.
+//! Results of the suite `rough-estimate`: quality of the estimate in each class, and every flight.
 
 mod cells;
 mod files;
@@ -24,16 +24,15 @@ fn grid(results: &RoughResults<'_>) -> Grid {
     }
 }
 
-/// Writes everything about the flights into `folder`, replacing all earlier files of its command, and returns the paths
-/// written:
+/// Writes all results into `folder`, and removes all earlier files of the same command. Returns the paths written:
 ///
-/// * `flights.csv`: a row for each flight;
-/// * `rough-estimate.json`: a row for each class;
+/// * `flights.csv`: one row per flight;
+/// * `rough-estimate.json`: one row per class;
 /// * `tables.md`, `tables.tex`: the table for a paper;
 /// * `report.html`: the same on one self-contained page.
 ///
 /// # Errors
-/// The first file that could not be written, or is not the command's.
+/// Fails at the first file that cannot be written, or that another command has written.
 pub fn write(folder: &Folder, results: &RoughResults<'_>) -> Result<Vec<PathBuf>, Error> {
     folder.only(&["flights.csv", "rough-estimate.json", "tables.md", "tables.tex", "report.html"])?;
     let [md, tex] = [TableFormat::Markdown, TableFormat::Latex].map(|format| tables(results, format));
@@ -54,7 +53,7 @@ pub fn tables(results: &RoughResults<'_>, format: TableFormat) -> String {
     grid::tables(&[grid(results)], "rough-estimate", format)
 }
 
-/// Formats the table for the terminal: a line for each class, and what the columns are.
+/// Formats the table for the terminal: one line per class, and an explanation of the columns.
 pub fn table(results: &RoughResults<'_>) -> String {
     let shown = grid(results);
     let mut lines = vec![format!("Suite rough-estimate: {}.", shown.caption), String::new()];
@@ -64,7 +63,7 @@ pub fn table(results: &RoughResults<'_>) -> String {
     lines.join("\n") + "\n"
 }
 
-/// Formats as Markdown for a page: what was drawn, and the table.
+/// Formats the settings and the table as Markdown, for a document.
 pub fn markdown(results: &RoughResults<'_>) -> String {
     let shown = grid(results);
     let mut lines = Vec::new();

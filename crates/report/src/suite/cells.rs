@@ -5,12 +5,12 @@ use core::fmt::Write;
 
 /// A figure of merit.
 pub(super) struct Figure {
-    /// Heading of its table.
+    /// Heading of the figure's table.
     pub(super) title: &'static str,
     pub(super) measure: Measure,
 }
 
-/// The figures of a suite, a table each.
+/// The suite's figures of merit, each with its own table.
 pub(super) const FIGURES: [Figure; 3] = [
     Figure { title: "Root mean square distance from the reference [m]", measure: Measure { digits: 4, ..DISTANCE } },
     Figure {
@@ -36,28 +36,28 @@ pub(super) const FIGURES: [Figure; 3] = [
 ];
 
 impl Figure {
-    /// Returns the median over a contender's flights as text; none if that is a lost one.
+    /// Returns the median over a contender's flights as text; `None` if the median is a lost flight's.
     pub(super) fn text(&self, entry: &Entry) -> Option<String> {
         let Measure { digits, scale, value, .. } = self.measure;
         let median = scale * entry.median(value)?.value;
         Some(if median < 1e4 { format!("{median:.digits$}") } else { format!("{median:.1e}") })
     }
 
-    /// True if no other contender has a smaller median.
+    /// Returns true if no other contender has a smaller median.
     pub(super) fn is_best(&self, comparison: &Comparison, entry: &Entry) -> bool {
         comparison.is_best(entry, &self.measure)
     }
 }
 
-/// Says when the vehicle was lost, or how many of several were, if any: "lost 6.2 s".
+/// Says when the vehicle was lost ("lost 6.2 s") or, for several flights, how many were lost. `None` without a loss.
 pub(super) fn lost(entry: &Entry) -> Option<String> {
     let first = entry.flights.iter().find_map(|flight| flight.lost)?;
     let of = entry.flights.len();
     Some(if of > 1 { format!("{} of {of} lost", entry.lost()) } else { format!("lost {:.1} s", first.time_s) })
 }
 
-/// Says when and why the monitor switched to the fallback law, or in how many of several flights and why first, if it
-/// did: "trip 10.3 s: errors of x stay large".
+/// Says when and why the monitor switched to the fallback law: "trip 10.3 s: errors of x stay large". For several
+/// flights it says how often, and describes the first trip. `None` without a trip.
 pub(super) fn trip(entry: &Entry) -> Option<String> {
     let mut trips = entry.flights.iter().filter_map(|flight| flight.tripped);
     let (first, others) = (trips.next()?, trips.count());
@@ -68,7 +68,7 @@ pub(super) fn trip(entry: &Entry) -> Option<String> {
     Some(format!("{when} {:.1} s: {reason}", first.time_s))
 }
 
-/// Returns everything about a contender in one cell: trip, then loss, or root mean square and largest distance.
+/// Summarises a contender in one cell: the trip, then the loss or the root mean square and largest distance.
 pub(super) fn summary(entry: &Entry) -> String {
     let mut words = trip(entry).map_or(String::new(), |trip| trip + "; ");
     let [rms, largest, _] = FIGURES.each_ref().map(|figure| figure.text(entry));

@@ -1,10 +1,10 @@
-//! Pictures of a suite's flights.
+//! Figures of a suite's flights.
 
 use crate::explore::ExplorableScene;
 use crate::figures::{self, Picture};
 use afbc_campaign::compare::Comparison;
 
-/// What the page shows of a flight.
+/// Figures of one flight on the page.
 pub(super) struct Drawn {
     pub(super) errors: Option<Picture>,
     pub(super) space: Option<ExplorableScene>,

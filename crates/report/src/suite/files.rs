@@ -1,4 +1,4 @@
-//! `suite.csv` and `suite.json`.
+//! Writes `suite.csv` and `suite.json`.
 
 use super::FlownSuite;
 use super::cells::{FIGURES, Figure};
@@ -9,8 +9,8 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
-/// Writes a row for each flight of each contender. A lost flight's figures cover the time until the loss; none are
-/// measured before 5 s.
+/// Writes one row per flight of each contender. A lost flight's figures cover the time until the loss. Figures only
+/// count from 5 s on.
 pub(super) fn csv(out: &mut dyn Write, flown: FlownSuite<'_>) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     let inputs = (1..=4).map(|input| format!("mean_abs_delta_u{input}_n"));
@@ -66,15 +66,15 @@ struct Contender<'a> {
     tripped: usize,
     first_tripped_at_s: Option<f64>,
     first_trip: Option<&'a str>,
-    /// Null if a vehicle was lost.
+    /// Mean of each figure; null if a vehicle was lost.
     mean: BTreeMap<&'a str, Option<f64>>,
     figures: Vec<FigureOverSeeds>,
 }
 
-/// Writes an array with one object for each flight: means, medians and differences over the seeds, losses and trips.
+/// Writes an array with one object per flight: means, medians and differences over the seeds, losses and trips.
 ///
 /// # Errors
-/// If writing to `out` fails.
+/// Fails if writing to `out` fails.
 pub fn json(out: &mut dyn Write, flown: FlownSuite<'_>) -> io::Result<()> {
     let sources = &flown.suite.sources;
     let flights = flown.rows().map(|(flight, comparison)| Flight {

@@ -1,14 +1,14 @@
-//! A suite and what flew.
+//! A flown suite.
 
 use afbc_campaign::compare::Comparison;
 use afbc_campaign::suite::{Suite, SuiteFlight};
 
-/// A suite that was flown.
+/// A flown suite.
 #[derive(Clone, Copy, Debug)]
 pub struct FlownSuite<'a> {
-    /// What was flown.
+    /// The suite.
     pub suite: &'a Suite,
-    /// Its flights under every contender, in the suite's order.
+    /// Results of the flights under every contender, in the suite's order.
     pub comparisons: &'a [Comparison],
 }
 

@@ -1,4 +1,4 @@
-//! Where every contender stands: a heat map of ratios to the best.
+//! A heat map: each contender's distance divided by the best contender's.
 
 use super::FlownSuite;
 use super::cells::{FIGURES, Figure, lost};
@@ -9,8 +9,9 @@ use maud::{Markup, html};
 /// Ratio at which a cell has its full colour.
 const HOTTEST: f64 = 8.0;
 
-/// A row for each flight and a column for each contender: its root mean square distance as a multiple of the flight's
-/// best, the redder the larger, and their geometric mean over the flights it did not lose.
+/// Returns a table with one row per flight and one column per contender. A cell shows the root mean square distance as
+/// a multiple of the flight's best, the redder the larger. The last row is the geometric mean over the flights that the
+/// contender did not lose.
 pub(super) fn map(flown: FlownSuite<'_>) -> Markup {
     let [figure, ..] = &FIGURES;
     let Some(first) = flown.comparisons.first() else { return html! {} };
@@ -36,17 +37,17 @@ pub(super) fn map(flown: FlownSuite<'_>) -> Markup {
     }
 }
 
-/// Name by which a page refers to the section of a flight.
+/// Returns the anchor of a flight's section in the page.
 pub(super) fn anchor(comparison: &Comparison) -> String {
     format!("flight-{}", comparison.scenario.name)
 }
 
-/// Returns a contender's median as a multiple of the best contender's; none if it lost a vehicle.
+/// Returns a contender's median as a multiple of the best contender's; `None` if it lost a vehicle.
 fn ratio(figure: &Figure, comparison: &Comparison, entry: &Entry) -> Option<f64> {
     let median = |entry: &Entry| entry.median(figure.measure.value).map(|median| median.value);
     let best = comparison.entries.iter().filter_map(median).min_by(f64::total_cmp)?;
     let own = median(entry)?;
-    // 1 also where both are zero, of which there is no ratio.
+    // The ratio is also 1 if both are zero.
     Some(if own > best { own / best } else { 1.0 })
 }
 
@@ -58,7 +59,7 @@ fn cell(ratio: Option<f64>, lost: Option<String>) -> Markup {
     }
 }
 
-/// The geometric mean of a contender's ratios, and how many flights it lost.
+/// Returns the geometric mean of a contender's ratios, and the number of flights that it lost.
 fn mean(figure: &Figure, comparisons: &[Comparison], index: usize) -> Markup {
     let entries = || comparisons.iter().filter_map(|comparison| Some((comparison, comparison.entries.get(index)?)));
     let ratios: Vec<f64> = entries().filter_map(|(comparison, entry)| ratio(figure, comparison, entry)).collect();
@@ -72,12 +73,12 @@ fn mean(figure: &Figure, comparisons: &[Comparison], index: usize) -> Markup {
     }
 }
 
-/// Share of the full colour: by the logarithm of the ratio.
+/// Returns the share of the full colour, which grows with the logarithm of the ratio.
 fn heat(ratio: f64) -> f64 {
     (libm::log(ratio) / (LN_2 * libm::log2(HOTTEST))).clamp(0.0, 1.0)
 }
 
-/// A ratio with three digits, or as many as it has before the point.
+/// Formats a ratio with three significant digits, or more if its integer part has more.
 fn rounded(ratio: f64) -> String {
     match ratio {
         ratio if ratio < 9.995 => format!("{ratio:.2}"),

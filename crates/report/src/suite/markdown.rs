@@ -1,15 +1,15 @@
-//! The suite's table for a document.
+//! The suite's table as Markdown, for a document.
 
 use super::FlownSuite;
 use super::cells::summary;
 use core::fmt::Write;
 
-/// Lines around the table of the suite `name` in a page.
+/// Returns the marker lines around the table of the suite `name` in a page.
 pub fn markers(name: &str) -> [String; 2] {
     ["begin", "end"].map(|end| format!("<!-- suite {name}: {end} -->"))
 }
 
-/// Formats as Markdown: the flights under each contender, and what others have published about them.
+/// Formats as Markdown: the flights under each contender, and published results of others.
 pub fn markdown(flown: FlownSuite<'_>) -> String {
     let mut page = String::new();
     let titles = flown.comparisons.first().map_or(Vec::new(), |comparison| {
@@ -41,7 +41,7 @@ pub fn markdown(flown: FlownSuite<'_>) -> String {
     page
 }
 
-/// Breaks a list item into lines of at most 120 columns.
+/// Wraps a list item into lines of at most 120 columns.
 fn wrapped(item: &str) -> String {
     let (mut text, mut column) = (String::new(), 0);
     for word in item.split_whitespace() {

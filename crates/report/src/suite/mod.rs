@@ -1,4 +1,4 @@
-//! Results of a suite: one table of flights and contenders, for page, terminal and documents, CSV and JSON.
+//! Results of a suite: tables of flights and contenders for page, terminal and documents, CSV and JSON.
 
 mod cells;
 mod drawn;
@@ -23,20 +23,20 @@ use cells::FIGURES;
 use drawn::Drawn;
 use std::path::PathBuf;
 
-/// Writes everything about a suite into `folder`, replacing all earlier files of its command, and returns the paths
+/// Writes all results of a suite into `folder`, and removes all earlier files of the same command. Returns the paths
 /// written:
 ///
-/// * `suite.csv`: a row for each flight of each contender;
+/// * `suite.csv`: one row per flight of each contender;
 /// * `suite.json`: means, medians and differences over the seeds, losses and trips;
-/// * `statistics.csv`: a row for each figure of each contender in each flight: its median, how it differs from
-///   another's, and whether by chance;
-/// * `standing.csv`: a row for each contender: how it stands over all flights;
-/// * `tables.md`, `tables.tex`: the tables for a paper;
+/// * `statistics.csv`: one row per figure of each contender in each flight: its median, its difference to the reference
+///   contender's, and the significance of that difference;
+/// * `standing.csv`: one row per contender: its ranking over all flights;
+/// * `tables.md`, `tables.tex`: tables for a paper;
 /// * `<flight>.svg`: errors of every contender over time, with the suite's own seed;
-/// * `report.html`: everything on one self-contained page.
+/// * `report.html`: all results on one self-contained page.
 ///
 /// # Errors
-/// The first file that could not be written, or is not the command's.
+/// Fails at the first file that cannot be written, or that another command has written.
 pub fn write(folder: &Folder, flown: FlownSuite<'_>) -> Result<Vec<PathBuf>, Error> {
     let drawn: Vec<Drawn> = flown.comparisons.iter().map(Drawn::of).collect();
     let name = |comparison: &Comparison| format!("{}.svg", comparison.scenario.name);
@@ -66,7 +66,7 @@ pub fn write(folder: &Folder, flown: FlownSuite<'_>) -> Result<Vec<PathBuf>, Err
     Ok(paths)
 }
 
-/// Formats the tables for a paper: the distances of every flight, and how the contenders stand over all of them.
+/// Formats the tables for a paper: the distances of every flight, and the contenders' ranking over all flights.
 pub fn tables(flown: FlownSuite<'_>, format: TableFormat) -> String {
     grid::tables(&standing::grids(flown), &flown.suite.name, format)
 }

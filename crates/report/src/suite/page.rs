@@ -1,4 +1,4 @@
-//! The report of a suite.
+//! The HTML page of a suite.
 
 use super::cells::{FIGURES, Figure, lost, trip};
 use super::drawn::Drawn;
@@ -51,7 +51,7 @@ fn tilt(flight: &SuiteFlight) -> String {
     flight.tilt_max_rad.map_or(String::new(), |tilt_rad| format!(", a tilt of up to {tilt_rad} rad"))
 }
 
-/// A row for each flight, a column for each contender.
+/// Returns a table with one row per flight and one column per contender.
 fn results(flown: FlownSuite<'_>, figure: &Figure) -> Markup {
     html! {
         table {
@@ -83,7 +83,7 @@ fn results(flown: FlownSuite<'_>, figure: &Figure) -> Markup {
     }
 }
 
-/// What others have published about the flights.
+/// Returns a table of published results about the flights.
 fn published(flown: FlownSuite<'_>) -> Markup {
     let figures = flown.rows().flat_map(|(flight, _)| flight.published.iter().map(move |figure| (flight, figure)));
     html! {

@@ -1,4 +1,4 @@
-//! How the contenders stand over all flights of a suite.
+//! Ranking of the contenders over all flights of a suite.
 
 use super::FlownSuite;
 use super::cells::{FIGURES, lost};
@@ -9,11 +9,11 @@ use afbc_campaign::random::{Difference, RESAMPLES, Ranking, Score, rankings};
 use serde::Serialize;
 use std::io::{self, Write};
 
-/// Returns how each contender stands: every flight counts once, with the median of its distance over the seeds.
+/// Ranks the contenders: every flight counts once, with the median distance over its seeds.
 fn standing(flown: FlownSuite<'_>) -> Vec<Ranking> {
     let score = |(flight, comparison): (usize, &Comparison)| {
         let rms_m = |entry: &Entry| entry.median(DISTANCE.value).map(|median| median.value);
-        // No two flights belong together, as those of one seed do.
+        // Each flight is its own cluster: unlike flights of one seed, no two of these belong together.
         Score { seed: flight as u64, rms_m: comparison.entries.iter().map(rms_m).collect() }
     };
     let scores: Vec<Score> = flown.comparisons.iter().enumerate().map(score).collect();
@@ -24,7 +24,7 @@ fn contenders(flown: FlownSuite<'_>) -> &[Entry] {
     flown.comparisons.first().map_or(&[], |first| first.entries.as_slice())
 }
 
-/// Returns the title of the contender that the others are compared with.
+/// Returns the title of the reference contender.
 fn against(flown: FlownSuite<'_>) -> &str {
     flown
         .comparisons
@@ -33,7 +33,7 @@ fn against(flown: FlownSuite<'_>) -> &str {
         .unwrap_or("")
 }
 
-/// Returns how they stand as a table.
+/// Returns the ranking as a table.
 pub(super) fn grid(flown: FlownSuite<'_>) -> Grid {
     let against = against(flown);
     let row = |(entry, ranking): (&Entry, &Ranking)| {
@@ -66,7 +66,7 @@ pub(super) fn grid(flown: FlownSuite<'_>) -> Grid {
     }
 }
 
-/// Returns the tables for a paper: the distances of every flight, and how the contenders stand.
+/// Returns the tables for a paper: the distances of every flight, and the contenders' ranking.
 pub(super) fn grids(flown: FlownSuite<'_>) -> Vec<Grid> {
     let [distance, ..] = FIGURES;
     let cell = |comparison: &Comparison, entry: &Entry| GridCell {
@@ -109,7 +109,7 @@ struct StandingRow<'a> {
     rank_biserial: Option<f64>,
 }
 
-/// Writes how they stand: a row for each contender.
+/// Writes the ranking, one row per contender.
 pub(super) fn csv(out: &mut dyn Write, flown: FlownSuite<'_>) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     for (entry, ranking) in contenders(flown).iter().zip(standing(flown)) {

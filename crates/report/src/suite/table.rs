@@ -1,4 +1,4 @@
-//! The suite's table for the terminal.
+//! Formats a suite's table for the terminal.
 
 use super::cells::{FIGURES, lost, trip};
 use super::{FlownSuite, standing};
@@ -6,7 +6,7 @@ use crate::grid::parts;
 use crate::table::wrap;
 use afbc_sim::metrics::SETTLED_S;
 
-/// Formats the root mean square distances: a line for each flight, a column for each contender, then every trip.
+/// Formats the root mean square distances, one line per flight and one column per contender; then lists every trip.
 pub fn table(flown: FlownSuite<'_>) -> String {
     let [rms, ..] = FIGURES;
     let mut rows: Vec<(String, Vec<String>)> = Vec::new();
@@ -15,7 +15,7 @@ pub fn table(flown: FlownSuite<'_>) -> String {
         let name = &comparison.scenario.name;
         let titles = comparison.entries.iter().map(|entry| entry.contender().title().to_owned());
         if rows.is_empty() {
-            // As wide as the figures with their asterisks.
+            // The added space aligns titles with the numbers, which may have an asterisk.
             rows.push((String::new(), titles.map(|title| title + " ").collect()));
         }
         let cells = comparison.entries.iter().map(|entry| {

@@ -1,4 +1,4 @@
-//! Small reports to write, and what is read back from their SVG and HTML.
+//! Helpers for the tests: small reports to write, and readers of their SVG and HTML.
 #![allow(dead_code, reason = "each test file uses a part")]
 
 use afbc_campaign::{self as campaign, Drawn, FIGURES, Manifest, QUANTITIES, Row, Shard, Summary};
@@ -14,11 +14,11 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Names, some with escapes or spaces; two share a colour, since there are fewer colours than names.
+/// Contender names, some with characters to escape or spaces. There are more names than colours, so some share one.
 pub(crate) const OWN: [&str; 14] =
     ["soft", "stiff", "no limits", "a", "b", "c", "d", "e", "f", "g", "pid-tuned", "AFBC 2", "<&> δ", "mine (storm)"];
 
-/// A separate empty folder for each test.
+/// Returns a separate empty folder for each test.
 pub(crate) fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("reports").join(test);
     if folder.exists() {
@@ -27,7 +27,7 @@ pub(crate) fn folder(test: &str) -> PathBuf {
     folder
 }
 
-/// Opens it as a command's own.
+/// Opens the folder as a command's own.
 pub(crate) fn open(folder: &Path) -> Folder {
     Folder::open(folder, "test", "it", false).unwrap()
 }
@@ -58,7 +58,7 @@ pub(crate) fn named(name: &str) -> Contender {
     Contender { name: name.into(), ..Contender::of(ControllerKind::Backstepping, afbc::Profile::Paper) }
 }
 
-/// Flies `scenario` under contenders of these names.
+/// Flies `scenario` under contenders with these names.
 pub(crate) fn flown(scenario: &Scenario, names: &[&str]) -> Vec<Flown> {
     let contenders: Vec<_> = names.iter().map(|name| named(name)).collect();
     let scenario = Scenario { contenders, ..scenario.clone() };
@@ -66,7 +66,7 @@ pub(crate) fn flown(scenario: &Scenario, names: &[&str]) -> Vec<Flown> {
     scenario.contenders.iter().map(fly).collect()
 }
 
-/// A campaign of `flights` in which those for which `lost` holds were lost; all others have equal results.
+/// Returns a campaign whose flights have the same results for all contenders, except those that are `lost`.
 pub(crate) fn gone_alike(names: &[&str], drawn: &[&str], flights: u64, lost: impl Fn(&str, u64) -> bool) -> Summary {
     let drawn = drawn.iter().map(|name| {
         let quantity = QUANTITIES.iter().find(|quantity| quantity.range.name == *name).unwrap();
@@ -104,7 +104,7 @@ pub(crate) fn gone_alike(names: &[&str], drawn: &[&str], flights: u64, lost: imp
     summary.finish()
 }
 
-/// A scenario with every kind of event, many at the same time.
+/// Returns a scenario with every kind of event, many at the same time.
 pub(crate) fn eventful() -> Scenario {
     let calm = hover(12.0);
     let gust = |axis, start_s, end_s| Gust { axis, kind: GustKind::Force, size: 0.01, start_s, end_s };
@@ -140,7 +140,7 @@ pub(crate) fn words(node: Node<'_, '_>) -> String {
         .to_owned()
 }
 
-/// Returns all text in a figure with its position.
+/// Returns all texts of a figure with their positions.
 pub(crate) fn labels(svg: &Document<'_>) -> Vec<(String, f64, f64)> {
     let texts = svg.descendants().filter(|node| node.has_tag_name("text"));
     texts.map(|text| (words(text), number(text, "x"), middle(text))).collect()
