@@ -1,24 +1,25 @@
-//! A median with a band around it, of flights over seeds or of the rows of a campaign.
+//! Medians with a band around them, over flights of several seeds or over the rows of a campaign.
 
 use crate::table::Points;
 
-/// A median with a band around it.
+/// A median curve with a band around it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Band {
-    /// The median over x.
+    /// Points of the median.
     pub median: Points,
-    /// Lower and upper edge over x.
+    /// Lower and upper edge of the band, each pair with its x.
     pub edges: Vec<(f64, [f64; 2])>,
 }
 
-/// Points of a median over time.
+/// Number of time steps at which [`over_seeds`] computes the median.
 const GRID: usize = 400;
-/// Rows of a campaign behind each point of a median, at least, and points at most.
+/// Each bin of [`binned`] has at least this many rows; there are at most `BINS` bins.
 const ROWS: usize = 25;
 const BINS: usize = 40;
 
-/// Returns the median of several flights over time, and the band that holds the middle `percent` of them, where at
-/// least half of them still fly. Between their samples flights are straight lines.
+/// Returns the median of several flights over time, and the band that holds the middle `percent` of them. The curves
+/// cover the times at which at least half of the flights are under way. Flights are interpolated linearly between
+/// samples.
 pub fn over_seeds(flights: &[Points], percent: f64) -> Band {
     let ends = |end: fn(&Points) -> Option<&(f64, f64)>| flights.iter().filter_map(end).map(|(x, _)| *x);
     let (start, end) =
@@ -34,8 +35,9 @@ pub fn over_seeds(flights: &[Points], percent: f64) -> Band {
     band
 }
 
-/// Returns the median of rows over x, and the band that holds the middle `percent` of them: of equal numbers of rows
-/// beside each other, or of all that have the same x if there are few.
+/// Returns the median of rows over x, and the band that holds the middle `percent` of them.
+///
+/// If x takes few distinct values, there is one bin per value. Otherwise neighbouring rows form bins of equal size.
 pub fn binned(mut rows: Points, percent: f64) -> Band {
     rows.sort_by(|a, b| a.0.total_cmp(&b.0));
     let levels: Vec<&[(f64, f64)]> = rows.chunk_by(|a, b| a.0 == b.0).collect();
@@ -65,7 +67,7 @@ impl Band {
     }
 }
 
-/// Returns a quantile of sorted values, linear between them, as numpy's is.
+/// Returns a quantile of sorted values by linear interpolation, as `numpy.quantile` does.
 fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let place = share.clamp(0.0, 1.0) * sorted.len().checked_sub(1)? as f64;
     let (below, part) = (place as usize, place.fract());
@@ -73,7 +75,7 @@ fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     Some(sorted.get(below + 1).map_or(low, |high| low + part * (high - low)))
 }
 
-/// Returns the value of a flight at `x`; none before its start and after its end.
+/// Returns a flight's value at `x` by linear interpolation; `None` before its start and after its end.
 fn value_at(flight: &Points, x: f64) -> Option<f64> {
     let after = flight.partition_point(|(at, _)| *at < x);
     let (x1, y1) = *flight.get(after)?;
@@ -89,8 +91,8 @@ mod tests {
     #![expect(clippy::unwrap_used, reason = "tests")]
     use super::*;
 
-    /// Straight flights at heights 0 to 10: the median is the middle one, the band of 80 % lies from the second to the
-    /// tenth, wherever each was sampled.
+    /// Eleven flights have the constant values 0 to 10 and different sample times. The median is 5, and the band of 80
+    /// % goes from 1 to 9.
     #[test]
     fn the_band_of_seeds_holds_its_share() {
         let flight = |height: usize| -> Points {
@@ -105,7 +107,7 @@ mod tests {
         assert_eq!((band.median.first().unwrap().0, band.median.last().unwrap().0), (0.0, 10.0));
     }
 
-    /// A flight that ends early counts up to its end; the median ends when most have.
+    /// A flight that ends early counts up to its end. The median ends when fewer than half of the flights remain.
     #[test]
     fn flights_count_while_they_last() {
         let until = |end: f64, y: f64| vec![(0.0, y), (end, y)];
@@ -117,7 +119,7 @@ mod tests {
         assert_eq!(over_seeds(&[], 80.0), Band::default());
     }
 
-    /// By `numpy.quantile([1, 2, 4, 8], [0, 0.1, 0.5, 0.9, 1])`.
+    /// Expected values are from `numpy.quantile([1, 2, 4, 8], [0, 0.1, 0.5, 0.9, 1])`.
     #[test]
     fn quantiles_are_numpys() {
         for (share, expected) in [(0.0, 1.0), (0.1, 1.3), (0.5, 3.0), (0.9, 6.8), (1.0, 8.0)] {

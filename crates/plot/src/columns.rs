@@ -1,4 +1,4 @@
-//! The columns of a log, by name.
+//! Reads logs and finds their columns by name.
 
 use crate::table::{LogTable, Points};
 use afbc_files::read::FileError;
@@ -6,25 +6,25 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-/// The columns of a log.
+/// All columns of a log.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LogColumns {
     file: String,
     tables: Vec<LogTable>,
 }
 
-/// Names of columns that lines are drawn over, the first that there is.
+/// Names of time columns, in order of preference.
 const TIMES: [&str; 5] = ["time_s", "t_s", "t", "time", "timestamp"];
-/// Name of the column by which rows are of several contenders.
+/// Name of the column that tells which contender a row belongs to.
 const CONTENDER: &str = "contender";
-/// Fewest letters in common of a name that is suggested, of 1.
+/// Jaro-Winkler similarity from which a known name is suggested for an unknown one.
 const SIMILAR: f64 = 0.6;
 
 impl LogColumns {
-    /// Reads the log at `path`: Parquet, ULog or MCAP by its first bytes, otherwise CSV.
+    /// Reads the log at `path`. The first bytes tell Parquet, ULog and MCAP; anything else is read as CSV.
     ///
     /// # Errors
-    /// One line on what is wrong with the file.
+    /// A file that cannot be read or parsed gives one line that names the problem.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         let file = path.display().to_string();
         let fault = |problem: String| FileError::whole(&file, problem);
@@ -41,16 +41,16 @@ impl LogColumns {
         Ok(LogColumns { file, tables })
     }
 
-    /// Returns the names of all columns of numbers.
+    /// Returns the names of all numeric columns.
     pub fn names(&self) -> Vec<String> {
         let of = |table: &LogTable| table.numbers.iter().map(|(name, _)| table.full(name)).collect::<Vec<_>>();
         self.tables.iter().flat_map(of).collect()
     }
 
-    /// Returns the name of the column that `y` is drawn over unless another is named: its table's time.
+    /// Returns the default x-axis for column `y`: the time column of its table.
     ///
     /// # Errors
-    /// One line if there is no column `y`, or no time beside it.
+    /// Fails with one line if there is no column `y`, or its table has no time column.
     pub fn usual_x(&self, y: &str) -> Result<String, FileError> {
         let (table, _) = self.find(y)?;
         let names = || table.numbers.iter().map(|(name, _)| name.as_str());
@@ -59,10 +59,11 @@ impl LogColumns {
         time.map(|name| table.full(name)).ok_or_else(none)
     }
 
-    /// Returns `y` over `x`, of each contender if the rows are of several; those without a number left out.
+    /// Returns column `y` over column `x`, per contender if the table has contenders. Rows without both numbers are
+    /// left out.
     ///
     /// # Errors
-    /// One line if there is no such column, or they are not of the same table.
+    /// Fails with one line if a column does not exist, or the two are in different tables.
     pub fn points(&self, x: &str, y: &str) -> Result<BTreeMap<Option<String>, Points>, FileError> {
         let (table, ys) = self.find(y)?;
         let xs = match table.column(x) {

@@ -1,9 +1,9 @@
-//! CSV files with a head.
+//! Reads CSV files with a header.
 
 use crate::table::LogTable;
 use afbc_files::read::Separated;
 
-/// Reads the only table of a file: a column of which no field is a number is one of words.
+/// Reads the file's only table. A column without any number becomes a column of words.
 pub(crate) fn read(bytes: &[u8]) -> Result<Vec<LogTable>, String> {
     let form = Separated::of(bytes);
     let mut reader = csv::ReaderBuilder::new().delimiter(form.separator).from_reader(bytes);

@@ -1,50 +1,50 @@
-//! A figure: panels above each other with a common axis.
+//! Figures for papers: panels above each other with a common x-axis.
 
 use crate::table::Points;
 
-/// A figure for a paper's column.
+/// A figure as wide as a paper's column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PaperFigure {
-    /// Width of everything \[mm\].
+    /// Width of the figure \[mm\].
     pub width_mm: f64,
     /// Height of a panel \[mm\].
     pub panel_mm: f64,
-    /// Size of the type \[pt\].
+    /// Font size \[pt\].
     pub font_pt: f64,
     /// Width of the lines \[pt\].
     pub line_pt: f64,
-    /// Title for those who do not see it; it is not drawn.
+    /// Title in the file's metadata; it is not drawn.
     pub title: String,
-    /// Title of the x-axis.
+    /// Label of the x-axis.
     pub x_title: String,
-    /// Ends of the x-axis; all points if there are none.
+    /// Limits of the x-axis; `None` shows all points.
     pub x_range: Option<[f64; 2]>,
-    /// Whether the y-axes are logarithmic; what is not positive is left out then.
+    /// Whether the y-axes are logarithmic; values that are not positive are left out then.
     pub is_logarithmic: bool,
-    /// From top to bottom.
+    /// Panels from top to bottom.
     pub panels: Vec<FigurePanel>,
 }
 
 /// A panel with its own y-axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FigurePanel {
-    /// Title of the y-axis.
+    /// Label of the y-axis.
     pub y_title: String,
-    /// From back to front.
+    /// Lines from back to front.
     pub lines: Vec<PanelLine>,
 }
 
-/// What one entry of the legend stands for.
+/// Lines that share one entry of the legend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PanelLine {
     /// Name in the legend.
     pub label: String,
-    /// Red, green, blue.
+    /// Colour: red, green, blue.
     pub color: [u8; 3],
-    /// Number of its dash pattern; 0 is a solid line.
+    /// Index of the dash pattern; 0 is a solid line.
     pub dash: usize,
-    /// The lines, all alike.
+    /// Curves, all drawn in the same style.
     pub lines: Vec<Points>,
-    /// Lower and upper edge of a band over x.
+    /// Lower and upper edge of a band, each pair with its x.
     pub band: Vec<(f64, [f64; 2])>,
 }

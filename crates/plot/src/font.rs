@@ -1,27 +1,27 @@
-//! The font: widths and outlines.
+//! Widths and outlines of the font's glyphs.
 
 use afbc_drawing::{Point, TextAnchor, parts};
 use ttf_parser::{Face, OutlineBuilder};
 
-/// Latin, Greek and mathematical characters of DejaVu Sans 2.37; its licence lies beside it.
+/// Latin, Greek and mathematical characters of DejaVu Sans 2.37. The licence is in the same folder.
 const BYTES: &[u8] = include_bytes!("../font/DejaVuSans-subset.ttf");
 
-/// A piece of an outline, y downwards \[pt\].
+/// One segment of an outline \[pt\]; y points down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Stretch {
     Move(Point),
     Line(Point),
-    /// A cubic Bézier curve: two controls, end.
+    /// A cubic Bézier curve: two control points and the end.
     Curve(Point, Point, Point),
     Close,
 }
 
-/// Returns the font; none if it is damaged, which a test excludes.
+/// Returns the font, or `None` if it is damaged; a test makes sure that it is not.
 fn face() -> Option<Face<'static>> {
     Face::parse(BYTES, 0).ok()
 }
 
-/// Size of what is lowered, and how far down its base line is, both of the type's size.
+/// Size of a subscript, and distance of its base line below the text's base line; both relative to the font size.
 const LOWERED: f64 = 0.75;
 const DOWN: f64 = 0.225;
 
@@ -35,7 +35,7 @@ pub(crate) fn width_pt(text: &str, size_pt: f64) -> f64 {
     parts(text).into_iter().map(width).sum::<f64>() * size_pt / f64::from(face.units_per_em())
 }
 
-/// Returns the outlines of a text on its base line.
+/// Returns the outlines of a text whose base line goes through the given point.
 pub(crate) fn outlines(text: &str, (x, y): Point, size_pt: f64, anchor: TextAnchor, upwards: bool) -> Vec<Stretch> {
     let Some(face) = face() else { return Vec::new() };
     let full = size_pt / f64::from(face.units_per_em());
@@ -58,17 +58,17 @@ pub(crate) fn outlines(text: &str, (x, y): Point, size_pt: f64, anchor: TextAnch
     pen.stretches
 }
 
-/// Puts outlines in their place.
+/// Transforms glyph outlines from font units to their position in the drawing.
 struct Pen {
     x: f64,
     y: f64,
     upwards: bool,
-    /// Where the glyph begins along the text \[pt\].
+    /// Start of the glyph along the text \[pt\].
     along: f64,
-    /// How far its base line lies below that of the text \[pt\].
+    /// Distance of the glyph's base line below the text's base line \[pt\].
     down: f64,
     scale: f64,
-    /// Last point in the font's units.
+    /// Last point, in font units.
     last: (f32, f32),
     stretches: Vec<Stretch>,
 }
@@ -91,7 +91,8 @@ impl OutlineBuilder for Pen {
         self.stretches.push(Stretch::Line(self.place(x, y)));
     }
 
-    /// The same curve with two controls, each two thirds of the way to the only one.
+    /// Converts a quadratic curve to the equal cubic one: both its control points lie two thirds of the way from an end
+    /// to the quadratic control point.
     fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
         let (x0, y0) = self.last;
         let towards = |from: f32, to: f32| from + 2.0 / 3.0 * (to - from);
@@ -135,7 +136,7 @@ mod tests {
         assert!((lowest("H⟨H⟩") - lowest("H") - DOWN * 8.0).abs() < 1e-6);
     }
 
-    /// A text lies where its anchor says, whichever way it runs.
+    /// Texts lie where their anchor says, both horizontal and rotated.
     #[test]
     fn outlines_lie_at_their_anchor() {
         for (anchor, from) in [(TextAnchor::Start, 0.0), (TextAnchor::Middle, -0.5), (TextAnchor::End, -1.0)] {

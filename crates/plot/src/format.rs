@@ -1,4 +1,4 @@
-//! The formats of a figure.
+//! File formats of a figure.
 
 use crate::figure::PaperFigure;
 use crate::layout::laid_out;
@@ -7,22 +7,22 @@ use crate::png::png;
 use afbc_drawing::{SvgStyle, SvgUnit};
 use std::path::Path;
 
-/// How a figure is written.
+/// File format of a figure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FigureFormat {
-    /// Vectors for pages and editors.
+    /// Vector graphics for web pages and editors.
     Svg,
-    /// Vectors for LaTeX.
+    /// Vector graphics for LaTeX.
     Pdf,
-    /// Pixels.
+    /// Bitmap.
     Png {
-        /// Pixels to the inch.
+        /// Pixels per inch.
         dpi: f64,
     },
 }
 
 impl FigureFormat {
-    /// Returns the format that a file's name asks for, if it is known.
+    /// Returns the format for a file name's extension, if it is known. `dpi` applies to PNG.
     pub fn of(path: &Path, dpi: f64) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "svg" => Some(FigureFormat::Svg),
@@ -34,10 +34,10 @@ impl FigureFormat {
 }
 
 impl PaperFigure {
-    /// Returns the figure's file. The same figure gives the same bytes.
+    /// Returns the contents of the figure's file. The same figure always gives the same bytes.
     ///
     /// # Errors
-    /// One line if there is nothing to draw, or no room for it.
+    /// Fails with one line if there is nothing to draw, or not enough room.
     pub fn write(&self, format: FigureFormat) -> Result<Vec<u8>, String> {
         let drawing = laid_out(self)?;
         Ok(match format {

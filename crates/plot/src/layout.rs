@@ -1,29 +1,29 @@
-//! Where everything in a figure goes.
+//! Lays out a figure: computes the position of each of its shapes.
 
 use crate::figure::{FigurePanel, PanelLine, PaperFigure};
 use crate::font::width_pt;
 use afbc_drawing::{Drawing, PlotAxis, Point, Rgb, Shape, Stroke, TextAnchor, Ticks};
 
-/// Points in a millimetre.
+/// Points per millimetre.
 const PT_PER_MM: f64 = 72.0 / 25.4;
 const INK: Rgb = [0x1A, 0x1A, 0x1A];
 const GRID: Rgb = [0xDD, 0xDD, 0xDD];
 const FRAME_PT: f64 = 0.5;
 const GRID_PT: f64 = 0.3;
 const TICK_PT: f64 = 2.0;
-/// Opacity of a band.
+/// Opacity of a band's area.
 const BAND: f64 = 0.2;
-/// Points nearer than this to the last one drawn are not seen, and left out \[pt\].
+/// A point closer than this to the last one drawn cannot be seen and is left out \[pt\].
 const UNSEEN_PT: f64 = 0.12;
-/// Room around the values of an axis, of their range.
+/// Margin around the values of an axis, as a share of their range.
 const ROOM: f64 = 0.05;
-/// Most ticks on a y-axis, and least distance of those on the x-axis, in widths of its longest label.
+/// Most ticks of a y-axis, and least distance between ticks of the x-axis in widths of its longest label.
 const Y_TICKS: usize = 5;
 const X_APART: f64 = 1.8;
-/// Lengths on and off \[pt\].
+/// Dash patterns: lengths of dashes and gaps \[pt\].
 const DASHES: [&[f64]; 5] = [&[], &[4.0, 1.5], &[1.0, 1.2], &[5.0, 1.5, 1.0, 1.5], &[8.0, 2.0]];
 
-/// Lays out a figure.
+/// Returns the figure as a drawing in points.
 pub(crate) fn laid_out(figure: &PaperFigure) -> Result<Drawing, String> {
     let PaperFigure { font_pt, x_range, panels, is_logarithmic, .. } = figure;
     let width_pt_all = figure.width_mm * PT_PER_MM;
@@ -36,7 +36,7 @@ pub(crate) fn laid_out(figure: &PaperFigure) -> Result<Drawing, String> {
     if low >= high {
         return Err(format!("the x-axis would go from {low} to {high}; choose another --x or another range"));
     }
-    // What the y-axes need is known first, then the width of the panels.
+    // The width of the y-axes' labels comes first: the panels get the width that is left.
     let ranges: Vec<[f64; 2]> =
         panels.iter().map(|panel| range(panel, [low, high], *is_logarithmic)).collect::<Result<_, _>>()?;
     let y_ticks: Vec<Ticks> = ranges
@@ -67,7 +67,7 @@ pub(crate) fn laid_out(figure: &PaperFigure) -> Result<Drawing, String> {
     Ok(Drawing { width: width_pt_all, height: height_pt, shapes })
 }
 
-/// Draws the legend, if there is more than one entry, and returns where the panels begin.
+/// Draws the legend if there is more than one entry. Returns the y of the first panel's top.
 fn legend(figure: &PaperFigure, left_pt: f64, right_pt: f64, shapes: &mut Vec<Shape>) -> f64 {
     let font_pt = figure.font_pt;
     let mut entries: Vec<&PanelLine> = Vec::new();
@@ -100,7 +100,7 @@ fn legend(figure: &PaperFigure, left_pt: f64, right_pt: f64, shapes: &mut Vec<Sh
     y + 0.8 * font_pt
 }
 
-/// Draws grid, frame, ticks and titles of a panel.
+/// Draws a panel's grid, frame, ticks and axis labels.
 fn frame(
     figure: &PaperFigure,
     panel: &FigurePanel,
@@ -116,7 +116,8 @@ fn frame(
     };
     let widest = |ticks: &Ticks| ticks.marks().map(|(_, label)| width_pt(&label, font_pt)).fold(font_pt, f64::max);
     let most = |ticks: &Ticks| ((x.to - x.from) / (X_APART * widest(ticks))) as usize;
-    // How many fit depends on their labels, and the labels on how many there are: a guess gives the width.
+    // The number of ticks depends on the width of the labels, and the labels on the number of ticks. The labels of 8
+    // ticks give the width.
     let x_ticks = x.ticks(most(&x.ticks(8)).clamp(2, 10));
     for at in x_ticks.at.iter().map(|value| x.at(*value)) {
         line((at, y.from), (at, y.to), GRID, GRID_PT);
@@ -138,7 +139,7 @@ fn frame(
     shapes.push(text(&panel.y_title, (1.1 * font_pt, middle), font_pt, TextAnchor::Middle, true));
     if is_last {
         for (value, label) in x_ticks.marks() {
-            // A long number at the right end stays within the figure.
+            // Move a long number at the right end left, so that it stays within the figure.
             let last_pt = figure.width_mm * PT_PER_MM - 0.5 * width_pt(&label, font_pt);
             let place = (x.at(value).min(last_pt), y.from + TICK_PT + 1.1 * font_pt);
             shapes.push(text(&label, place, font_pt, TextAnchor::Middle, false));
@@ -148,14 +149,14 @@ fn frame(
     }
 }
 
-/// Draws bands, and then lines.
+/// Draws the panel's bands, then its lines.
 fn lines(figure: &PaperFigure, panel: &FigurePanel, [x, y]: [&PlotAxis; 2], shapes: &mut Vec<Shape>) {
     let within = Some([x.from, y.to, x.to, y.from]);
     let is_seen = |value: &f64| !y.is_logarithmic || *value > 0.0;
     for PanelLine { color, band, .. } in &panel.lines {
         let edge = |edge: usize| {
             let values = band.iter().filter_map(move |(at, ends)| Some((*at, *ends.get(edge)?)));
-            // A logarithmic axis has no place for zero: the band goes on to the lower end of the panel.
+            // A logarithmic axis has no zero: draw the band's edge at the lower end of the panel instead.
             values.map(|(at, value)| (x.at(at), y.at(if is_seen(&value) { value } else { y.low }))).collect::<Vec<_>>()
         };
         if band.len() > 1 {
@@ -174,7 +175,7 @@ fn lines(figure: &PaperFigure, panel: &FigurePanel, [x, y]: [&PlotAxis; 2], shap
     }
 }
 
-/// Leaves out what is not seen beside the point before; the last stays.
+/// Leaves out points that are too close to the last one kept; the very last point stays.
 fn thinned(places: impl Iterator<Item = Point>) -> Vec<Point> {
     let mut kept: Vec<Point> = Vec::new();
     let mut last = None;
@@ -202,7 +203,7 @@ fn xs(line: &PanelLine) -> impl Iterator<Item = f64> {
     line.lines.iter().flatten().map(|(x, _)| *x)
 }
 
-/// Returns the smallest and the largest of some numbers.
+/// Returns the smallest and the largest number.
 fn extent(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
     values.fold(None, |extent, value| {
         let [low, high] = extent.unwrap_or([value, value]);
@@ -210,7 +211,7 @@ fn extent(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
     })
 }
 
-/// Returns the range of a panel's y-axis, with room around the values within the x-axis.
+/// Returns the range of a panel's y-axis: the values within the x-range, with a margin.
 fn range(panel: &FigurePanel, [from, to]: [f64; 2], is_logarithmic: bool) -> Result<[f64; 2], String> {
     let is_shown = |x: f64| (from..=to).contains(&x);
     let lines = panel.lines.iter().flat_map(|line| line.lines.iter().flatten().map(|(x, y)| (*x, *y)));
@@ -224,7 +225,7 @@ fn range(panel: &FigurePanel, [from, to]: [f64; 2], is_logarithmic: bool) -> Res
         let room = libm::pow((high / low).max(1.2), ROOM);
         return Ok([low / room, high * room]);
     }
-    // A constant has no range, and a constant of zero no size either.
+    // The margin is positive even for a constant, also for a constant of zero.
     let least = if low == 0.0 && high == 0.0 { 1.0 } else { 1e-9 };
     let room = (ROOM * (high - low)).max(1e-3 * low.abs().max(high.abs())).max(least);
     Ok([low - room, high + room])

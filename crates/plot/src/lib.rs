@@ -1,8 +1,9 @@
-//! Figures for a paper from logs: columns of CSV, Parquet, ULog and MCAP files, as SVG, PDF or PNG of a given width.
+//! Draws figures for papers from logs: columns of CSV, Parquet, ULog and MCAP files as SVG, PDF or PNG of a given
+//! width.
 //!
-//! A [`PaperFigure`] is laid out as a drawing in points of 1/72 inch, which each format writes in its own way.
-//! Text is measured by the font in `font/`, whose outlines PDF and PNG draw: no fonts of the machine are used, so the
-//! same figure has the same bytes everywhere, and nothing is left to embed.
+//! A [`PaperFigure`] is laid out as a drawing in points of 1/72 inch, and each format writes this drawing. The font in
+//! `font/` measures all texts and gives their outlines in PDF and PNG. No system fonts are used, so the same figure has
+//! the same bytes on every machine, and no fonts are embedded.
 #![forbid(unsafe_code)]
 
 mod band;

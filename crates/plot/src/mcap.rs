@@ -1,4 +1,4 @@
-//! MCAP files whose messages are as ROS 2 writes them (CDR, schemas in `ros2msg`); ULogs by way of them.
+//! Reads MCAP files with ROS 2 messages (CDR, schemas in `ros2msg`). ULog files are converted to MCAP first.
 
 use crate::table::LogTable;
 use ::mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -9,22 +9,23 @@ use std::io::Cursor;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Name of the column of a message's time since the first of the log \[s\].
+/// Name of the column with the time since the log's first message \[s\].
 const TIME: &str = "time_s";
-/// Deepest nesting of messages, and longest sequence that becomes columns.
+/// Deepest nesting of messages, and most elements of an array that become columns.
 const DEPTH: usize = 8;
 const LONGEST: usize = 64;
-/// Most fields of a message that are looked at, those of messages in it among them: ten of eight deep would be 10^8.
+/// Most fields of a message that are read, including those of nested messages. Ten fields at each of eight levels would
+/// be 10^8.
 const FIELDS: u32 = 100_000;
 
-/// Reads a ULog.
+/// Reads a ULog file.
 pub(crate) fn read_ulog(path: &Path) -> Result<Vec<LogTable>, FileError> {
     let mut bytes = Vec::new();
     afbc_replay::mcap::convert(path, Cursor::new(&mut bytes))?;
     read(&bytes).map_err(|problem| FileError::whole(&path.display().to_string(), problem))
 }
 
-/// Reads the topics of a file; those that are written otherwise are left out.
+/// Reads the topics of an MCAP file. Topics in another encoding are left out.
 pub(crate) fn read(bytes: &[u8]) -> Result<Vec<LogTable>, String> {
     let mut topics: BTreeMap<u16, Option<(Layout, Topic)>> = BTreeMap::new();
     let mut start = None;
@@ -53,7 +54,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Vec<LogTable>, String> {
     Ok(tables)
 }
 
-/// Checks that a file is whole, by the checksums in it.
+/// Checks by the file's checksums that it is complete and undamaged.
 pub(crate) fn check(mut bytes: &[u8]) -> Result<(), String> {
     let options = LinearReaderOptions::default().with_validate_chunk_crcs(true).with_validate_data_section_crc(true);
     let mut reader = LinearReader::new_with_options(options);
@@ -68,7 +69,7 @@ pub(crate) fn check(mut bytes: &[u8]) -> Result<(), String> {
     Ok(())
 }
 
-/// Says why a file is not drawn, and what helps: one that is not whole is not drawn as if it were.
+/// Says why a file is refused, and what helps. A damaged or cut file is never drawn in part.
 fn refused(error: McapError) -> String {
     match error {
         McapError::UnsupportedCompression(by) => {
@@ -81,12 +82,12 @@ fn refused(error: McapError) -> String {
     }
 }
 
-/// The columns of a topic while it is read.
+/// Columns of a topic while the file is read.
 #[derive(Default)]
 struct Topic {
     times_s: Vec<f64>,
     columns: Vec<(String, Vec<f64>)>,
-    /// Where in them each name is.
+    /// Index in `columns` of each name.
     places: HashMap<String, usize>,
 }
 
@@ -95,7 +96,7 @@ impl Topic {
         let before = self.times_s.len();
         self.times_s.push(time_s);
         for (place, (name, value)) in values.into_iter().enumerate() {
-            // Usually each message has the same fields.
+            // Fast path: most messages have the same fields in the same order.
             let known = self.columns.get(place).filter(|(known, _)| *known == name).map(|_| place);
             let known = known.or_else(|| self.places.get(&name).copied()).unwrap_or_else(|| {
                 self.places.insert(name.clone(), self.columns.len());
@@ -117,10 +118,10 @@ impl Topic {
     }
 }
 
-/// How the messages of a topic are laid out.
+/// Field layout of a topic's messages.
 struct Layout {
     topic: String,
-    /// Fields of the message, and of those in it by the last part of their names.
+    /// Fields of each message type, by the last part of its name; the topic's own message has the empty name.
     messages: BTreeMap<String, Vec<FieldLayout>>,
 }
 
@@ -128,7 +129,7 @@ struct Layout {
 struct FieldLayout {
     name: String,
     kind: String,
-    /// How many of a fixed array, or 0 for a sequence; none for a single one.
+    /// Length of an array, or `Some(0)` for a sequence; `None` for a single value.
     many: Option<usize>,
 }
 
@@ -149,7 +150,7 @@ impl Layout {
             } else if let Some((kind, rest)) = line.split_once(char::is_whitespace)
                 && let Some(fields) = messages.get_mut(&current)
             {
-                // A constant has a value and no place; a default stands behind the name.
+                // A constant ("=") takes no space in the message. A default value follows the name and is ignored.
                 let name = rest.split_whitespace().next().unwrap_or_default();
                 if !rest.contains('=') && !name.is_empty() {
                     fields.push(FieldLayout::new(kind, name));
@@ -159,10 +160,10 @@ impl Layout {
         Some(Layout { topic: channel.topic.trim_start_matches('/').to_owned(), messages })
     }
 
-    /// Returns the numbers of a message with their names, up to where it ends too early or has what is not known.
+    /// Returns the numbers of a message with their names. Stops at the end of the data or at an unknown type.
     fn values(&self, data: &[u8]) -> Vec<(String, f64)> {
         let mut values = Vec::new();
-        // Behind the four bytes that say how it is encoded; the second is odd for the usual order of bytes.
+        // The first four bytes give the encoding; the second is odd for little-endian.
         if let Some((head, body)) = data.split_at_checked(4)
             && head.get(1).is_some_and(|kind| kind % 2 == 1)
         {
@@ -203,7 +204,7 @@ impl Layout {
                     }
                     other => self.message(last(other), &format!("{name}."), reader, values, depth + 1)?,
                 }
-                // However many there are said to be: what takes no room has no number.
+                // Elements without any bytes hold no numbers: stop, however many the message announces.
                 if reader.at == before {
                     break;
                 }
@@ -216,44 +217,44 @@ impl Layout {
 impl FieldLayout {
     fn new(kind: &str, name: &str) -> Self {
         let (kind, many) = match kind.split_once('[') {
-            // `[3]` is an array, `[]` and `[<=3]` are sequences.
+            // `[3]` is an array; `[]` and `[<=3]` are sequences.
             Some((kind, count)) => (kind, Some(count.trim_end_matches(']').parse().unwrap_or(0))),
             None => (kind, None),
         };
-        // A string may have a longest length.
+        // A string type may have a maximum length: `string<=9`.
         let kind = if kind.starts_with("string") { "string" } else { kind };
         FieldLayout { name: name.into(), kind: kind.into(), many }
     }
 }
 
-/// Returns the last part of a message's name.
+/// Returns the last part of a message type's name.
 fn last(name: &str) -> &str {
     name.rsplit('/').next().unwrap_or(name)
 }
 
-/// Returns the length of a number \[bytes\].
+/// Returns the size of a numeric type \[bytes\]; `None` for other types.
 fn size(kind: &str) -> Option<usize> {
     Some(match kind {
         "bool" | "byte" | "char" | "int8" | "uint8" => 1,
         "int16" | "uint16" => 2,
         "int32" | "uint32" | "float32" => 4,
         "int64" | "uint64" | "float64" => 8,
-        // Two 32-bit numbers, read as its seconds with their fraction.
+        // Two 32-bit numbers, seconds and nanoseconds, read as one number of seconds.
         "time" | "duration" | "builtin_interfaces/Time" | "builtin_interfaces/Duration" => 8,
         _ => return None,
     })
 }
 
-/// The body of a message in the Common Data Representation, version 1.
+/// Reads the body of a message in the Common Data Representation, version 1.
 struct CdrReader<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// Fields that may still be looked at.
+    /// Number of fields that may still be read.
     fields: u32,
 }
 
 impl CdrReader<'_> {
-    /// Returns the next number, which begins at a multiple of its length.
+    /// Returns the next number, which is aligned to its size.
     fn number(&mut self, kind: &str) -> Option<f64> {
         let length = size(kind)?;
         let is_time = kind.ends_with("ime") || kind.ends_with("uration");
@@ -283,7 +284,7 @@ impl CdrReader<'_> {
         })
     }
 
-    /// Passes a text: its length, its bytes.
+    /// Skips a string: its length and its bytes.
     fn text(&mut self) -> Option<()> {
         let length = self.number("uint32")? as usize;
         self.at = self.at.checked_add(length).filter(|end| *end <= self.bytes.len())?;

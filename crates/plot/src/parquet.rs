@@ -1,4 +1,4 @@
-//! Parquet files without nested columns.
+//! Reads Parquet files without nested columns.
 
 use crate::table::LogTable;
 use ::parquet::errors::ParquetError;
@@ -6,7 +6,7 @@ use ::parquet::file::reader::{FileReader, SerializedFileReader};
 use ::parquet::record::Field;
 use bytes::Bytes;
 
-/// A column while it is read: of words if a row has some.
+/// A column while it is read; it becomes a column of words if any row has a word.
 #[derive(Default)]
 struct Column {
     numbers: Vec<f64>,
@@ -14,7 +14,7 @@ struct Column {
     has_words: bool,
 }
 
-/// Reads the only table of a file.
+/// Reads the file's only table.
 pub(crate) fn read(bytes: Vec<u8>) -> Result<Vec<LogTable>, String> {
     rows(bytes).map(|table| vec![table]).map_err(|error| {
         format!("cannot be read as Parquet ({error}); write it uncompressed or with Snappy, without nested columns")
@@ -44,7 +44,7 @@ fn rows(bytes: Vec<u8>) -> Result<LogTable, ParquetError> {
     Ok(table)
 }
 
-/// Returns a field as a number, or as a word.
+/// Returns a field as a number or as a word; NaN if it is neither.
 fn value(field: &Field) -> (f64, Option<String>) {
     let number = match field {
         Field::Bool(value) => f64::from(u8::from(*value)),

@@ -1,4 +1,4 @@
-//! A figure as PDF: vectors only, no fonts to embed.
+//! Writes a figure as PDF: vector graphics without embedded fonts.
 
 use crate::font::{Stretch, outlines};
 use afbc_drawing::{Drawing, Rgb, Shape};
@@ -6,12 +6,12 @@ use miniz_oxide::deflate::compress_to_vec_zlib;
 use pdf_writer::types::LineJoinStyle;
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect, Ref, TextStr};
 
-/// Writes a figure on a page of its size.
+/// Writes a figure on a page of the figure's size.
 pub(crate) fn pdf(drawing: &Drawing, title: &str) -> Vec<u8> {
     let [catalog, pages, page, contents, info] = [1, 2, 3, 4, 5].map(Ref::new);
     let mut opacities: Vec<f64> = Vec::new();
     let mut content = Content::new();
-    // Y upwards there.
+    // In PDF, y points up.
     content.transform([1.0, 0.0, 0.0, -1.0, 0.0, drawing.height as f32]);
     content.set_line_join(LineJoinStyle::RoundJoin);
     for shape in &drawing.shapes {
@@ -35,7 +35,7 @@ pub(crate) fn pdf(drawing: &Drawing, title: &str) -> Vec<u8> {
     states.finish();
     resources.finish();
     own.finish();
-    // Level 6 is zlib's usual one.
+    // Level 6 is zlib's default.
     let compressed = compress_to_vec_zlib(&content.finish(), 6);
     pdf.stream(contents, &compressed).filter(Filter::FlateDecode);
     pdf.document_info(info).title(TextStr(title)).creator(TextStr("sitl plot"));
@@ -43,7 +43,7 @@ pub(crate) fn pdf(drawing: &Drawing, title: &str) -> Vec<u8> {
 }
 
 fn draw(content: &mut Content, shape: &Shape, opacities: &mut Vec<f64>) {
-    // In PDF a clip can only be taken back with the state that was saved before it.
+    // PDF can only remove a clip by restoring a saved state.
     content.save_state();
     match shape {
         Shape::Line { points, stroke, within } => {
@@ -63,7 +63,7 @@ fn draw(content: &mut Content, shape: &Shape, opacities: &mut Vec<f64>) {
             path(content, points);
             content.close_path().fill_nonzero();
         }
-        // The font has one weight.
+        // The font has no bold variant.
         Shape::Text { text, place, size, anchor, color: rgb, upwards, is_bold: _ } => {
             let [r, g, b] = color(*rgb);
             content.set_fill_rgb(r, g, b);
@@ -83,7 +83,7 @@ fn draw(content: &mut Content, shape: &Shape, opacities: &mut Vec<f64>) {
     content.restore_state();
 }
 
-/// Lets what is below be seen through what is drawn next.
+/// Sets the opacity of the shapes that are drawn next.
 fn veil(content: &mut Content, opacity: f64, opacities: &mut Vec<f64>) {
     if opacity < 1.0 {
         let place = opacities.iter().position(|other| *other == opacity).unwrap_or_else(|| {

@@ -1,15 +1,15 @@
-//! A figure as PNG.
+//! Writes a figure as PNG.
 
 use crate::font::{Stretch, outlines};
 use afbc_drawing::{Drawing, Point, Shape};
 use tiny_skia::{Color, FillRule, LineJoin, Mask, Paint, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
 
-/// Points to the inch.
+/// Points per inch.
 const POINTS: f64 = 72.0;
-/// Most pixels along a side.
+/// Most pixels along one side.
 const LONGEST_PX: f64 = 20_000.0;
 
-/// Draws a figure with so many pixels to the inch.
+/// Draws a figure at `dpi` pixels per inch.
 pub(crate) fn png(drawing: &Drawing, dpi: f64) -> Result<Vec<u8>, String> {
     let scale = dpi / POINTS;
     let [width, height] = [drawing.width, drawing.height].map(|length| (length * scale).round().max(1.0));
@@ -45,7 +45,7 @@ fn draw(pixels: &mut Pixmap, shape: &Shape, transform: Transform) {
                 pixels.fill_path(&path, &paint, FillRule::Winding, transform, mask.as_ref());
             }
         }
-        // The font has one weight.
+        // The font has no bold variant.
         Shape::Text { text, place, size, anchor, color: [r, g, b], upwards, is_bold: _ } => {
             paint.set_color_rgba8(*r, *g, *b, 255);
             let mut path = PathBuilder::new();
@@ -78,7 +78,7 @@ fn path(points: &[Point], closed: bool) -> PathBuilder {
     path
 }
 
-/// Returns what is visible within a box.
+/// Returns a clip mask for a box.
 fn mask(pixels: &Pixmap, within: &Option<[f64; 4]>, transform: Transform) -> Option<Mask> {
     let [left, top, right, bottom] = within.as_ref()?.map(|end| end as f32);
     let mut mask = Mask::new(pixels.width(), pixels.height())?;

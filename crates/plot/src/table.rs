@@ -1,26 +1,27 @@
-//! Tables of numbers and words.
+//! Tables of numeric and word columns.
 
-/// Points of a line, x and y; none of them is NaN.
+/// Points (x, y) of a line, none of them NaN.
 pub type Points = Vec<(f64, f64)>;
 
-/// Columns of the same length: a file of one table, or a topic of a log, with which its columns' names begin.
+/// Columns of equal length: one table of a file, or one topic of a log. A topic's name is the prefix of its columns'
+/// names.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LogTable {
-    /// Name of the topic; empty for a file of one table.
+    /// Name of the topic; empty for a file with a single table.
     pub topic: String,
-    /// Numbers; NaN where there is none.
+    /// Numeric columns; NaN marks a missing number.
     pub numbers: Vec<(String, Vec<f64>)>,
-    /// Words, such as the contender.
+    /// Word columns, such as the contender.
     pub words: Vec<(String, Vec<String>)>,
 }
 
 impl LogTable {
-    /// Returns the name of a column, with that of its topic.
+    /// Returns a column's name with its topic as prefix.
     pub(crate) fn full(&self, column: &str) -> String {
         if self.topic.is_empty() { column.into() } else { format!("{}.{column}", self.topic) }
     }
 
-    /// Returns a column by that name.
+    /// Returns the numeric column with this full name.
     pub(crate) fn column(&self, full: &str) -> Option<&[f64]> {
         self.numbers.iter().find(|(name, _)| self.full(name) == full).map(|(_, values)| values.as_slice())
     }

@@ -1,6 +1,6 @@
-//! Titles of axes from names of columns.
+//! Axis titles made from column names.
 
-/// Ends of names, the longest first, and the units that they say.
+/// Suffixes of column names and the units they stand for. A suffix comes before every suffix that it ends with.
 const UNITS: [(&str, &str); 24] = [
     ("_rad_s2", "rad/s²"),
     ("_m_s2", "m/s²"),
@@ -28,7 +28,7 @@ const UNITS: [(&str, &str); 24] = [
     ("_w", "W"),
 ];
 
-/// Returns a column's name as the title of an axis, with its unit in brackets: "vx \[m/s\]" of `vx_m_s`.
+/// Turns a column's name into an axis title with the unit in brackets: `vx_m_s` becomes "vx \[m/s\]".
 pub fn axis_title(column: &str) -> String {
     let known = UNITS.iter().find_map(|(end, unit)| Some((column.strip_suffix(end)?, unit)));
     match known.filter(|(name, _)| !name.is_empty()) {
@@ -55,7 +55,7 @@ mod tests {
         ] {
             assert_eq!(axis_title(column), title);
         }
-        // Of two ends that fit, the longer comes first.
+        // If two suffixes fit, the longer one must come first.
         for (place, (end, _)) in UNITS.iter().enumerate() {
             assert!(UNITS.iter().take(place).all(|(earlier, _)| !end.ends_with(earlier)), "{end}");
         }

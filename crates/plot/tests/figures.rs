@@ -1,4 +1,4 @@
-//! Figures as they are written: of the size asked for, with everything within, and the same in every format.
+//! Figures have the requested size, everything lies within them, and all formats show the same.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)]
 
 use afbc_plot::{FigureFormat, FigurePanel, LogColumns, PanelLine, PaperFigure};
@@ -44,7 +44,7 @@ fn folder() -> PathBuf {
     folder
 }
 
-/// Returns the number of an attribute.
+/// Returns the value of a numeric attribute.
 fn number(node: roxmltree::Node<'_, '_>, name: &str) -> f64 {
     node.attribute(name).unwrap().trim_end_matches("pt").parse().unwrap()
 }
@@ -79,7 +79,8 @@ fn everything_lies_within_the_width_asked_for() {
     }
 }
 
-/// Constants, noise about one, and narrow times: each axis has two labels or more, all within the figure.
+/// Constants, values that nearly are constant, and narrow time ranges: each axis has at least two labels, all within
+/// the figure.
 #[test]
 fn every_axis_has_ticks_within_the_figure() {
     for (value, width_mm, [from, to]) in
@@ -98,7 +99,7 @@ fn every_axis_has_ticks_within_the_figure() {
                 upright.filter(|node| node.attribute("text-anchor") == Some(anchor)).collect()
             };
             assert!(labels("end").len() >= 2, "{value}: {text}");
-            // The title is one of those in the middle.
+            // One of the centred texts is the axis title.
             assert!(labels("middle").len() >= 3, "{from} to {to}: {text}");
             for label in labels("middle") {
                 let half = 0.29 * number(label, "font-size") * label.text().unwrap().chars().count() as f64;
@@ -108,7 +109,7 @@ fn every_axis_has_ticks_within_the_figure() {
     }
 }
 
-/// The line's highest point is at the top of the panel, and half the range as far down as it should be.
+/// The line's maximum lies at the top of the panel, and a quarter of the range lies a quarter of the way up.
 #[test]
 fn values_lie_where_the_axis_says() {
     let points = vec![(0.0, 0.0), (5.0, 1.0), (10.0, 0.25)];
@@ -128,7 +129,7 @@ fn values_lie_where_the_axis_says() {
     assert!((top[0] - 0.5 * (first[0] + last[0])).abs() < 0.02);
     let share = (first[1] - last[1]) / (first[1] - top[1]);
     assert!((share - 0.25).abs() < 1e-3, "{share}");
-    // The axis has 5 % of room on both sides: the panel is 30 mm high.
+    // The axis has a margin of 5 % on both sides, and the panel is 30 mm high.
     let height = (first[1] - top[1]) * 1.1;
     assert!((height * 25.4 / 72.0 - 30.0).abs() < 0.02, "{height}");
 }
@@ -142,7 +143,7 @@ fn a_pdf_has_its_size_and_no_fonts_to_embed() {
     let ends: Vec<f64> = page.split_whitespace().map(|end| end.parse().unwrap()).collect();
     assert!((ends[2] * 25.4 / 72.0 - 88.0).abs() < 0.01, "{page}");
     assert!(!text.contains("/Font"));
-    // Each object lies where the table at the end says.
+    // Each object is at the offset that the cross-reference table says.
     let table = text.rsplit("xref\n").nth(1).unwrap();
     let places = table.lines().filter(|line| line.ends_with(" n") || line.ends_with(" n "));
     let objects = places.map(|line| line.split(' ').next().unwrap().parse::<usize>().unwrap());
@@ -169,7 +170,7 @@ fn a_png_has_its_pixels_and_shows_the_line() {
     let red = share(&|pixel| pixel == RED);
     assert!((0.002..0.05).contains(&red), "{red}");
     assert!(share(&|pixel| pixel == [255; 3]) > 0.4, "paper");
-    // The band, a fifth of the colour on white.
+    // Colour of the band: a fifth of the line's colour on white.
     let band = RED.map(|part| (255.0 + 0.2 * (f64::from(part) - 255.0)).round());
     let near = |pixel: [u8; 3]| pixel.iter().zip(band).all(|(part, band)| (f64::from(*part) - band).abs() < 3.0);
     assert!(share(&near) > 0.02);
@@ -193,7 +194,7 @@ fn what_cannot_be_drawn_is_refused() {
     assert!(negative.write(FigureFormat::Svg).unwrap_err().contains("positive"));
 }
 
-/// Semicolons with decimal commas, as spreadsheets write where a comma is decimal, and tabs.
+/// Semicolons with decimal commas, as spreadsheets write them in some countries, and tabs.
 #[test]
 fn a_log_may_be_separated_otherwise() {
     let folder = folder();

@@ -1,4 +1,4 @@
-//! MCAP files by others, whole, damaged, and made to take long.
+//! MCAP files by other programs: intact, damaged, and built to take a long time.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_plot::LogColumns;
@@ -11,7 +11,7 @@ use std::fs;
 use std::io::Cursor;
 use std::path::PathBuf;
 
-/// Returns a file with messages of one topic, a millisecond apart.
+/// Returns an MCAP file with messages of one topic at intervals of one millisecond.
 fn file(schema: &str, encoding: &str, messages: &[Vec<u8>]) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     let mut writer = WriteOptions::new().compression(None).create(&mut bytes).unwrap();
@@ -27,7 +27,7 @@ fn file(schema: &str, encoding: &str, messages: &[Vec<u8>]) -> Vec<u8> {
     bytes.into_inner()
 }
 
-/// Returns a message by the Common Data Representation, with the order of bytes that is usual.
+/// Returns a message in the Common Data Representation, little-endian.
 fn message(body: &[u8]) -> Vec<u8> {
     [&[0, 1, 0, 0], body].concat()
 }
@@ -38,7 +38,7 @@ fn path(name: &str) -> PathBuf {
     folder.join(format!("{name}-{:?}.mcap", std::thread::current().id()))
 }
 
-/// Reads what is written; if it is refused, in one line that names the file.
+/// Writes `bytes` to a file and reads it. A refusal must be one line that names the file.
 fn read(name: &str, bytes: &[u8]) -> Option<LogColumns> {
     let path = path(name);
     fs::write(&path, bytes).unwrap();
@@ -56,7 +56,7 @@ const SCHEMA: &str = "uint8 kind\nfloat64[2] values\npkg/Part part\nstring<=9 na
     ================\nMSG: pkg/Part\nfloat32 share\nbool is_there\n";
 
 fn body(kind: u8, more: &[i16]) -> Vec<u8> {
-    // Each number begins at a multiple of its length.
+    // Each number is aligned to its size.
     let mut body = vec![kind, 0, 0, 0, 0, 0, 0, 0];
     [1.5_f64, -2.5].iter().for_each(|value| body.extend(value.to_le_bytes()));
     body.extend(0.25_f32.to_le_bytes());
@@ -81,10 +81,10 @@ fn numbers_are_where_the_schema_has_them() {
     }
 }
 
-/// Messages in messages, however many are said to be there, end soon.
+/// Huge numbers of nested messages are read quickly.
 #[test]
 fn what_would_take_for_ever_does_not() {
-    // A hundred fields of a hundred fields, seven deep, of messages that take no room.
+    // Seven levels of a hundred fields each, whose innermost messages are empty.
     let mut deep = String::new();
     for depth in 0..8 {
         if depth > 0 {
@@ -106,7 +106,7 @@ fn what_would_take_for_ever_does_not() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
-    /// Any bytes in the place of some, and a file that is cut, are read or refused in one line.
+    /// A file with some bytes replaced, and cut anywhere, is either read or refused in one line.
     #[test]
     fn damage_is_borne(
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..20), cut: prop::sample::Index,
@@ -121,7 +121,7 @@ proptest! {
         read("damaged", &bytes);
     }
 
-    /// Any schema and any messages.
+    /// Any schema with any messages is read or refused in one line.
     #[test]
     fn any_messages_are_borne(
         schema in "((bool|float32|float64|int64|string|pkg/Kind|time)(\\[\\]|\\[[0-9]{1,9}\\])? [a-c]\n){0,6}",
