@@ -1,24 +1,24 @@
-//! An axis: where values lie.
+//! Linear and logarithmic axes that map values to lengths.
 
 use crate::ticks::Ticks;
 
-/// An axis of a panel.
+/// One axis of a panel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlotAxis {
-    /// Value at the lower end.
+    /// Value at the axis's lower end.
     pub low: f64,
-    /// Value at the upper end.
+    /// Value at the axis's upper end.
     pub high: f64,
-    /// Where the lower end is drawn.
+    /// Position of the lower end in the drawing.
     pub from: f64,
-    /// Where the upper end is drawn.
+    /// Position of the upper end in the drawing.
     pub to: f64,
-    /// Whether equal ratios have equal lengths; both ends are positive then.
+    /// Whether the axis is logarithmic; `low` and `high` must be positive then.
     pub is_logarithmic: bool,
 }
 
 impl PlotAxis {
-    /// Returns where a value is drawn.
+    /// Returns a value's position in the drawing.
     pub fn at(&self, value: f64) -> f64 {
         let share = if self.is_logarithmic {
             libm::log10(value / self.low) / libm::log10(self.high / self.low)
@@ -28,7 +28,7 @@ impl PlotAxis {
         self.from + share * (self.to - self.from)
     }
 
-    /// Returns about `most` ticks or fewer, but two at least.
+    /// Returns at least two ticks, and `most` or slightly more at most.
     pub fn ticks(&self, most: usize) -> Ticks {
         if self.is_logarithmic {
             Ticks::logarithmic(self.low, self.high, most)

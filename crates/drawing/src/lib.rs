@@ -1,7 +1,7 @@
-//! Drawings: what every figure is made of, whoever draws it, and their SVG.
+//! Shapes, axes and SVG output that every figure of the project shares.
 //!
-//! A [`Drawing`] is a list of shapes in a length of its author's choice, pixels or points. Axes and their ticks are
-//! here, too, so that every figure has the same. Formats that need a font or pixels are `afbc-plot`'s.
+//! A [`Drawing`] is a list of shapes. Their lengths are in pixels or points, as the author chooses. Formats that need a
+//! font or pixels (PDF, PNG) are in `afbc-plot`.
 #![forbid(unsafe_code)]
 
 mod axis;

@@ -1,100 +1,100 @@
-//! What a figure is drawn from: lengths in a unit of the drawing's own, y downwards.
+//! Shapes that a figure consists of. Lengths have the drawing's own unit; y points down.
 
-/// Red, green, blue.
+/// A colour: red, green, blue.
 pub type Rgb = [u8; 3];
 
-/// A point: right and down.
+/// A point: x to the right, y down.
 pub type Point = (f64, f64);
 
-/// Colour of what is drawn on.
+/// Background colour.
 pub const PAPER: Rgb = [0xFF; 3];
 
-/// How a line is drawn.
+/// Style of a line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stroke {
-    /// Its colour.
+    /// Colour of the line.
     pub color: Rgb,
-    /// Its width.
+    /// Width of the line.
     pub width: f64,
-    /// 0 for what is not seen to 1 for what hides all below.
+    /// Opacity from 0 (invisible) to 1 (hides everything below).
     pub opacity: f64,
-    /// Lengths on and off; empty for a solid line.
+    /// Lengths of dashes and gaps; empty for a solid line.
     pub dashes: Vec<f64>,
 }
 
 impl Stroke {
-    /// Returns a solid line that hides what is below.
+    /// Returns an opaque solid line.
     pub fn solid(color: Rgb, width: f64) -> Self {
         Stroke { color, width, opacity: 1.0, dashes: Vec::new() }
     }
 }
 
-/// Where the given place of a text is.
+/// Part of a text that lies at the text's given position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TextAnchor {
-    /// At its beginning.
+    /// The beginning of the text.
     Start,
-    /// In its middle.
+    /// The middle of the text.
     Middle,
-    /// At its end.
+    /// The end of the text.
     End,
 }
 
-/// A part of a figure.
+/// One shape of a figure.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
-    /// A line through points.
+    /// A polyline.
     Line {
-        /// From its beginning to its end.
+        /// Points from the beginning to the end.
         points: Vec<Point>,
-        /// How it is drawn.
+        /// Style of the line.
         stroke: Stroke,
-        /// What is seen of it lies within this box, if any: left, top, right, bottom.
+        /// Box that clips the line, if any: left, top, right, bottom.
         within: Option<[f64; 4]>,
     },
-    /// A filled area.
+    /// A filled polygon.
     Area {
-        /// Its corners.
+        /// Corners of the polygon.
         points: Vec<Point>,
-        /// Its colour.
+        /// Fill colour.
         color: Rgb,
-        /// As that of a line.
+        /// Opacity from 0 (invisible) to 1 (hides everything below).
         opacity: f64,
-        /// As that of a line.
+        /// Box that clips the polygon, if any: left, top, right, bottom.
         within: Option<[f64; 4]>,
     },
-    /// A text; `⟨d⟩` in it is a lowered d.
+    /// A text. The part between `⟨` and `⟩` is a subscript.
     Text {
-        /// The words.
+        /// Words of the text.
         text: String,
-        /// Where its anchor lies on its base line.
+        /// Position of the anchor, on the text's base line.
         place: Point,
-        /// Size of the type.
+        /// Font size.
         size: f64,
-        /// What of it lies at the place.
+        /// Part of the text that lies at `place`.
         anchor: TextAnchor,
-        /// Its colour.
+        /// Colour of the text.
         color: Rgb,
-        /// Whether it is turned to run upwards.
+        /// Whether the text is rotated to run upwards.
         upwards: bool,
-        /// Whether it is bold, where the format's fonts are.
+        /// Whether the text is bold; formats without a bold font ignore this.
         is_bold: bool,
     },
 }
 
-/// A laid out figure.
+/// A figure whose shapes all have their positions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawing {
-    /// Width of everything.
+    /// Width of the drawing.
     pub width: f64,
-    /// Height of everything.
+    /// Height of the drawing.
     pub height: f64,
-    /// From back to front.
+    /// Shapes from back to front.
     pub shapes: Vec<Shape>,
 }
 
-/// Returns the parts of a text, each with whether it is lowered, without the brackets that say so; what is not lowered
-/// comes first, if empty, and between any two that are.
+/// Splits a text into parts, each with whether it is a subscript. The brackets `⟨` and `⟩` are removed. Parts alternate
+/// and begin with normal text, which may be empty.
 pub fn parts(text: &str) -> Vec<(&str, bool)> {
     let (mut parts, mut rest) = (Vec::new(), text);
     while let Some((before, (lower, after))) =

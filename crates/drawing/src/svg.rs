@@ -1,34 +1,35 @@
-//! A drawing as SVG, its text as text.
+//! Writes a drawing as SVG; texts stay texts.
 
 use crate::shape::{Drawing, PAPER, Point, Rgb, Shape, TextAnchor, parts};
 use core::fmt::Write;
 
-/// The drawing's unit of length.
+/// Unit of the drawing's lengths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SvgUnit {
-    /// Points of 1/72 inch, written to the hundredth.
+    /// Points of 1/72 inch, written with two decimals.
     Point,
-    /// Pixels, written as whole quarters: shorter than decimals, and finer than anybody sees.
+    /// Pixels, written as integers in quarters of a pixel; shorter than decimals, and finer than anybody sees.
     Pixel,
 }
 
-/// How a drawing is written.
+/// Options of the SVG output.
 #[derive(Clone, Copy, Debug)]
 pub struct SvgStyle<'a> {
-    /// Title for those who do not see it.
+    /// Title that screen readers read out.
     pub title: &'a str,
-    /// Unit of the drawing.
+    /// Unit of the drawing's lengths.
     pub unit: SvgUnit,
-    /// Names of fonts, the first that a reader has.
+    /// Font families in order of preference.
     pub fonts: &'a str,
-    /// Width of an outline in the colour of the paper, which separates text from what lies below it; 0 for none.
+    /// Width of an outline of the texts in the background colour, which separates a text from the shapes below it; 0
+    /// for none.
     pub halo: f64,
-    /// Colours, each with its variant for readers who prefer a dark screen; on paper the first is used.
+    /// Pairs of a colour and its replacement in dark mode on a screen. Print always uses the first colour.
     pub dark: &'a [[Rgb; 2]],
 }
 
 impl Drawing {
-    /// Returns the drawing as a file.
+    /// Returns the drawing as an SVG file.
     pub fn svg(&self, style: &SvgStyle<'_>) -> String {
         let writer = Writer::new(style, &self.shapes);
         let mut body = format!("<rect width=\"100%\" height=\"100%\" fill=\"{}\"/>\n", hex(PAPER));
@@ -51,7 +52,7 @@ impl Drawing {
     }
 }
 
-/// Returns the rules that switch the colours of a body to those for the dark; nothing without any.
+/// Returns a style sheet that replaces the body's colours in dark mode; empty if no colour has a replacement.
 fn dark(variants: &[[Rgb; 2]], body: &str) -> String {
     let mut rules = String::new();
     for [light, dark] in variants.iter().map(|pair| pair.map(hex)) {
@@ -67,14 +68,14 @@ fn dark(variants: &[[Rgb; 2]], body: &str) -> String {
     format!("<style>@media screen and (prefers-color-scheme:dark){{{rules}}}</style>\n")
 }
 
-/// Writes shapes in the file's unit.
+/// Writes shapes in the unit of the file.
 struct Writer {
-    /// Boxes that shapes lie within, each once: shapes refer to them by their place.
+    /// Distinct clip boxes. Shapes refer to a box by its index.
     boxes: Vec<[f64; 4]>,
-    /// Written units in the drawing's.
+    /// Units of the file per unit of the drawing.
     steps: f64,
     decimals: usize,
-    /// Attributes of every text.
+    /// SVG attributes that every text gets.
     halo: String,
 }
 
@@ -101,12 +102,12 @@ impl Writer {
         Writer { boxes, steps, decimals, halo }
     }
 
-    /// Returns a length of a place.
+    /// Formats a coordinate in the unit of the file.
     fn length(&self, value: f64) -> String {
         format!("{:.*}", self.decimals, self.steps * value)
     }
 
-    /// Returns the boxes.
+    /// Returns the clip paths of all boxes.
     fn clips(&self) -> String {
         let mut clips = String::new();
         for (place, [left, top, right, bottom]) in self.boxes.iter().enumerate() {
@@ -178,18 +179,18 @@ impl Writer {
     }
 }
 
-/// Returns the attribute of what does not hide all below it.
+/// Returns the opacity attribute of `part`; empty if the shape is opaque.
 fn opacity(part: &str, share: f64) -> String {
     if share < 1.0 { format!(" {part}-opacity=\"{}\"", short(share)) } else { String::new() }
 }
 
-/// Formats a number to the thousandth, without zeros at its end.
+/// Formats a number with at most three decimals and no trailing zeros.
 fn short(value: f64) -> String {
     let text = format!("{value:.3}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// Formats a colour as in SVG and CSS.
+/// Formats a colour as `#rrggbb`.
 pub fn hex([r, g, b]: Rgb) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
@@ -198,7 +199,7 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// Returns the text with what is lowered below the base line, and what follows on it again.
+/// Returns SVG that shifts subscripts below the base line, and the text after them back up.
 fn lowered(text: &str) -> String {
     let parts = parts(text);
     let piece = |part: &(&str, bool), is_first: bool| match part {

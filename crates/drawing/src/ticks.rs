@@ -1,31 +1,31 @@
-//! Ticks of an axis.
+//! Round numbers at which an axis has its ticks.
 
 use core::ops::RangeInclusive;
 
-/// Ticks of an axis at round numbers.
+/// Ticks of an axis at round numbers, with the format of their labels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ticks {
-    /// Where they are.
+    /// Values of the ticks.
     pub at: Vec<f64>,
     form: Form,
 }
 
-/// How the numbers of an axis are written.
+/// Number format of an axis's labels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Form {
-    /// With that many decimals, which tell them from each other.
+    /// The same number of decimals for all labels, enough to tell them apart.
     Decimals(usize),
-    /// With the decimals that each needs.
+    /// Without trailing zeros: each label has the decimals that it needs.
     Short,
-    /// As "1.5·10⁶".
+    /// Mantissa and power, as "1.5·10⁶".
     Scientific,
-    /// As "10⁶".
+    /// Power of ten alone, as "10⁶".
     Power,
 }
 
-/// Steps within a power of ten.
+/// Tick distances within a power of ten.
 const FACTORS: [f64; 3] = [1.0, 2.0, 5.0];
-/// Most decimals, and numbers of a logarithmic axis that are written out.
+/// A linear axis that needs more decimals than this is labelled in scientific notation.
 const DECIMALS: usize = 5;
 const PLAIN: RangeInclusive<f64> = 0.999e-4..=1.001e5;
 
@@ -34,15 +34,15 @@ fn power_of_ten(power: i32) -> f64 {
 }
 
 impl Ticks {
-    /// Returns ticks from `low` to `high`: two at least and, from two on, at most `most`, at equal multiples of 1, 2 or
-    /// 5 times a power of ten; none of an axis without a length.
+    /// Returns ticks from `low` to `high` at multiples of a step. The step is 1, 2 or 5 times a power of ten. There are
+    /// at least two ticks and at most `most` (for `most` of at least 2). An axis without a length has none.
     pub fn linear(low: f64, high: f64, most: usize) -> Self {
         let rough = libm::log10((high - low) / most.max(1) as f64);
         if !rough.is_finite() {
             return Ticks { at: Vec::new(), form: Form::Decimals(0) };
         }
         let step = |n: i32| FACTORS.get(n.rem_euclid(3) as usize).unwrap_or(&1.0) * power_of_ten(n.div_euclid(3));
-        // An end that is a multiple itself counts in spite of rounding.
+        // The tolerance counts an end that is itself a multiple, in spite of rounding.
         let ends = |n: i32| (libm::ceil(low / step(n) - 1e-9), libm::floor(high / step(n) + 1e-9));
         let count = |n: i32| {
             let (first, last) = ends(n);
@@ -59,14 +59,15 @@ impl Ticks {
         let decimals = usize::try_from(-n.div_euclid(3)).unwrap_or(0);
         let is_large = low.abs().max(high.abs()) >= 1e5 || decimals > DECIMALS;
         let form = if is_large { Form::Scientific } else { Form::Decimals(decimals) };
-        // The next wider step may leave one: then some of the narrower are left out.
+        // The next wider step may leave a single tick. Keep this step then, and leave out some of its ticks.
         let places = (0..count).step_by(count.div_ceil(most.max(2)));
         Ticks { at: places.map(|place| (first + place as f64) * step(n)).collect(), form }
     }
 
-    /// Returns ticks from `low` to `high`, both positive: 1, 2 and 5 times the powers of ten if at most `most` of them
-    /// are within, else powers of ten, and every second, third and so on of many; those of a linear axis where there
-    /// are fewer than two.
+    /// Returns ticks from `low` to `high`; both must be positive.
+    ///
+    /// The ticks are 1, 2 and 5 times the powers of ten if at most `most` of them fit. Otherwise they are powers of
+    /// ten, thinned out to `most`. If fewer than two ticks lie in the range, they are those of a linear axis.
     pub fn logarithmic(low: f64, high: f64, most: usize) -> Self {
         let powers = libm::floor(libm::log10(low)) as i32..=libm::ceil(libm::log10(high)) as i32;
         let within = |factors: &[f64]| -> Vec<f64> {
@@ -88,12 +89,12 @@ impl Ticks {
         }
     }
 
-    /// Returns the ticks with their labels.
+    /// Returns each tick with its label.
     pub fn marks(&self) -> impl Iterator<Item = (f64, String)> {
         self.at.iter().map(|at| (*at, self.label(*at)))
     }
 
-    /// Formats a number as the axis's are.
+    /// Formats a number in the axis's label format.
     pub fn label(&self, value: f64) -> String {
         match self.form {
             Form::Decimals(decimals) => label(value, decimals),
@@ -104,7 +105,7 @@ impl Ticks {
     }
 }
 
-/// Returns a number without zeros at the end of its decimals.
+/// Removes trailing zeros after the decimal point.
 fn short(number: &str) -> &str {
     if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }
@@ -128,7 +129,7 @@ fn scientific(value: f64) -> String {
     format!("{digits}·10{}", raised(power.parse().unwrap_or_default()))
 }
 
-/// Formats an exponent.
+/// Formats an exponent in superscript digits.
 fn raised(power: i32) -> String {
     let high = |digit: char| match digit {
         '-' => '⁻',
@@ -169,7 +170,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever an axis shows, and however few labels fit.
+        /// For axes of any offset and length, and any limit on the number of ticks.
         #[test]
         fn every_axis_has_two_ticks_with_labels_of_their_own(
             sign in prop::sample::select(vec![-1.0, 0.0, 1.0]), offset in -12.0..9.0f64, span in -12.0..9.0f64,
