@@ -1,7 +1,8 @@
-//! What pages are made of, each file as one text to be put into a page or served beside it, so that it needs no
-//! network: three.js (MIT) for the vehicle in three dimensions and uPlot (MIT) for charts over time, and the page that
-//! shows a vehicle ([`page_files`]). `scripts/build-web` bundles the libraries from the versions in `package.json`;
-//! their licences are beside them, in `vendor`.
+//! Files of the project's web pages, compiled in so that a page needs no network.
+//!
+//! They are three.js (MIT) for the 3D view, uPlot (MIT) for charts over time, and the page that shows a vehicle
+//! ([`page_files`]). `scripts/build-web` bundles the libraries in the versions of `package.json`. Their licences are in
+//! `vendor`.
 
 #![forbid(unsafe_code)]
 

@@ -1,15 +1,15 @@
-//! The page that shows a vehicle: files to be served.
+//! Files of the page that shows a vehicle.
 
 use crate::vendor::{THREE_JS, UPLOT_CSS, UPLOT_JS};
 
-/// A file of the page.
+/// One file of the page.
 #[derive(Clone, Debug)]
 pub struct PageFile {
-    /// Path below the page's address.
+    /// Path of the file, relative to the page's address.
     pub path: &'static str,
-    /// Media type.
+    /// Media type (MIME).
     pub media: &'static str,
-    /// Contents.
+    /// Contents of the file.
     pub text: String,
 }
 
@@ -19,7 +19,7 @@ const HEAD: &str = r#"<link rel="stylesheet" href="uplot.min.css"><link rel="sty
 const TAIL: &str = r#"<script src="three.min.js"></script><script src="uplot.min.js"></script>
 <script type="module" src="socket-main.js"></script>"#;
 
-/// Ranges and ticks of axes, and where a camera stands: a module.
+/// JavaScript module with functions for axis ranges, ticks and camera positions.
 const FIT_JS: &str = include_str!("../page/fit.js");
 
 /// Returns the functions of `fit.js` as a plain script, for a page without modules.
@@ -27,8 +27,8 @@ pub fn fit_script() -> &'static str {
     FIT_JS.split_once("\nexport ").map_or(FIT_JS, |(functions, _)| functions)
 }
 
-/// Returns the files of the page for a server, whose socket is at `/socket` (`scripts/build-playground` makes the page
-/// without one).
+/// Returns the page's files for a server that has a WebSocket at `/socket`. `scripts/build-playground` makes the page
+/// without one.
 pub fn page_files() -> Vec<PageFile> {
     let index = include_str!("../page/index.html").replace("<!-- head -->", HEAD).replace("<!-- tail -->", TAIL);
     let files = [

@@ -1,9 +1,9 @@
-//! The libraries, as `scripts/build-web` bundles them.
+//! JavaScript libraries, bundled by `scripts/build-web`.
 
-/// The parts of three.js listed in `three.js`, with its `OrbitControls`; a script that defines `THREE`.
+/// The parts of three.js that are listed in `three.js`, with its `OrbitControls`; defines `THREE`.
 pub const THREE_JS: &str = include_str!("../vendor/three.min.js");
 
-/// A script that defines `uPlot`.
+/// Chart library; defines `uPlot`.
 pub const UPLOT_JS: &str = include_str!("../vendor/uplot.min.js");
 
 /// The style sheet of `uPlot`.
