@@ -1,17 +1,17 @@
-//! The vehicle that the firmware flies: `VEHICLE=racer cargo fw` takes `vehicles/racer.toml`, `VEHICLE=./mine.toml` a
-//! file of one's own, relative to the workspace's root. Read and checked here, so that the image holds numbers only,
-//! and a vehicle that cannot fly makes no image.
+//! Reads and checks the file of the vehicle that the firmware flies, and writes its numbers as Rust source.
+//! `VEHICLE=racer cargo fw` takes `vehicles/racer.toml`; `VEHICLE=./mine.toml` takes a path relative to the
+//! workspace's root. A vehicle that fails the checks fails the build.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs, process};
 
-/// The vehicle of the paper.
+/// The paper's vehicle flies if `VEHICLE` is not set.
 const DEFAULT: &str = "paper";
 
 fn main() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace's root");
     let asked = env::var("VEHICLE").ok().filter(|name| !name.is_empty()).unwrap_or(DEFAULT.into());
-    // No vehicle's name has one of these.
+    // A path contains one of these characters, the name of a shipped vehicle none.
     let path = if asked.contains(['/', '\\', '.']) {
         root.join(&asked)
     } else {
@@ -20,7 +20,7 @@ fn main() {
     println!("cargo::rerun-if-env-changed=VEHICLE");
     println!("cargo::rerun-if-changed={}", path.display());
     let vehicle = afbc_vehicles::load(&path).unwrap_or_else(|error| {
-        // One line that cargo shows, whatever else it shows of a build script that fails.
+        // Cargo shows this line even if it hides the other output of a failed build script.
         println!("cargo::error=VEHICLE={asked}: {error}");
         process::exit(1)
     });

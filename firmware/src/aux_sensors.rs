@@ -1,5 +1,5 @@
-//! Barometer, magnetometer, GNSS receiver and battery: their readings as measurements, and what stations are to know of
-//! them.
+//! Passes readings of barometer, magnetometer, GNSS receiver and battery monitor to the estimator, and their state to
+//! the ground stations.
 
 use crate::samples::{self, SampleTime, SampleValue};
 use afbc_drivers::battery::{BatteryPins, BatteryScale};
@@ -16,18 +16,18 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use nalgebra::Matrix3;
 
-/// Time without a reading after which a sensor has failed \[us\].
+/// A sensor counts as failed after this time without a reading \[us\].
 const SILENT_US: u64 = 2_000_000;
 
 struct Known {
     frame: FixFrame,
     origin: Option<EarthOrigin>,
-    /// Newest epoch of the receiver, with its time \[us\].
+    /// Newest epoch of the GNSS receiver and its time \[us\].
     receiver: Option<(u64, GnssReceiver)>,
-    /// Time of the newest reading \[us\].
+    /// Time of the newest barometer reading \[us\].
     barometer: Option<u64>,
     magnetometer: Option<u64>,
-    /// Newest reading, with its time \[us\] and the board's own scale.
+    /// Newest battery reading: its time \[us\], the pin voltages and the board's scale for them.
     battery: Option<(u64, Option<BatteryPins>, BatteryScale)>,
 }
 
@@ -40,31 +40,32 @@ static KNOWN: Mutex<CriticalSectionRawMutex, RefCell<Known>> = Mutex::new(RefCel
     battery: None,
 }));
 
-/// Not borrowed elsewhere while it is locked; no panic in any case.
+/// Runs `change` under the lock. `try_borrow_mut` succeeds, since nothing else borrows while the lock is held.
 fn with<T>(change: impl FnOnce(&mut Known) -> T) -> Option<T> {
     KNOWN.lock(|known| known.try_borrow_mut().ok().map(|mut known| change(&mut known)))
 }
 
-/// Puts what a barometer has read.
+/// Passes on a barometer reading.
 pub fn put_pressure(reading: &Stamped<PressureReading>) {
     let _ = with(|known| known.barometer = Some(reading.at_us));
     samples::put(SampleTime::At(reading.at_us), SampleValue::Aid(height(&reading.value)));
 }
 
-/// Puts what a magnetometer has read, whose axes `to_body` turns into the body's.
+/// Passes on a magnetometer reading. `to_body` rotates the sensor's axes into the body's.
 pub fn put_field(reading: &Stamped<MagneticReading>, to_body: &Matrix3<f32>) {
     let _ = with(|known| known.magnetometer = Some(reading.at_us));
     samples::put(SampleTime::At(reading.at_us), SampleValue::Aid(field(&reading.value, to_body)));
 }
 
-/// Puts a GNSS receiver's fix; none for an epoch without one.
+/// Passes on a GNSS fix, or `None` for an epoch without a fix.
 pub fn put_fix(at_us: u64, fix: Option<FixReading>) {
     let receiver = fix.map_or(GnssReceiver::NO_FIX, |fix| GnssReceiver {
         kind: GnssReceiver::FIX_3D,
         satellites: fix.satellites,
         sigma_mm: [fix.horizontal_sigma_m, fix.vertical_sigma_m].map(|sigma_m| (sigma_m * 1e3) as u32),
     });
-    // Computed outside the lock, which all interrupts wait for: places are in double precision. Nobody else has fixes.
+    // Computed outside the lock, because positions are in double precision and the lock holds up all interrupts. No
+    // other task changes the frame.
     let mut frame = with(|known| known.frame).unwrap_or(FixFrame::NEW);
     let measured = fix.and_then(|fix| Some((fix, frame.measure(&fix)?)));
     let first = measured.filter(|(_, (_, is_first))| *is_first).map(|(fix, _)| fix);
@@ -74,7 +75,7 @@ pub fn put_fix(at_us: u64, fix: Option<FixReading>) {
     let _ = with(|known| {
         known.frame = frame;
         known.receiver = Some((at_us, receiver));
-        // Of the first fix alone: later ones must not take it away.
+        // Only the first fix yields an origin; later fixes must not clear it.
         if origin.is_some() {
             known.origin = origin;
         }
@@ -84,20 +85,21 @@ pub fn put_fix(at_us: u64, fix: Option<FixReading>) {
     }
 }
 
-/// Returns the place from which fixes are measured, once there is one.
+/// Returns the origin of the local frame, once a first fix has set it.
 pub(crate) fn frame_origin() -> Option<Origin> {
     with(|known| known.frame.origin()).flatten()
 }
 
-/// Puts what a battery's pins have read, which mean `scale` on this board; none if it is none of a battery.
+/// Passes on the voltages at the battery's pins and the board's scale for them; `None` if the voltages cannot be a
+/// battery's.
 pub fn put_battery(at_us: u64, pins: Option<BatteryPins>, scale: BatteryScale) {
     let _ = with(|known| known.battery = Some((at_us, pins, scale)));
 }
 
-/// Returns what stations are to know at `now_us`, where the vehicle's parameters tell these volts and amperes per volt
-/// at the battery's pins.
+/// Returns the sensor state for ground stations at `now_us`. `told` has the vehicle's parameters for volts and amperes
+/// at the battery per volt at the pins.
 pub(crate) fn known(now_us: u64, told: [f32; 2]) -> AuxSensors {
-    // Saturating: a reading may be newer than the tick that stations are told of.
+    // Saturating, since a reading may be newer than the tick being reported.
     let works = |at_us: u64| now_us.saturating_sub(at_us) < SILENT_US;
     let aux = with(|known| {
         let mut sensors = SensorBits::default();

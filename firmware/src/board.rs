@@ -1,5 +1,5 @@
-//! Interface between firmware and board. A crate in `firmware/boards/` implements it and builds its images by
-//! [`image!`](crate::image!), the only place where firmware and board meet.
+//! Interface between firmware and board. A crate in `firmware/boards/` implements [`Board`] and builds its images by
+//! [`image!`](crate::image!). Firmware and board meet nowhere else.
 
 use crate::samples::Sampler;
 use crate::ticks::Tick;
@@ -12,62 +12,63 @@ use embedded_storage::nor_flash::NorFlash;
 
 /// A board: its clock, sensors, links, flash, motors, watchdog and health.
 pub trait Board: Sized + 'static {
-    /// Interrupt lines of its chip.
+    /// Interrupt lines of the chip.
     type Interrupt: InterruptNumber;
-    /// Its inertial sensors, or [`NoSensors`](crate::samples::NoSensors).
+    /// Inertial sensors, or [`NoSensors`](crate::samples::NoSensors).
     type Sampler: Sampler + Send + 'static;
-    /// Its slow sensors: whatever aids the estimate.
+    /// Slow sensors that aid the estimate, such as a barometer.
     type Aids: Sampler + Send + 'static;
-    /// Its links: `[BoardLink<R, T>; N]`.
+    /// Links: `[BoardLink<R, T>; N]`.
     type Links: Links + 'static;
-    /// What keeps its logs, or [`NoLog`](crate::logging::NoLog).
+    /// Storage of the logs, or [`NoLog`](crate::logging::NoLog).
     type Log: LogKeeper + Send + 'static;
-    /// Flash with two sectors for the parameters, from [`STORE`](Self::STORE) on.
+    /// Flash that has two sectors for the parameters, starting at [`STORE`](Self::STORE).
     type Memory: NorFlash + Send + 'static;
     /// Clock of the core and of SysTick \[Hz\], in whole MHz.
     const CORE_HZ: u32;
     /// Offset of the parameters' sectors \[bytes\].
     const STORE: u32;
-    /// Its name in logs.
+    /// Name of the board in logs.
     const HARDWARE: &'static str;
-    /// True if it has room for minutes of logs only, which are small then
+    /// True if the storage holds only minutes of logs. Logs are then small
     /// ([`BlackBox::small`](afbc_log::ulog::BlackBox::small)).
     const SMALL_LOGS: bool = false;
-    /// True if it keeps logs.
+    /// True if the board keeps logs.
     const HAS_LOG: bool = false;
-    /// Most motors that it drives.
+    /// Largest number of motors that the board can drive.
     const OUTPUTS: usize;
-    /// True if it has a task that shows by LED or buzzer how the vehicle is ([`indication`](crate::indication)).
+    /// True if a task of the board shows the vehicle's state by LED or buzzer ([`indication`](crate::indication)).
     const INDICATES: bool = false;
-    /// Index of the link that is meant for a radio receiver, if one is.
+    /// Index of the link meant for a radio receiver, if there is one.
     const RADIO_LINK: Option<usize> = None;
-    /// True if it has a line for the telemetry of its motor controllers ([`escs`](crate::escs)).
+    /// True if the board has a UART for the telemetry of its motor controllers ([`escs`](crate::escs)).
     const ESCS: bool = false;
-    /// True if it hears motor controllers that answer on their own lines (bidirectional DSHOT).
+    /// True if the board supports bidirectional DSHOT, by which motor controllers answer on their signal lines.
     const ANSWERS: bool = false;
-    /// Restarts the chip into its boot loader, if it has one.
+    /// Function that restarts the chip into its boot loader, if it has one.
     const BOOT_LOADER: Option<fn() -> !> = None;
 
-    /// Runs first after a reset, before anything is set up: what [`BOOT_LOADER`](Self::BOOT_LOADER) needs then.
+    /// Runs first after a reset, before any setup. If [`BOOT_LOADER`](Self::BOOT_LOADER) has caused the
+    /// reset, the boot loader is entered here.
     fn after_reset() {}
 
-    /// Brings up clocks and peripherals; the core runs at [`CORE_HZ`](Self::CORE_HZ) from then on. To be called once. A
-    /// board's tasks spawned on `control` run right after the control tick.
+    /// Sets up clocks and peripherals, after which the core runs at [`CORE_HZ`](Self::CORE_HZ). Must be called once.
+    /// Tasks that the board spawns on `control` run right after the control tick.
     fn start(core: &mut cortex_m::Peripherals, control: SendSpawner) -> Parts<Self>;
 
-    /// Sets how throttles are sent to the motors, before the first are, and whether their controllers answer; nothing
-    /// if there is only one way.
+    /// Sets the protocol of the motor outputs, before the first output, and whether the motor controllers answer. Does
+    /// nothing on a board that has only one protocol.
     fn set_motor_protocol(&mut self, _protocol: MotorProtocol, _answers: bool) {}
 
-    /// Starts the watchdog, if there is one; nothing is erased from now on.
+    /// Starts the watchdog, if there is one. No flash is erased after this call.
     fn unleash_watchdog(&mut self);
 
-    /// Waits for the next interrupt, or a part of that time.
+    /// Waits for the next interrupt; may return earlier.
     fn idle() {
         cortex_m::asm::wfi();
     }
 
-    /// True if the crystal has failed and another clock has taken over.
+    /// True if the crystal has failed and another clock has replaced it.
     fn clock_has_failed(&self) -> bool;
 
     /// True if a task that is not needed in flight has panicked.
@@ -80,19 +81,19 @@ pub trait Board: Sized + 'static {
     fn feed_watchdog(&mut self);
 }
 
-/// What a board has brought up.
+/// Parts of a board after its setup.
 pub struct Parts<B: Board> {
-    /// What the control tick uses.
+    /// The board itself, used by the control tick.
     pub board: B,
-    /// What the sampling task uses.
+    /// Inertial sensors, used by the sampling task.
     pub sampler: B::Sampler,
-    /// What the slow sensors' task uses.
+    /// Slow sensors, used by their own task.
     pub aids: B::Aids,
-    /// What the links' task uses.
+    /// Links, used by the link task.
     pub links: B::Links,
-    /// Where the parameters are kept.
+    /// Flash of the parameters.
     pub memory: B::Memory,
-    /// Where logs are kept.
+    /// Storage of the logs.
     pub log: B::Log,
 }
 
@@ -104,16 +105,16 @@ pub struct BoardLink<R, T> {
     pub transmitter: T,
 }
 
-/// The links of a board, of one kind: each is listened to, and all are told the same.
+/// Links of a board, all of one type. The firmware listens on each link and sends the same messages on all.
 pub trait Links {
-    /// Receiving side of each.
+    /// Receiving side of a link.
     type Receiver: Receiver;
-    /// Sending side of each.
+    /// Sending side of a link.
     type Transmitter: Transmitter;
     /// Number of links, at least one.
     const COUNT: usize;
 
-    /// Returns them.
+    /// Returns the links.
     fn each(&mut self) -> &mut [BoardLink<Self::Receiver, Self::Transmitter>];
 }
 
@@ -129,12 +130,12 @@ impl<R: Receiver, T: Transmitter, const N: usize> Links for [BoardLink<R, T>; N]
 
 /// Receiving side of a link.
 pub trait Receiver {
-    /// Reads the next bytes and returns their number; waits for at least one. Nothing is lost if the future is dropped
-    /// before it is ready.
+    /// Reads the next bytes and returns their number; waits for at least one byte. No byte is lost if the future is
+    /// dropped before it is ready.
     fn receive(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize> + Send;
 
-    /// True for a link that only somebody with the vehicle in their hands can have plugged in. If no link is, the first
-    /// one counts as such.
+    /// True for a link, such as USB, that can be plugged in only at the vehicle. If no link is wired, the first one
+    /// counts as wired.
     fn is_wired(&self) -> bool {
         false
     }
@@ -142,13 +143,13 @@ pub trait Receiver {
 
 /// Sending side of a link.
 pub trait Transmitter {
-    /// Sets the baud rate of the line in both directions, before anything is sent; nothing if there is no such line.
+    /// Sets the baud rate in both directions, before anything is sent. Does nothing on a link without a UART.
     fn set_baud(&mut self, _baud: u32) {}
 
-    /// Sets the line up for SBUS: 100,000 baud, 8E2, and inverted if the chip can; nothing if there is no such line.
+    /// Sets the UART up for SBUS: 100,000 baud, 8E2, inverted if the chip can. Does nothing on a link without a UART.
     fn set_sbus(&mut self) {}
 
-    /// Sends the messages after `tick`, without waiting for the line. False if that is too far behind: then none of
-    /// them is sent.
+    /// Sends the messages of `tick` without waiting for the line. Returns false, and sends nothing, if the line is too
+    /// far behind.
     fn transmit(&mut self, tick: &Tick, bytes: &[u8]) -> bool;
 }

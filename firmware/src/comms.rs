@@ -1,4 +1,4 @@
-//! The links: receives and sends messages, at a lower priority than the control tick.
+//! Link task: receives and sends messages, at a lower priority than the control tick.
 
 use crate::aux_sensors;
 use crate::board::{Board, Links, Receiver as _, Transmitter as _};
@@ -33,7 +33,7 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use heapless::Vec;
 use static_cell::StaticCell;
 
-/// Largest number of bytes read at once.
+/// Largest number of bytes read in one call.
 const READ_MAX: usize = 128;
 
 static BAD_FRAMES: AtomicU32 = AtomicU32::new(0);
@@ -43,11 +43,11 @@ pub fn bad_frames() -> u32 {
     BAD_FRAMES.load(Ordering::Relaxed)
 }
 
-/// Ticks from a request to reboot to the reset, in which the answer leaves and a change of a parameter is written.
+/// Ticks between a reboot request and the reset. They leave time to send the answer and to write a changed parameter.
 const FAREWELL: u32 = 100;
 
-/// What the links' task has: the services for stations, the parameters, and exact log, radio and black box if there are
-/// any.
+/// State of the link task: the services for ground stations, the parameters and, where present, exact log, radio and
+/// black box.
 pub type CommsParts = (
     Comms,
     ParameterTable,
@@ -56,8 +56,8 @@ pub type CommsParts = (
     Option<&'static mut LinkLog>,
 );
 
-/// Creates it, with nothing received, to be called once: in place, since a task would store a value twice and take the
-/// stack for it.
+/// Creates the link task's state. Must be called once. The state is built in place, because passing it to the task by
+/// value would store it twice and use stack.
 #[inline(never)]
 pub fn make<B: Board>(
     table: ParameterTable,
@@ -81,15 +81,16 @@ pub fn make<B: Board>(
     })
 }
 
-/// Receives messages, and reports every tick on every link, of which there are `OTHERS` beside the first.
+/// Runs the link task: receives messages, and reports every tick on every link. `OTHERS` is the number of links after
+/// the first.
 pub async fn run<B: Board, const OTHERS: usize>(
     (comms, table, log, radio, black_box): &mut CommsParts,
     links: &mut B::Links,
 ) -> ! {
-    // The first link's is in `comms`.
+    // The decoder of the first link is in `comms`.
     let mut decoders: [_; OTHERS] = array::from_fn(|_| comms.decoder());
     let wired = links.each().iter().position(|link| link.receiver.is_wired()).unwrap_or(0);
-    // The first key of signatures is taken over a wire only: whoever sets it shuts out all others.
+    // The first signing key is accepted over a wired link only, because it locks out everyone who lacks it.
     let decoder = comms.decoder().wired();
     match wired.checked_sub(1).and_then(|other| decoders.get_mut(other)) {
         Some(other) => *other = decoder,
@@ -111,10 +112,10 @@ pub async fn run<B: Board, const OTHERS: usize>(
                     if let Some(news) = radio.receive(comms, bytes, table) {
                         pass_on::<B>(&news, log);
                     }
-                    // What a receiver sends is no MAVLink.
+                    // A radio receiver does not send MAVLink.
                     continue;
                 }
-                // A decoder for each link: frames come in pieces, and those of two links must not be mixed.
+                // Each link has its own decoder, because frames arrive in pieces and pieces of two links must not mix.
                 let mut other = link.checked_sub(1).and_then(|other| decoders.get_mut(other));
                 other.iter_mut().for_each(|decoder| comms.exchange(decoder));
                 let news = hear::<B>(comms, black_box, bytes);
@@ -135,13 +136,13 @@ pub async fn run<B: Board, const OTHERS: usize>(
                     begin_logging(comms, black_box, table, &tick);
                 }
                 report(comms, &tick, B::CORE_HZ, &mut outgoing);
-                // A constant, so that a board without sensors has none of it.
+                // The constant lets the compiler drop this code on a board without sensors.
                 if B::Sampler::SENSES
                     && let Some(calibrator) = &mut calibrator
                 {
                     calibrate(comms, calibrator, table, &mut outgoing);
                 }
-                // A constant here, too, as below.
+                // Constant as well, for the same reason.
                 let kept = if recording::is_possible::<B>() { log.as_deref_mut() } else { None };
                 let others = [kept.as_ref().map(|log| log.link()), radio.as_ref().and_then(|radio| radio.link())];
                 let changed = serve(comms, table, kept, &mut outgoing);
@@ -161,11 +162,12 @@ pub async fn run<B: Board, const OTHERS: usize>(
                     black_box.transfer(comms, &mut outgoing);
                 }
                 let told = links.each().iter_mut().enumerate().filter(|(index, _)| !others.contains(&Some(*index)));
-                // Of telemetry, what a line does not take is lost.
+                // Telemetry that a link has no room for is lost.
                 told.for_each(|(_, link)| {
                     link.transmitter.transmit(&tick, &outgoing);
                 });
-                // The next leg of a mission and news of the fence come of what was uploaded, without a byte now.
+                // An uploaded mission or fence can yield inputs for the control tick without a byte received in this
+                // tick.
                 if comms.has_mail() {
                     let news = hear::<B>(comms, black_box, &[]);
                     pass_on::<B>(&news, log);
@@ -173,7 +175,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
                 if radio::is_possible::<B>()
                     && let Some(radio) = radio
                 {
-                    // Notices that nothing comes.
+                    // Called without bytes too, so that a silent receiver is noticed.
                     if let Some(news) = radio.receive(comms, &[], table) {
                         pass_on::<B>(&news, log);
                     }
@@ -201,7 +203,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
                     black_box.send(tick.report.time_us, &outgoing);
                 }
                 leaving += u32::from(comms.wants_reboot().is_some());
-                // It may have been armed since the request: a reset would stop the motors in flight.
+                // The vehicle may have armed since the request, and a reset would stop the motors in flight.
                 if leaving >= FAREWELL && !control::armed() {
                     reboot::<B>(comms);
                 }
@@ -210,7 +212,8 @@ pub async fn run<B: Board, const OTHERS: usize>(
     }
 }
 
-/// Tells stations what sensors outside the control tick read, and the control tick what the battery says.
+/// Passes the state of sensors outside the control tick to the ground stations, and the battery's state to the control
+/// tick.
 fn look_at_sensors<B: Board>(comms: &mut Comms, table: &ParameterTable, now_us: u64) {
     let net = &table.configuration().guidance.net;
     let mut aux = aux_sensors::known(now_us, [net.divider, net.current_a_v]);
@@ -219,12 +222,12 @@ fn look_at_sensors<B: Board>(comms: &mut Comms, table: &ParameterTable, now_us: 
     }
     report_self_tests(comms, &mut aux);
     comms.set_aux_sensors(aux);
-    // Also that there is none any more.
+    // Also passed on when there is no battery state any more.
     let battery = comms.battery();
     control::with_mail(|inputs| inputs.battery = battery);
 }
 
-/// Begins a tick of the log, and says what has become of its storage.
+/// Begins a tick of the log, and reports changes of its storage.
 fn begin_logging(comms: &mut Comms, black_box: &mut LinkLog, table: &ParameterTable, tick: &Tick) {
     match black_box.begin_tick(tick.report.time_us, tick.report.mode.armed(), table) {
         Some((text, true)) => comms.warn(text),
@@ -233,7 +236,7 @@ fn begin_logging(comms: &mut Comms, black_box: &mut LinkLog, table: &ParameterTa
     }
 }
 
-/// Restarts as a station has asked, in the boot loader or in this program.
+/// Restarts into the boot loader or this program, as a ground station requested.
 fn reboot<B: Board>(comms: &Comms) -> ! {
     if let (Some(Reboot::BootLoader), Some(restart)) = (comms.wants_reboot(), B::BOOT_LOADER) {
         restart();
@@ -241,17 +244,17 @@ fn reboot<B: Board>(comms: &Comms) -> ! {
     cortex_m::peripheral::SCB::sys_reset()
 }
 
-/// Receives bytes, and what stations ask of the logs that are kept.
+/// Decodes received bytes, including requests for stored logs.
 fn hear<B: Board>(comms: &mut Comms, black_box: &mut Option<&'static mut LinkLog>, bytes: &[u8]) -> ControlInputs {
     match black_box {
         Some(black_box) if B::HAS_LOG => comms.receive_with_logs(bytes, &mut black_box.server),
-        // Never on a board that keeps logs, so that no image has both.
+        // Unreachable on a board with logs; spares its image a second copy of the receiver.
         _ if B::HAS_LOG => ControlInputs::EMPTY,
         _ => comms.receive(bytes),
     }
 }
 
-/// Passes on what has come to the control tick.
+/// Passes inputs on to the control tick and records them in the exact log.
 fn pass_on<B: Board>(news: &ControlInputs, log: &mut Option<&'static mut ExactLog>) {
     let tick = control::with_mail(|inputs| inputs.merge(news));
     if recording::is_possible::<B>()
@@ -261,7 +264,7 @@ fn pass_on<B: Board>(news: &ControlInputs, log: &mut Option<&'static mut ExactLo
     }
 }
 
-/// Writes a tick into exact log and black box.
+/// Writes a tick into the exact log and the black box.
 fn record<B: Board>(
     tick: &TickRecord<'_, ROTORS>,
     log: &mut Option<&'static mut ExactLog>,
@@ -279,10 +282,11 @@ fn record<B: Board>(
     }
 }
 
-/// Waits for bytes of any link; returns its index and their number.
+/// Waits for bytes on any link; returns the link's index and the number of bytes.
 fn receive(links: &mut impl Links, buffer: &mut [u8]) -> impl Future<Output = (usize, usize)> {
     poll_fn(|context| {
-        // Futures made anew at every poll lose nothing (`Receiver::receive`), and their wakers stay with the rings.
+        // Recreating the futures at every poll loses nothing (`Receiver::receive`); the wakers stay with the ring
+        // buffers.
         for (index, link) in links.each().iter_mut().enumerate() {
             if let Poll::Ready(length) = pin!(link.receiver.receive(buffer)).poll(context) {
                 return Poll::Ready((index, length));
@@ -292,17 +296,16 @@ fn receive(links: &mut impl Links, buffer: &mut [u8]) -> impl Future<Output = (u
     })
 }
 
-/// Sends all messages after a tick. Out of line, like the control tick, to be identified in the image.
+/// Sends all messages of a tick. Out of line, like the control tick, so that it can be identified in the image.
 #[inline(never)]
 fn report(comms: &mut Comms, tick: &Tick, core_hz: u32, outgoing: &mut Vec<u8, REPORT_MAX>) {
     outgoing.clear();
     let tick_us = tick.cycles as f32 / (core_hz / 1_000_000) as f32;
-    // There is room for every frame.
     comms.report(&tick.report, tick_us, |frame| drop(outgoing.extend_from_slice(frame)));
 }
 
-/// Reports two inertial sensors. Out of line like the report, and what has been told is no part of the task: boards
-/// with one sensor do not have its memory.
+/// Reports the state of two inertial sensors. Out of line, and with its memory in a static of its own, so that boards
+/// with one sensor spend no memory on it.
 #[inline(never)]
 fn report_imus(comms: &mut Comms, aux: &mut AuxSensors, now_us: u64) {
     static NEWS: Mutex<CriticalSectionRawMutex, RefCell<ImuNews>> = Mutex::new(RefCell::new(ImuNews::NEW));
@@ -315,7 +318,7 @@ fn report_imus(comms: &mut Comms, aux: &mut AuxSensors, now_us: u64) {
     }
 }
 
-/// Passes on a request for the sensors' own tests, and tells their results. Out of line like the report.
+/// Passes on a request for the sensors' self-tests, and reports their results. Out of line like `report`.
 #[inline(never)]
 fn report_self_tests(comms: &mut Comms, aux: &mut AuxSensors) {
     if comms.wants_self_tests() {
@@ -328,8 +331,8 @@ fn report_self_tests(comms: &mut Comms, aux: &mut AuxSensors) {
     }
 }
 
-/// Takes what the motor controllers have told, asks the next one and moves the notch; returns what the vehicle is to do
-/// about a rotor's failure. Out of line like the report.
+/// Passes received motor controller telemetry on, requests the next answer and moves the notch filter. Returns the
+/// vehicle's reaction to a failed rotor, if any. Out of line like `report`.
 #[inline(never)]
 fn listen_to_escs(
     comms: &mut Comms,
@@ -337,12 +340,11 @@ fn listen_to_escs(
     answers: [Option<u32>; ROTORS_MAX],
     tick: &Tick,
 ) -> Option<ControlInputs> {
-    // Three answers, of which the line brings one in a tick; what is left waits for the next tick.
+    // Holds three answers; the line delivers at most one per tick. Bytes left over wait for the next tick.
     let mut heard = Vec::<u8, 32>::new();
     while !heard.is_full()
         && let Some(byte) = escs::heard()
     {
-        // There is room.
         let _ = heard.push(byte);
     }
     let heard = EscsHeard { bytes: &heard, speeds_rev_min: answers };
@@ -352,14 +354,14 @@ fn listen_to_escs(
     inputs
 }
 
-/// Creates what calibrates, to be called once, by a board with sensors: the others do not have its memory.
+/// Creates the calibrator. Must be called once, only on a board with sensors; the others spend no memory on it.
 #[inline(never)]
 fn calibrator() -> &'static mut Calibrator {
     static CALIBRATOR: StaticCell<Calibrator> = StaticCell::new();
     CALIBRATOR.init_with(Calibrator::new)
 }
 
-/// Goes on with a calibration, and shows stations what the sensors read. Out of line like the report.
+/// Advances a calibration, and sends raw sensor readings to ground stations. Out of line like `report`.
 #[inline(never)]
 fn calibrate(
     comms: &mut Comms,
@@ -371,8 +373,8 @@ fn calibrate(
     comms.calibrate(calibrator, sample, table, |frame| drop(outgoing.extend_from_slice(frame)));
 }
 
-/// Sends values of parameters, passes on what has changed, of the signatures too, and returns it. Out of line like the
-/// report.
+/// Sends parameter values, passes on a changed parameter and changed signing records, and returns the changed
+/// parameter. Out of line like `report`.
 #[inline(never)]
 fn serve(
     comms: &mut Comms,

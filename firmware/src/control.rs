@@ -16,27 +16,27 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_time::{Instant, Timer};
 use static_cell::StaticCell;
 
-/// Newest inputs, written by [`crate::comms`], and the number of the tick that takes them.
+/// Newest inputs, written by [`crate::comms`], and the number of the tick that will take them.
 static MAIL: Mutex<CriticalSectionRawMutex, RefCell<(ControlInputs, u32)>> =
     Mutex::new(RefCell::new((ControlInputs::EMPTY, 0)));
 
-/// Cycles of the last control tick and of the longest, for [`crate::housekeeping`].
+/// Duration of the last control tick and of the longest one \[core cycles\], for [`crate::housekeeping`].
 static CYCLES: AtomicU32 = AtomicU32::new(0);
 static CYCLES_MAX: AtomicU32 = AtomicU32::new(0);
 
-/// Returns the duration of the last control tick, and the longest so far, interrupts included \[core cycles\].
+/// Returns the durations of the last and the longest control tick, interrupts included \[core cycles\].
 pub fn cycles() -> [u32; 2] {
     [&CYCLES, &CYCLES_MAX].map(|cycles| cycles.load(Ordering::Relaxed))
 }
 
-/// Configuration to be flown from the next disarmed tick on.
+/// Configuration to adopt at the next disarmed tick.
 ///
-/// Not an [`Option`], of which nothing is not all zeros: the flash would have 3.6 kB for it.
+/// Not an [`Option`], whose `None` is not all zeros: the static's initial value would take 3.6 kB of flash.
 #[repr(u8)]
 #[allow(clippy::large_enum_variant, reason = "there is one")]
 enum NextConfiguration {
     Nothing = 0,
-    /// With its number.
+    /// The configuration and its number.
     Is(Prepared, u16),
 }
 
@@ -45,7 +45,7 @@ static NEXT: Mutex<CriticalSectionRawMutex, RefCell<NextConfiguration>> =
 /// True if the vehicle was armed in the last tick.
 static ARMED: AtomicBool = AtomicBool::new(false);
 
-/// Flies another configuration, of this number, from the next disarmed tick on.
+/// Hands over a configuration and its number, for the next disarmed tick to adopt.
 pub fn fly(prepared: Prepared, number: u16) {
     NEXT.lock(|next| next.try_borrow_mut().ok().map(|mut next| *next = NextConfiguration::Is(prepared, number)));
 }
@@ -55,9 +55,9 @@ pub fn armed() -> bool {
     ARMED.load(Ordering::Relaxed)
 }
 
-/// Changes the inputs of the next tick, and returns its number.
+/// Changes the inputs of the next tick, and returns that tick's number.
 pub fn with_mail(change: impl FnOnce(&mut ControlInputs)) -> u32 {
-    // Not borrowed elsewhere while it is locked; no panic in any case.
+    // `try_borrow_mut` succeeds, since nothing else borrows while the lock is held.
     let tick = MAIL.lock(|shared| {
         let mut shared = shared.try_borrow_mut().ok()?;
         change(&mut shared.0);
@@ -66,11 +66,11 @@ pub fn with_mail(change: impl FnOnce(&mut ControlInputs)) -> u32 {
     tick.unwrap_or_default()
 }
 
-/// Creates the vehicle, disarmed, to be called once: in place, since a task would store a value twice and take the
-/// stack for it.
+/// Creates the disarmed vehicle. Must be called once. It is built in place, because passing it to the task by value
+/// would store it twice and use stack.
 ///
 /// # Panics
-/// If one of its parameters is out of range.
+/// If one of the vehicle's parameters is out of range.
 #[inline(never)]
 pub fn make(configuration: &Configuration) -> &'static mut Flight {
     static FLIGHT: StaticCell<Flight> = StaticCell::new();
@@ -80,13 +80,13 @@ pub fn make(configuration: &Configuration) -> &'static mut Flight {
     })
 }
 
-/// Runs the ticks.
+/// Runs the control task.
 pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
     let (mut messages, mut inputs, mut before) = (ControlInputs::EMPTY, TickInputs::default(), TickBefore::default());
     let mut details = if recording::is_possible::<B>() { ticks::details_in() } else { None };
     loop {
-        // Not a ticker, whose periods begin when it is created: just after the start of a control period, when alarms
-        // are due, it would tick twice in every second period.
+        // Not a `Ticker`, whose periods begin when it is created. Alarms are due just after a control period starts,
+        // so a ticker would tick twice in every second period.
         Timer::at(time::next_period()).await;
         let stopwatch = Stopwatch::start();
         let report = tick(flight, &mut messages, &mut inputs, &mut before, board);
@@ -99,7 +99,7 @@ pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
             if B::HAS_LOG {
                 write_details(slot, flight, &inputs, &before, &messages);
             } else {
-                // The exact log has no more of them: what tells the rest is not in the image.
+                // The exact log needs nothing else, so an image without a black box leaves the other details out.
                 slot.inputs = inputs;
             }
         }
@@ -120,7 +120,7 @@ pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
         CYCLES.store(cycles, Ordering::Relaxed);
         CYCLES_MAX.fetch_max(cycles, Ordering::Relaxed);
         let is_queued = ticks::push(Tick { report, cycles, is_detailed });
-        // Of a tick that is not queued, the next one takes the place.
+        // A tick that is not queued leaves its slot of details to the next tick.
         if is_queued
             && is_detailed
             && let Some(details) = &mut details
@@ -130,7 +130,8 @@ pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
     }
 }
 
-/// Writes down what logs have of a tick beside its report. Out of line, since only boards that keep logs do.
+/// Stores the details of a tick that logs need besides its report. Out of line, since only boards that keep logs use
+/// it.
 #[cold]
 #[inline(never)]
 fn write_details(
@@ -143,7 +144,7 @@ fn write_details(
     *slot = flight.details(inputs, before, messages);
 }
 
-/// Moves the notch, if it is to be moved; returns where to \[rad/s\]. Out of line, as below.
+/// Moves the notch filter if a new place is set, and returns its centre \[rad/s\]. Out of line like `tick`.
 #[inline(never)]
 fn move_notch(flight: &mut Flight) -> Option<f32> {
     let notch = escs::moved_notch()?;
@@ -151,22 +152,22 @@ fn move_notch(flight: &mut Flight) -> Option<f32> {
     Some(notch.centre_rad_s())
 }
 
-/// Takes over a configuration, if there is one, and returns its number. Out of line, since it is rare.
+/// Adopts the next configuration, if there is one, and returns its number. Out of line, since it runs rarely.
 #[inline(never)]
 fn adopt(flight: &mut Flight) -> Option<u16> {
     NEXT.lock(|next| {
         let mut next = next.try_borrow_mut().ok()?;
         let NextConfiguration::Is(prepared, number) = &*next else { return None };
-        // Disarmed: the caller has looked.
+        // The caller has checked that the vehicle is disarmed.
         let adopted = flight.adopt(prepared).then_some(*number);
         *next = NextConfiguration::Nothing;
         adopted
     })
 }
 
-/// The top loop: takes the newest inputs; supervises, controls and gates the motors ([`afbc_flight_core::tick`]);
-/// drives them; checks the rate. Out of line, so that its stack and its instructions can be counted
-/// (`docs/budgets.md`).
+/// Runs one control tick: takes the newest inputs; supervises, controls and gates the motors
+/// ([`afbc_flight_core::tick`]); drives them; checks the rate. Out of line, so that its stack and its instructions can
+/// be counted (`docs/budgets.md`).
 #[inline(never)]
 fn tick<B: Board>(
     flight: &mut Flight,
@@ -176,13 +177,13 @@ fn tick<B: Board>(
     board: &mut B,
 ) -> Report {
     let now_us = Instant::now().as_micros();
-    // Not borrowed elsewhere while it is locked; the tick has no panic.
+    // `try_borrow_mut` succeeds, since nothing else borrows while the lock is held. The tick must not panic.
     MAIL.lock(|shared| {
         let Ok(mut shared) = shared.try_borrow_mut() else { return };
         let (mail, next) = &mut *shared;
         mail.take_into(messages);
         if recording::is_possible::<B>() {
-            // In place: returned beside the report, it would cost the tick a copy of that.
+            // Stored in place: returned with the report, the number would make the tick copy the report.
             inputs.number = *next;
             *next = next.wrapping_add(1);
         }
@@ -195,22 +196,22 @@ fn tick<B: Board>(
     if recording::is_possible::<B>() {
         inputs.clock_failed = clock_failed;
     }
-    // Flown on, by a clock that is off by up to 1 %; the vehicle is not armed again.
+    // The flight goes on with a clock that is off by up to 1 %; the vehicle cannot arm again.
     if clock_failed {
         flight.distrust_clock();
     }
     if B::Sampler::SENSES {
         samples::take(now_us, &mut inputs.readings);
     } else {
-        // So that the compiler leaves out what only sensors need.
+        // Lets the compiler drop the code that only sensors need.
         inputs.readings.clear();
     }
     let report = flight.tick(now_us, messages, &inputs.readings);
 
     board.drive(report.throttles);
-    // A reset restarts a failed task, once it does not end a flight.
+    // A failed task is restarted by a reset, unless the vehicle is armed.
     let may_reset = board.task_has_failed() && !report.mode.armed();
-    // Whatever the rate: in the air a wrong one is better than a reset. Not if the clock stands still.
+    // Fed at a wrong tick rate too, since in the air that is better than a reset; not fed if the clock has stopped.
     if report.health.rate.alive && !may_reset {
         board.feed_watchdog();
     }

@@ -1,7 +1,7 @@
 //! Interrupt executors, and the priorities of all interrupts.
 //!
-//! Each executor has an interrupt line that the board's peripherals leave unused; [`image!`](crate::image!) is told
-//! which.
+//! Each executor has an interrupt line that the board's peripherals leave unused; [`image!`](crate::image!) takes
+//! these lines as arguments.
 
 use core::sync::atomic::{AtomicU16, Ordering};
 use cortex_m::interrupt::InterruptNumber;
@@ -9,11 +9,12 @@ use cortex_m::peripheral::SCB;
 use cortex_m::peripheral::scb::{SystemHandler, VectActive};
 use embassy_executor::{InterruptExecutor, SendSpawner, SpawnError, SpawnToken, Spawner};
 
-/// Interrupt priorities; lower numbers preempt higher ones. A chip has at least sixteen, in the upper four bits.
+/// Interrupt priorities; lower numbers preempt higher ones. A chip has at least sixteen, in the upper four bits of the
+/// register.
 pub mod priority {
     /// SysTick: [`crate::time`].
     pub const TIME: u8 = 1 << 4;
-    /// Bytes of the links.
+    /// Bytes to and from the links.
     pub const UART: u8 = 2 << 4;
     /// [`crate::samples`].
     pub const SAMPLING: u8 = 3 << 4;
@@ -25,7 +26,7 @@ pub mod priority {
     pub const AIDING: u8 = 7 << 4;
     /// [`crate::comms`].
     pub const COMMS: u8 = 8 << 4;
-    /// [`crate::housekeeping`], and USB, whose hosts wait.
+    /// [`crate::housekeeping`], and USB, whose hosts can wait.
     pub const HOUSEKEEPING: u8 = 12 << 4;
     /// [`crate::logging`], which waits for a memory card or flash.
     pub const LOGGING: u8 = 14 << 4;
@@ -38,31 +39,30 @@ static COMMS: InterruptExecutor = InterruptExecutor::new();
 static HOUSEKEEPING: InterruptExecutor = InterruptExecutor::new();
 static LOGGING: InterruptExecutor = InterruptExecutor::new();
 
-/// Interrupt lines of the tasks without which a flight goes on: the links', housekeeping, slow sensors', the log's, and
-/// USB's.
-// At first a number that no interrupt has.
+/// Interrupt lines of the tasks that a flight can do without: link task, housekeeping, slow sensors, logging and USB.
+// Initially a number that no interrupt has.
 static DISPENSABLE: [AtomicU16; 5] = [const { AtomicU16::new(u16::MAX) }; 5];
 
-/// Declares that a flight goes on without the driver that has the interrupt `usb`, of a priority below the motors'.
+/// Declares that a flight can do without the USB driver, whose interrupt `usb` has a lower priority than the motors'.
 pub fn dispense_with(usb: impl InterruptNumber) {
     let [.., last] = &DISPENSABLE;
     last.store(usb.number(), Ordering::Relaxed);
 }
 
-/// Returns the spawner of housekeeping's executor, which has started.
+/// Returns the spawner of the housekeeping executor.
 ///
 /// # Panics
-/// If it has not.
+/// If the executor has not been started.
 pub fn housekeeping() -> SendSpawner {
     HOUSEKEEPING.spawner()
 }
 
-/// Returns a task to be spawned.
+/// Returns the token of a task to spawn.
 ///
 /// # Panics
-/// If it has been spawned before.
+/// If the task has been spawned before.
 pub fn once<S>(task: Result<SpawnToken<S>, SpawnError>) -> SpawnToken<S> {
-    // Out of line, since every task would have a message of its own.
+    // Out of line, so that the tasks share one panic message.
     #[cold]
     #[inline(never)]
     fn again() -> ! {
@@ -71,7 +71,7 @@ pub fn once<S>(task: Result<SpawnToken<S>, SpawnError>) -> SpawnToken<S> {
     task.unwrap_or_else(|_| again())
 }
 
-/// True in a task that is not needed in flight.
+/// True if called from a task that a flight can do without.
 pub fn in_dispensable_task() -> bool {
     match SCB::vect_active() {
         VectActive::Interrupt { irqn } => DISPENSABLE.iter().any(|line| line.load(Ordering::Relaxed) == irqn.into()),
@@ -93,10 +93,10 @@ pub struct Executors {
     pub logging: Option<SendSpawner>,
 }
 
-/// Returns the spawner of the executor whose task calls this, for tasks that stay on it. Only tasks may call it.
+/// Returns the spawner of the current executor, for tasks that are not `Send`. Must be called from a task.
 #[expect(unsafe_code, reason = "an interrupt executor has no other spawner for tasks that are not Send")]
 pub async fn spawner() -> Spawner {
-    // SAFETY: polled by an executor, as every task of this program is.
+    // SAFETY: this future is polled by an executor, since every task of this program is.
     unsafe { Spawner::for_current_executor() }.await
 }
 
@@ -114,11 +114,12 @@ pub struct InterruptLines<I> {
     pub logging: Option<I>,
 }
 
-/// Starts the executors and sets the time base's priority. To be called once.
+/// Starts the executors and sets the priority of the time base. Must be called once.
 #[expect(unsafe_code, reason = "priorities are set by hand")]
 pub(crate) fn start<I: InterruptNumber>(core: &mut cortex_m::Peripherals, lines: InterruptLines<I>) -> Executors {
     let InterruptLines { control, comms, housekeeping, sampling, aiding, logging } = lines;
-    // Without sampling or control nothing flies: a panic there must stop the motors.
+    // Sampling and control are not in this list, because no flight goes on without them: a panic there must stop the
+    // motors.
     let dispensable = [Some(comms), Some(housekeeping), aiding, logging];
     for (line, dispensable) in dispensable.into_iter().flatten().zip(&DISPENSABLE) {
         dispensable.store(line.number(), Ordering::Relaxed);
@@ -131,7 +132,7 @@ pub(crate) fn start<I: InterruptNumber>(core: &mut cortex_m::Peripherals, lines:
         (Some(housekeeping), priority::HOUSEKEEPING),
         (logging, priority::LOGGING),
     ];
-    // SAFETY: none of them runs yet, and no critical section relies on a priority.
+    // SAFETY: none of these interrupts runs yet, and no critical section relies on a priority.
     unsafe {
         core.SCB.set_priority(SystemHandler::SysTick, priority::TIME);
         for (line, priority) in all {
@@ -153,10 +154,10 @@ pub(crate) fn start<I: InterruptNumber>(core: &mut cortex_m::Peripherals, lines:
 /// Polls the control executor.
 ///
 /// # Safety
-/// Only to be called by the interrupt that the executor was started with.
+/// Must be called only by the interrupt that the executor was started with.
 #[expect(unsafe_code, reason = "an executor must be polled from its own interrupt")]
 pub unsafe fn on_control() {
-    // SAFETY: the caller's; `start` enables the interrupt.
+    // SAFETY: guaranteed by the caller; `start` enables the interrupt.
     unsafe { CONTROL.on_interrupt() }
 }
 
@@ -180,7 +181,7 @@ pub unsafe fn on_aiding() {
     unsafe { AIDING.on_interrupt() }
 }
 
-/// Polls the links' executor.
+/// Polls the link task's executor.
 ///
 /// # Safety
 /// As for [`on_control`].
@@ -190,7 +191,7 @@ pub unsafe fn on_comms() {
     unsafe { COMMS.on_interrupt() }
 }
 
-/// Polls housekeeping's executor.
+/// Polls the housekeeping executor.
 ///
 /// # Safety
 /// As for [`on_control`].
@@ -200,7 +201,7 @@ pub unsafe fn on_housekeeping() {
     unsafe { HOUSEKEEPING.on_interrupt() }
 }
 
-/// Polls the log's executor.
+/// Polls the logging executor.
 ///
 /// # Safety
 /// As for [`on_control`].

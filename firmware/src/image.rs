@@ -1,10 +1,10 @@
-//! The image of a board: everything whose type depends on the board.
+//! Macro that defines everything in an image whose type depends on the board.
 
 /// Builds an image for a type that implements [`Board`](crate::board::Board): the program's entry, the time base, the
 /// executors' interrupts and the tasks whose type depends on the board. The board handles panics and faults.
 ///
-/// `control`, `comms` and `housekeeping` name an interrupt line each that the board leaves unused, and so do `sampling`
-/// if it has inertial sensors, `aiding` if it has slow ones and `logging` if it keeps logs:
+/// `control`, `comms` and `housekeeping` each name an interrupt line that the board leaves unused. A board also names
+/// `sampling` if it has inertial sensors, `aiding` if it has slow sensors, and `logging` if it keeps logs:
 /// `image!(board::Mine, control: LINE_A, comms: LINE_B, housekeeping: LINE_C, sampling: LINE_D, aiding: LINE_E)`.
 #[macro_export]
 macro_rules! image {
@@ -33,7 +33,7 @@ macro_rules! image {
             )
         };
 
-        // Tasks are made here, since an executor's cannot be generic in the board.
+        // Tasks are defined here because an embassy task cannot be generic in the board.
         #[embassy_executor::task]
         async fn sampling(sampler: <$board as $crate::board::Board>::Sampler) {
             $crate::samples::Sampler::run(sampler).await
@@ -58,7 +58,7 @@ macro_rules! image {
             $crate::parameters::run(&mut keeper).await
         }
 
-        // Spawned from within its executor, where futures need not be Send, as those of transfers are not.
+        // Spawned from within its executor, because the futures of sensor transfers are not Send.
         #[embassy_executor::task]
         async fn start_sampling(sampler: <$board as $crate::board::Board>::Sampler) {
             let task = $crate::executors::once(sampling(sampler));
@@ -98,7 +98,7 @@ macro_rules! image {
             blocks: $crate::logging::LogEnds,
             log: <$board as $crate::board::Board>::Log,
         ) {
-            // Once, and not in every task that it goes through.
+            // In a static, since passing it through both tasks by value would store it twice.
             static LOG: $crate::StaticCell<<$board as $crate::board::Board>::Log> = $crate::StaticCell::new();
             spawner.spawn($crate::executors::once(start_logging(blocks, LOG.init(log))));
         }
@@ -114,7 +114,7 @@ macro_rules! image {
             spawner.spawn($crate::executors::once(start_sampling(sampler)));
         }
 
-        // Out of line, so that their stacks are not used at the same time.
+        // Out of line, so that the stacks of these functions are not used at the same time.
         #[inline(never)]
         fn spawn_control(
             spawner: embassy_executor::SendSpawner,
@@ -141,7 +141,7 @@ macro_rules! image {
             spawner.spawn($crate::executors::once(parameters(keeper)));
         }
 
-        // Here, too, since its type has the clock of the board's core in it.
+        // Defined here because the type contains the core's clock rate.
         $crate::time::time_driver_impl!(
             static TIME: $crate::time::SysTickDriver<{ <$board as $crate::board::Board>::CORE_HZ / 1_000_000 }> =
                 $crate::time::SysTickDriver
@@ -151,7 +151,7 @@ macro_rules! image {
         mod executors {
             #[unsafe(no_mangle)]
             extern "C" fn $control() {
-                // SAFETY: the executor is started with this line, below.
+                // SAFETY: `main` starts the executor with this interrupt line.
                 unsafe { $crate::executors::on_control() }
             }
 

@@ -3,15 +3,15 @@
 //!
 //! # One firmware, an image per board
 //!
-//! The differences between boards, of whatever chip, are behind the trait [`board::Board`]; each crate in
-//! `firmware/boards/` implements it and builds its images. `firmware/boards/emulated` has the same control tick, link,
-//! supervisor, executors and time base as the boards that fly, but exchanges bytes with the host once per control tick,
+//! The trait [`board::Board`] hides the differences between boards and chips. Each crate in `firmware/boards/`
+//! implements it and builds the board's images. `firmware/boards/emulated` has the same control tick, link,
+//! supervisor, executors and time base as the boards that fly. It exchanges bytes with the host once per control tick,
 //! so that an emulator can fly it in lockstep.
 //!
 //! # Priorities
 //!
-//! Nothing runs in thread mode: every task is in an interrupt executor, and the core idles otherwise. From the highest
-//! priority (see [`executors::priority`]):
+//! Nothing runs in thread mode: every task is in an interrupt executor, and the core idles otherwise. The table begins
+//! with the highest priority (see [`executors::priority`]):
 //!
 //! | | runs | duration |
 //! |---|---|---|
@@ -26,7 +26,7 @@
 //! | 14 | [`logging`]: the black box to a memory card or flash, for which it waits | |
 //!
 //! The links precede the control tick because a UART may buffer one byte only, and the next comes within 11 us. USB
-//! comes last: its host waits, whatever it sends.
+//! has a low priority because its host waits until the device is ready.
 #![no_std]
 
 pub mod aux_sensors;
@@ -54,8 +54,8 @@ pub use static_cell::StaticCell;
 use board::{Board, Links as _, Parts, Transmitter as _};
 use embassy_executor::SendSpawner;
 
-/// Starts everything; the core then idles between interrupts. The functions start the tasks that use the board.
-/// [`image!`] defines all of them.
+/// Starts all tasks; the core then idles between interrupts. The functions start the tasks whose type depends on the
+/// board. [`image!`] defines these functions.
 #[expect(clippy::too_many_arguments, reason = "a function for each task, each of a type of its own")]
 pub fn run<B: Board>(
     mut core: cortex_m::Peripherals,
@@ -74,7 +74,8 @@ pub fn run<B: Board>(
     let configuration = table.configuration();
     board.set_motor_protocol(configuration.outputs.protocol, configuration.escs.answers);
     let flight = control::make(table.configuration());
-    // Not before: a start may erase flash for half a second and more, without a tick that feeds it.
+    // Not started earlier, because the start may erase flash for half a second or more, during which no tick feeds the
+    // watchdog.
     board.unleash_watchdog();
     time::start(core.SYST, B::CORE_HZ);
     comms(executors.comms, parts, links);
@@ -87,7 +88,7 @@ pub fn run<B: Board>(
     control(executors.control, flight, board);
     keeper(executors.housekeeping, kept);
     housekeeping::spawn(executors.housekeeping);
-    // A constant, so that a board that keeps no log has none of it.
+    // The constant lets the compiler drop this code on a board without logs.
     if B::HAS_LOG
         && let (Some(spawner), Some(blocks)) = (executors.logging, blocks)
     {
@@ -98,20 +99,21 @@ pub fn run<B: Board>(
     }
 }
 
-/// Reads the parameters, sets the links up by them, and creates what the links' task has. Out of line, so that the
-/// stack of the start does not hold the parameters beside the flight. Before the watchdog: it looks at each of them.
+/// Reads the parameters, sets the links up by them, and creates the state of the link task. Out of line, so that the
+/// stack does not hold the parameters and the vehicle at the same time. Must run before the watchdog starts, since it
+/// reads every stored parameter.
 #[inline(never)]
 fn read<B: Board>(
     memory: B::Memory,
     links: &mut B::Links,
 ) -> (parameters::Keeper<B::Memory>, &'static mut comms::CommsParts, Option<logging::LogEnds>) {
     let (kept, table, signing) = parameters::read(memory, B::STORE);
-    // Before the radio's line, which has a rate of its own.
+    // Before the radio receiver's link is set up, which has a baud rate of its own.
     for link in links.each() {
         link.transmitter.set_baud(table.configuration().link.baud);
     }
     let radio = if radio::is_possible::<B>() { radio::RadioLine::begin::<B>(&table, links) } else { None };
-    // On one link, the pilot goes before the log.
+    // If radio receiver and exact log are set to the same link, the receiver gets it.
     let is_free = radio::leaves_log::<B>(&table);
     let log = if recording::is_possible::<B>() && is_free { recording::ExactLog::begin::<B>(&table) } else { None };
     if recording::is_possible::<B>() {

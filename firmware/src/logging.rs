@@ -1,5 +1,5 @@
-//! The black box: ticks to blocks, in the links' task, and blocks to a memory card or flash, in a task below all
-//! others, which may wait for it. See [`afbc_log::storage`].
+//! Black box ([`afbc_log::storage`]). The link task packs ticks into blocks. The logging task writes the blocks to a
+//! memory card or flash. It has the lowest priority, since it may wait for the storage.
 
 use crate::aux_sensors;
 use crate::board::Board;
@@ -20,16 +20,16 @@ use embassy_time::{Instant, Timer};
 use heapless::Vec;
 use static_cell::StaticCell;
 
-/// Blocks that wait, at most: of a log of 140 kB/s those of 43 ms.
+/// Number of blocks that can wait: 43 ms of a log of 140 kB/s.
 const BLOCKS: usize = 12;
-/// Time between two looks at a storage without a log \[us\].
+/// Time between two polls of the storage while there is nothing to write \[us\].
 const LOOK_US: u64 = 100_000;
-/// The control period \[us\].
+/// Control period \[us\].
 const PERIOD_US: u64 = 1_000;
-/// The law that every image flies: AFBC under its monitor.
+/// Name of the law that every image flies: AFBC under its monitor.
 const LAW: &str = "afbc";
 
-/// Of a board that keeps no logs.
+/// Storage of a board that keeps no logs.
 pub struct NoLog;
 
 impl LogKeeper for NoLog {
@@ -46,7 +46,8 @@ impl LogKeeper for NoLog {
 
 type Blocks = Channel<'static, CriticalSectionRawMutex, LogBlock>;
 
-/// What the log's task has of the links': blocks to be kept, and where it puts what is asked of the logs.
+/// Logging task's ends of the channels to the link task: blocks to write, and pages of stored logs that stations asked
+/// for.
 pub struct LogEnds {
     blocks: Receiver<'static, CriticalSectionRawMutex, LogBlock>,
     pages: Sender<'static, CriticalSectionRawMutex, LogPage>,
@@ -54,10 +55,10 @@ pub struct LogEnds {
 
 static WANTED: AtomicBool = AtomicBool::new(false);
 static STORAGE: AtomicU8 = AtomicU8::new(StorageState::Unknown as u8);
-/// What is asked of the logs that are kept.
+/// Newest query about the stored logs.
 static ASKED: Signal<CriticalSectionRawMutex, LogQuery> = Signal::new();
 
-/// True if there is a log to be written.
+/// True if ticks are to be logged.
 pub(crate) fn is_wanted() -> bool {
     WANTED.load(Ordering::Relaxed)
 }
@@ -94,9 +95,9 @@ impl LogPages for Pages {
     }
 }
 
-/// The links' task's part.
+/// Link task's part of the black box.
 pub struct LinkLog {
-    /// What stations ask of the logs.
+    /// Answers to stations' requests for stored logs.
     pub(crate) server: LogServer,
     stored: KeptLogs<Pages>,
     writer: LogWriter,
@@ -105,7 +106,7 @@ pub struct LinkLog {
 }
 
 impl LinkLog {
-    /// Creates it, before the first tick, and what the log's task receives; to be called once.
+    /// Creates the link task's part and the logging task's ends, before the first tick. Must be called once.
     #[inline(never)]
     pub(crate) fn begin<B: Board>() -> (&'static mut Self, LogEnds) {
         static LOG: StaticCell<LinkLog> = StaticCell::new();
@@ -126,8 +127,8 @@ impl LinkLog {
         (log, LogEnds { blocks, pages })
     }
 
-    /// Begins a tick of the links' task, of which this is the newest report. Returns a text for stations about the
-    /// storage when there is something new, and whether it is a warning.
+    /// Begins a tick of the log. Returns a text for stations, and whether it is a warning, when the state of the
+    /// storage has changed.
     pub(crate) fn begin_tick(
         &mut self,
         now_us: u64,
@@ -135,12 +136,12 @@ impl LinkLog {
         table: &ParameterTable,
     ) -> Option<(&'static str, bool)> {
         let wanted = self.writer.wants(now_us, armed, table.configuration().link.log_mode);
-        // Without a storage that takes it, the ticks are not even passed on.
+        // Details of ticks are not even passed on unless the storage is ready.
         WANTED.store(wanted && storage() == StorageState::Ready, Ordering::Relaxed);
         self.writer.news(storage())
     }
 
-    /// Writes a tick.
+    /// Logs a tick.
     #[inline(never)]
     pub(crate) fn tick(&mut self, tick: &TickRecord<'_, ROTORS>, table: &ParameterTable, escs: &EscTelemetry) {
         let beside = BesideTick { escs: Some(escs), origin: aux_sensors::frame_origin() };
@@ -148,22 +149,21 @@ impl LinkLog {
         self.writer.tick((tick, &beside), table, &start, storage(), PERIOD_US);
     }
 
-    /// Writes a change of the parameters.
+    /// Logs a change of the parameters.
     pub(crate) fn change(&mut self, table: &ParameterTable, change: RecordChange) {
         self.writer.change(table, change);
     }
 
-    /// Goes on with what stations ask of the logs.
+    /// Continues answering stations' requests for stored logs.
     #[inline(never)]
     pub(crate) fn transfer(&mut self, comms: &mut Comms, outgoing: &mut Vec<u8, REPORT_MAX>) {
         if self.server.is_busy() {
-            // There is room.
             let send = &mut |frame: &[u8]| drop(outgoing.extend_from_slice(frame));
             comms.transfer_logs(&mut self.server, &mut self.stored, send);
         }
     }
 
-    /// Writes the texts among the messages of a tick, and passes full blocks on.
+    /// Logs the status texts among the messages of a tick, and passes full blocks on.
     #[inline(never)]
     pub(crate) fn send(&mut self, now_us: u64, messages: &[u8]) {
         let LinkLog { writer, queue, .. } = self;
@@ -174,12 +174,12 @@ impl LinkLog {
     }
 }
 
-/// Keeps logs, for ever. Calls of the keeper wait for its card or flash: nothing else may be on this executor.
+/// Runs the logging task. Calls of `keeper` block on its card or flash, so no other task may be on this executor.
 pub async fn run(LogEnds { mut blocks, mut pages }: LogEnds, keeper: &mut dyn LogKeeper) -> ! {
     let mut asked = LogQuery::Nothing;
     loop {
         let look = Timer::at(Instant::from_micros(Instant::now().as_micros().wrapping_add(LOOK_US)));
-        // Blocks come first.
+        // New blocks have precedence over queries.
         let is_block = match select3(blocks.receive(), ASKED.wait(), look).await {
             Either3::First(block) => {
                 keeper.take(Instant::now().as_micros(), block);
@@ -197,7 +197,7 @@ pub async fn run(LogEnds { mut blocks, mut pages }: LogEnds, keeper: &mut dyn Lo
         if is_block {
             blocks.receive_done();
         }
-        // The log that is written has the right of way. The page may still be with the links' task.
+        // Waiting blocks are written before a query is answered. The link task may still be using the page.
         if asked != LogQuery::Nothing
             && blocks.try_receive().is_none()
             && let Some(page) = pages.try_send()

@@ -1,10 +1,10 @@
-//! The vehicle's parameters, and its key of signatures: read from the board's flash at the start, written to it while
-//! disarmed.
+//! Storage of the vehicle's parameters and its MAVLink signing key. They are read from the board's flash at the start,
+//! and written to it while the vehicle is disarmed.
 //!
-//! Sectors are erased at the start only, before the watchdog and the control tick run: while a sector of a chip's own
-//! flash is erased, half a second and more, an access to the flash may stop the core. Writing may stop it for a word at
-//! a time, up to 0.1 ms, with the tick's interrupt served in between: a tick comes that much late, which is within its
-//! tolerance. No word is written while armed ([`Gate`]).
+//! Sectors are erased at the start only, before the watchdog and the control tick run. Erasing a sector of the chip's
+//! own flash takes half a second or more, during which an access to the flash may stop the core. Writing may stop the
+//! core for up to 0.1 ms per word. The tick's interrupt runs between two words, so a tick is delayed by 0.1 ms at
+//! most, which is within its tolerance. No word is written while armed ([`Gate`]).
 
 use crate::control;
 use crate::vehicle::{CONFIGURATION, NAME, ParameterTable, Prepared};
@@ -23,34 +23,34 @@ use embassy_time::{Instant, Timer};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 use heapless::Deque;
 
-/// What is to be written.
+/// Change that is waiting to be written.
 #[derive(Clone, Copy)]
 enum Unwritten {
     /// A change of the parameters.
     Parameters(RecordChange),
-    /// A part of the key of signatures.
+    /// A part of the signing key.
     Signing(SigningRecord),
 }
 
-/// Changes to be written, and a signal that there are some.
+/// Changes to write, and a signal that the queue has changes.
 static CHANGES: Mutex<CriticalSectionRawMutex, RefCell<Deque<Unwritten, 8>>> = Mutex::new(RefCell::new(Deque::new()));
 static CHANGED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-/// True if the parameters' flash could not be read at the start, or if a change has not been written: until a station
-/// is told.
+/// Flags for a station's warning: the parameters' flash could not be read at the start; a change could not be written.
+/// Cleared when the station is told.
 static UNREAD: AtomicBool = AtomicBool::new(false);
 static UNWRITTEN: AtomicBool = AtomicBool::new(false);
-/// Time between two looks at whether the vehicle is still armed \[us\].
+/// Time between two attempts to write while the vehicle is armed \[us\].
 const PATIENCE_US: u64 = 100_000;
 
-/// Flash that is written word by word, and not while the vehicle is armed.
+/// Flash that is written word by word, and only while the vehicle is disarmed.
 pub struct Gate<M>(M);
 
-/// Why a [`Gate`] does nothing.
+/// Error of a [`Gate`].
 #[derive(Clone, Copy, Debug)]
 pub enum Shut {
     /// The vehicle is armed.
     Armed,
-    /// The flash itself.
+    /// The flash failed.
     Flash(NorFlashErrorKind),
 }
 
@@ -84,7 +84,7 @@ impl<M: NorFlash> NorFlash for Gate<M> {
     const ERASE_SIZE: usize = M::ERASE_SIZE;
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), Shut> {
-        // Not gated: only the start erases, before anything can be armed.
+        // Not gated: flash is erased only at the start, before the vehicle can arm.
         self.0.erase(from, to).map_err(|error| Shut::Flash(error.kind()))
     }
 
@@ -98,14 +98,14 @@ impl<M: NorFlash> NorFlash for Gate<M> {
     }
 }
 
-/// Writes the changes; none without a store.
+/// Writer of changes; without a store it writes none.
 pub struct Keeper<M>(Option<Store<Gate<M>>>);
 
-/// Reads the parameters, and the key of signatures, from `memory`, whose sectors begin at `start`, and makes room for
-/// changes. Without a store that can be read, the parameters are the image's.
+/// Reads the parameters and the signing key from `memory`, whose sectors begin at `start`, and makes room for changes.
+/// If the store cannot be read, the parameters are the image's.
 pub fn read<M: NorFlash>(memory: M, start: u32) -> (Keeper<M>, ParameterTable, Signing) {
     let mut table = ParameterTable::new(CONFIGURATION);
-    // By the vehicle's name: what was set on another one does not count.
+    // The store is tied to the vehicle's name, so that values set for another vehicle are ignored.
     let Ok(mut store) = Store::open(Gate(memory), start, hash(NAME.as_bytes())) else {
         UNREAD.store(true, Ordering::Relaxed);
         return (Keeper(None), table, Signing::default());
@@ -122,23 +122,23 @@ pub fn read<M: NorFlash>(memory: M, start: u32) -> (Keeper<M>, ParameterTable, S
     (Keeper(Some(store)), table, signing)
 }
 
-/// Returns the bits of a record. Out of line: for each of a key.
+/// Returns the bits of a record. Out of line, since it is called for each part of the key.
 #[inline(never)]
 fn word<M: NorFlash>(store: &mut Store<Gate<M>>, name: RecordName) -> Option<u32> {
     store.get(name).ok().flatten().map(|(_, bits)| bits)
 }
 
-/// Takes a change over to flight and flash: the next tick of the disarmed vehicle flies `table`, the configuration of
-/// this number.
+/// Passes a changed parameter on to flight and flash. At the next disarmed tick, the vehicle adopts `table` as the
+/// configuration of this number.
 pub fn change(table: &ParameterTable, change: RecordChange, number: u16) {
-    // Each change has been checked; one that could not fly would leave the former configuration.
+    // Each change has already been checked. If it still cannot fly, the former configuration stays.
     if let Ok(prepared) = Prepared::new(table.configuration()) {
         control::fly(prepared, number);
     }
     put(Unwritten::Parameters(change));
 }
 
-/// Returns what is wrong with the parameters' flash, each once, for stations.
+/// Returns a problem with the parameters' flash as a text for stations. Each problem is returned once.
 pub fn trouble() -> Option<&'static str> {
     if UNREAD.swap(false, Ordering::Relaxed) {
         return Some("parameters' flash cannot be read: not as set");
@@ -146,17 +146,17 @@ pub fn trouble() -> Option<&'static str> {
     UNWRITTEN.swap(false, Ordering::Relaxed).then_some("setting not kept: lost at restart unless set again")
 }
 
-/// Has `record` written, if there is one, once there is room for it. It is made outside of the queue's lock, during
-/// which no interrupt runs.
+/// Queues the record returned by `record`, if any, once the queue has room. `record` is called outside the queue's
+/// lock, during which no interrupt runs.
 pub fn keep_signing(record: impl FnOnce() -> Option<SigningRecord>) {
     let has_room = CHANGES.lock(|changes| changes.try_borrow().is_ok_and(|changes| !changes.is_full()));
-    // The room stays, since only this task queues: a record is handed out once.
+    // The room cannot vanish, since only this task queues. It is checked first because a record is handed out once.
     if has_room && let Some(record) = record() {
         put(Unwritten::Signing(record));
     }
 }
 
-/// Queues what is to be written, if there is room for it.
+/// Queues a change, or sets the flag `UNWRITTEN` if the queue is full.
 fn put(change: Unwritten) {
     if CHANGES.lock(|changes| changes.try_borrow_mut().ok()?.push_back(change).ok()).is_none() {
         UNWRITTEN.store(true, Ordering::Relaxed);
@@ -164,7 +164,7 @@ fn put(change: Unwritten) {
     CHANGED.signal(());
 }
 
-/// Writes changes while the vehicle is disarmed.
+/// Runs the task that writes changes while the vehicle is disarmed.
 pub async fn run<M: NorFlash>(keeper: &mut Keeper<M>) -> ! {
     loop {
         let change = next().await;
@@ -174,7 +174,7 @@ pub async fn run<M: NorFlash>(keeper: &mut Keeper<M>) -> ! {
         };
         loop {
             match keep(store, change) {
-                // Cut off by arming, if not by the flash: once more when the vehicle is disarmed.
+                // The vehicle has armed: try again later.
                 Err(Error::Flash(Shut::Armed)) => {
                     Timer::at(Instant::from_micros(Instant::now().as_micros().wrapping_add(PATIENCE_US))).await;
                 }
@@ -189,7 +189,7 @@ pub async fn run<M: NorFlash>(keeper: &mut Keeper<M>) -> ! {
     }
 }
 
-/// Writes a change. Out of line, to be identified in the image.
+/// Writes a change. Out of line, so that it can be identified in the image.
 #[inline(never)]
 fn keep<M: NorFlash>(store: &mut Store<Gate<M>>, change: Unwritten) -> Result<(), Error<Shut>> {
     match change {
@@ -198,10 +198,10 @@ fn keep<M: NorFlash>(store: &mut Store<Gate<M>>, change: Unwritten) -> Result<()
     }
 }
 
-/// Waits for a change.
+/// Waits for the next change.
 fn next() -> impl Future<Output = Unwritten> {
     poll_fn(|context| {
-        // Registered before looking, so that no change is missed.
+        // The waker is registered before the queue is read, so that no change is missed.
         let _ = pin!(CHANGED.wait()).poll(context);
         match CHANGES.lock(|changes| changes.try_borrow_mut().ok()?.pop_front()) {
             Some(change) => Poll::Ready(change),

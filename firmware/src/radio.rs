@@ -1,4 +1,4 @@
-//! A radio receiver in place of one of the links.
+//! Radio receiver on one of the links, in place of MAVLink.
 
 use crate::board::{Board, Links, Transmitter as _};
 use crate::recording;
@@ -9,36 +9,36 @@ use afbc_radio::RadioProtocol;
 use afbc_station::{Comms, RadioControl};
 use static_cell::StaticCell;
 
-/// Baud rate of CRSF, between ExpressLRS's 420,000 and Crossfire's 416,666.
+/// Baud rate of CRSF: that of ExpressLRS, and close enough to Crossfire's 416,666.
 const CRSF_BAUD: u32 = 420_000;
 
-/// True if a board may have one: it flies by its own sensors, and has a link to spare. Others have none of it.
+/// True if the board may have a radio receiver: it has sensors and a spare link. Other images leave the code out.
 pub const fn is_possible<B: Board>() -> bool {
     recording::is_possible::<B>()
 }
 
-/// The pilot: a receiver's line, if there is one, and a station's channels.
+/// Pilot's inputs, from the radio receiver, if there is one, and from the channels that a station sends.
 pub struct RadioLine {
     control: RadioControl,
-    /// Index of the link.
+    /// Index of the receiver's link, if there is a receiver.
     link: Option<usize>,
 }
 
-/// Returns the index of the link that a receiver is on: that of the parameters, or the board's own for it. The first
-/// one never is.
+/// Returns the index of the receiver's link: the one that the parameters name, or else the board's own. The first link
+/// is reserved for stations.
 fn link<B: Board>(table: &ParameterTable) -> Option<usize> {
     let port = usize::try_from(table.configuration().radio.receiver.port).ok()?;
     port.checked_sub(1).or(B::RADIO_LINK).filter(|link| (1..B::Links::COUNT).contains(link))
 }
 
-/// True if the exact log may have the link that the parameters give it.
+/// True if the exact log may have the link that the parameters give it, because the radio receiver does not use it.
 pub fn leaves_log<B: Board>(table: &ParameterTable) -> bool {
     let log = usize::try_from(table.configuration().link.log_port).ok().and_then(|port| port.checked_sub(1));
     !is_possible::<B>() || log.is_none() || log != link::<B>(table)
 }
 
 impl RadioLine {
-    /// Begins to listen, to be called once.
+    /// Sets up the receiver's link. Must be called once.
     #[inline(never)]
     pub fn begin<B: Board>(table: &ParameterTable, links: &mut B::Links) -> Option<&'static mut Self> {
         static LINE: StaticCell<RadioLine> = StaticCell::new();
@@ -55,21 +55,22 @@ impl RadioLine {
         Some(LINE.init_with(|| RadioLine { control: RadioControl::default(), link }))
     }
 
-    /// Index of its link.
+    /// Returns the index of the receiver's link.
     pub fn link(&self) -> Option<usize> {
         self.link
     }
 
-    /// Takes bytes of the receiver, or none; returns what the pilot wants. Out of line, like the report.
+    /// Decodes bytes of the receiver, possibly none, and returns the pilot's inputs. Out of line, so that the image has
+    /// a symbol for it.
     #[inline(never)]
     pub fn receive(&mut self, comms: &mut Comms, bytes: &[u8], table: &ParameterTable) -> Option<ControlInputs> {
         comms.pilot(&mut self.control, bytes, &table.configuration().radio)
     }
 
-    /// Sends what the transmitter shows.
+    /// Sends telemetry for the pilot's transmitter to show.
     #[inline(never)]
     pub fn send(&mut self, comms: &Comms, tick: &Tick, links: &mut impl Links, table: &ParameterTable) {
-        // SBUS has no way back.
+        // SBUS has no return channel.
         if table.configuration().radio.receiver.protocol == RadioProtocol::Crsf
             && let Some(link) = self.link.and_then(|link| links.each().get_mut(link))
             && let Some(bytes) = comms.radio_telemetry(&mut self.control)

@@ -12,33 +12,33 @@ use static_cell::StaticCell;
 
 static RECORDS: AtomicBool = AtomicBool::new(false);
 
-/// True if the exact log is written.
+/// True while the exact log is being written.
 pub fn records() -> bool {
     RECORDS.load(Ordering::Relaxed)
 }
 
-/// True if a board may keep an exact log: it has sensors, and a link to spare. Others have none of it.
+/// True if the board may keep an exact log: it has sensors and a spare link. Other images leave the code out.
 pub const fn is_possible<B: Board>() -> bool {
     B::Sampler::SENSES && B::Links::COUNT > 1
 }
 
-/// The law that every image flies: AFBC under its monitor.
+/// Name of the law that every image flies: AFBC under its monitor.
 const LAW: &str = "afbc";
 
-/// The exact log on one of the links.
+/// Exact log and the link that carries it.
 pub struct ExactLog {
     queue: RecordQueue,
-    /// Index of the link.
+    /// Index of the link that carries the log.
     link: usize,
 }
 
 impl ExactLog {
-    /// Begins the log, before the first tick, if the parameters want one; to be called once.
+    /// Begins the log before the first tick, if the parameters ask for one. Must be called once.
     #[inline(never)]
     pub fn begin<B: Board>(table: &ParameterTable) -> Option<&'static mut Self> {
         static LOG: StaticCell<ExactLog> = StaticCell::new();
         let link = usize::try_from(table.configuration().link.log_port).ok()?.checked_sub(1)?;
-        // The log takes MAVLink's place on its link: the first one stays for stations.
+        // The log replaces MAVLink on its link, and the first link is reserved for stations.
         if !is_possible::<B>() || link == 0 || link >= B::Links::COUNT {
             return None;
         }
@@ -47,20 +47,20 @@ impl ExactLog {
         Some(log)
     }
 
-    // Not for each board anew: what only depends on it is compiled to be fast.
+    // Not generic, since code generic in the board is compiled in the board's crate and optimized for speed.
     #[inline(never)]
     fn start(&mut self, table: &ParameterTable) {
         self.queue.start([NAME, LAW], table);
         RECORDS.store(true, Ordering::Relaxed);
     }
 
-    /// Records what messages have brought for the tick of this number.
+    /// Records the inputs that messages brought for the tick of this number.
     #[inline(never)]
     pub fn inputs(&mut self, tick: u32, inputs: &ControlInputs) {
         self.queue.inputs(tick, inputs);
     }
 
-    /// Records a change of the parameters, and returns the number of the configuration.
+    /// Records a change of the parameters, and returns the number of the new configuration.
     #[inline(never)]
     pub fn change(&mut self, table: &ParameterTable, change: RecordChange) -> u16 {
         self.queue.change(table, change)
@@ -72,7 +72,7 @@ impl ExactLog {
         self.queue.tick(tick);
     }
 
-    /// Sends what is recorded, as far as the link takes it.
+    /// Sends recorded data, as far as the link has room.
     #[inline(never)]
     pub fn send(&mut self, tick: &Tick, links: &mut impl Links) {
         let ExactLog { queue, link } = self;
@@ -81,7 +81,7 @@ impl ExactLog {
         }
     }
 
-    /// Index of the link that carries it.
+    /// Returns the index of the link that carries the log.
     pub fn link(&self) -> usize {
         self.link
     }

@@ -1,7 +1,7 @@
-//! What the sensors have read, from the sampling task to the control tick.
+//! Readings of the sensors, passed from the sampling tasks to the control tick.
 //!
-//! The task runs at a higher priority than the tick, so that a sample's time is that of its interrupt, and a transfer
-//! from a sensor goes on while the tick runs. The tick takes what has arrived.
+//! The sampling task runs at a higher priority than the tick. A sample is therefore stamped at its interrupt, and
+//! transfers from a sensor go on while the tick runs.
 
 use crate::vehicle::Flight;
 use afbc_calibration::RawSample;
@@ -15,19 +15,20 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use heapless::Deque;
 use nalgebra::Vector3;
 
-/// Measurements that wait, at most; a tick takes [`AIDS_MAX`](afbc_onboard::AIDS_MAX).
+/// Number of measurements that can wait; a tick takes [`AIDS_MAX`](afbc_onboard::AIDS_MAX).
 const WAITING: usize = 4;
 
-/// When a sample was true.
+/// Time of a sample.
 #[derive(Clone, Copy, Debug)]
 pub enum SampleTime {
     /// On the vehicle's clock ([`embassy_time::Instant`]) \[us\].
     At(u64),
-    /// So long before the tick that takes it begins \[us\]: from a host in lockstep, which does not know the clock.
+    /// Age when the tick that takes the sample begins \[us\]. Used by a lockstep host, which does not know the
+    /// vehicle's clock.
     BeforeTick(u32),
 }
 
-/// What a sensor has read.
+/// Reading of a sensor.
 #[derive(Clone, Copy, Debug)]
 pub enum SampleValue {
     /// Rates \[rad/s\] and specific force \[m/s2\] in the sensor's axes.
@@ -36,18 +37,18 @@ pub enum SampleValue {
     Aid(Measurement),
 }
 
-/// The sensors of a board.
+/// Sensors of a board.
 pub trait Sampler {
-    /// True if there are any.
+    /// True if there are sensors.
     const SENSES: bool = true;
-    /// True if there are two inertial sensors, of which one flies.
+    /// True if there are two inertial sensors, one of which is selected for flight.
     const IS_REDUNDANT: bool = false;
 
-    /// Reads them for ever, at a higher priority than the control tick, and [`put`]s what they have read.
+    /// Reads the sensors for ever, and passes each reading to [`put`].
     fn run(self) -> impl Future<Output = ()>;
 }
 
-/// The sensors of a board that has none: the state comes over the link.
+/// Stand-in for a board without sensors, whose state comes over the link.
 pub struct NoSensors;
 
 impl Sampler for NoSensors {
@@ -58,9 +59,9 @@ impl Sampler for NoSensors {
     }
 }
 
-/// What has arrived since the last tick.
+/// Readings that have arrived since the last tick.
 struct Arrived {
-    /// Newest sample of the inertial sensor: a faster one's driver averages.
+    /// Newest sample of the inertial sensor. The driver of a faster sensor averages its samples.
     imu: Option<(SampleTime, [Vector3<f32>; 2])>,
     aids: Deque<(SampleTime, Measurement), WAITING>,
 }
@@ -70,35 +71,34 @@ static SELECTOR: Mutex<CriticalSectionRawMutex, RefCell<ImuSelector>> = Mutex::n
 static ARRIVED: Mutex<CriticalSectionRawMutex, RefCell<Arrived>> =
     Mutex::new(RefCell::new(Arrived { imu: None, aids: Deque::new() }));
 
-/// True while samples are wanted, and what the sensors have read meanwhile.
+/// True while raw samples are wanted, and the readings collected meanwhile.
 static CALIBRATES: AtomicBool = AtomicBool::new(false);
 static RAW: Mutex<CriticalSectionRawMutex, RefCell<RawReadings>> = Mutex::new(RefCell::new(RawReadings::NONE));
 
-/// Puts what a sensor has read where the next tick takes it.
+/// Stores a reading for the next tick.
 pub fn put(time: SampleTime, value: SampleValue) {
     ARRIVED.lock(|arrived| {
-        // Not borrowed elsewhere while it is locked; no panic in any case.
+        // `try_borrow_mut` succeeds, since nothing else borrows while the lock is held.
         let Ok(mut arrived) = arrived.try_borrow_mut() else { return };
         match value {
             SampleValue::Imu(imu) => arrived.imu = Some((time, imu)),
             SampleValue::Aid(aid) => {
                 if arrived.aids.is_full() {
-                    // The oldest is worth least.
+                    // Drops the oldest measurement, which is worth least.
                     arrived.aids.pop_front();
                 }
-                // There is room now.
                 let _ = arrived.aids.push_back((time, aid));
             }
         }
     });
 }
 
-/// Puts a sample of the first of two inertial sensors, in the body's axes; [`ImuSelector`] says which flies.
+/// Stores a sample of the first of two inertial sensors, in body axes; [`ImuSelector`] selects the sensor that flies.
 pub fn put_first_imu(at_us: u64, sample: [Vector3<f32>; 2]) {
     put_selected(at_us, |selector| selector.take_first(at_us, sample));
 }
 
-/// Puts a sample of the second.
+/// Stores a sample of the second inertial sensor.
 pub fn put_second_imu(at_us: u64, sample: [Vector3<f32>; 2]) {
     put_selected(at_us, |selector| selector.take_second(at_us, sample));
 }
@@ -110,8 +110,8 @@ fn put_selected(at_us: u64, select: impl FnOnce(&mut ImuSelector) -> Option<[Vec
     }
 }
 
-/// Cross-checks two inertial sensors after a tick that took these readings. Out of line, so that the tick's
-/// stack and instructions stay as they are counted.
+/// Cross-checks two inertial sensors after a tick that used `readings`. Out of line, so that it is not counted in the
+/// tick's stack and instructions.
 #[inline(never)]
 pub(crate) fn cross_check(flight: &Flight, readings: &Readings) {
     SELECTOR.lock(|selector| {
@@ -119,32 +119,33 @@ pub(crate) fn cross_check(flight: &Flight, readings: &Readings) {
     });
 }
 
-/// Returns which of two inertial sensors flies at `now_us`, and which work.
+/// Returns which of two inertial sensors is selected at `now_us`, and which of them work.
 pub(crate) fn imu_pair(now_us: u64) -> ImuPair {
     SELECTOR.lock(|selector| selector.try_borrow().map(|selector| selector.pair(now_us)).unwrap_or_default())
 }
 
-/// Returns the next sample for a calibration or a station; collects readings, or not, from now on.
+/// Returns the next raw sample for a calibration or a station. `collects` turns collecting on or off from now on.
 pub(crate) fn raw(collects: bool) -> Option<RawSample> {
     let collected = CALIBRATES.swap(collects, Ordering::Relaxed);
     RAW.lock(|raw| {
         let mut raw = raw.try_borrow_mut().ok().filter(|_| collects)?;
         if !collected {
-            // What is left of an earlier calibration is not of this one.
+            // Discards readings left over from an earlier calibration.
             *raw = RawReadings::NONE;
         }
         raw.take()
     })
 }
 
-/// Adds the readings of a tick to what a calibration takes.
+/// Adds the readings of a tick to the raw readings for a calibration.
 #[cold]
 #[inline(never)]
 fn collect(now_us: u64, readings: &Readings) {
     RAW.lock(|raw| raw.try_borrow_mut().ok().map(|mut raw| raw.add(now_us, readings)));
 }
 
-/// Sets `readings` to what has arrived, for a tick that begins at `now_us`; further measurements wait for the next one.
+/// Moves the stored readings into `readings` for a tick that begins at `now_us`. Measurements beyond
+/// [`AIDS_MAX`](afbc_onboard::AIDS_MAX) wait for the next tick.
 pub(crate) fn take(now_us: u64, readings: &mut Readings) {
     readings.clear();
     ARRIVED.lock(|arrived| {
@@ -163,10 +164,10 @@ pub(crate) fn take(now_us: u64, readings: &mut Readings) {
 }
 
 impl SampleTime {
-    /// Returns the age at `now_us`.
+    /// Returns the age at `now_us` \[us\].
     fn age_us(self, now_us: u64) -> u32 {
         match self {
-            // Sampling interrupts the tick, so that a sample may be newer than its beginning: the age is 0 then.
+            // Sampling interrupts the tick, so a sample may be newer than the tick's beginning; its age is then 0.
             SampleTime::At(at_us) => now_us.saturating_sub(at_us).try_into().unwrap_or(u32::MAX),
             SampleTime::BeforeTick(age_us) => age_us,
         }

@@ -1,4 +1,4 @@
-//! The sensors' own tests, which a station asks a disarmed vehicle for: from the links' task to the sensors' and back.
+//! Self-tests of the sensors: passes a station's request from the link task to the sensor tasks, and the results back.
 
 use crate::control;
 pub use afbc_station::services::health::sensor;
@@ -6,37 +6,37 @@ use afbc_station::services::sensors;
 use afbc_station::services::status::SensorBits;
 use core::sync::atomic::{AtomicU32, Ordering};
 
-/// The first inertial sensor, or the only one.
+/// Bits of the first, or only, inertial sensor.
 pub const FIRST_IMU: u32 = sensor::GYROSCOPE | sensor::ACCELEROMETER;
-/// The second one.
+/// Bits of the second inertial sensor.
 pub const SECOND_IMU: u32 = sensor::GYROSCOPE_2 | sensor::ACCELEROMETER_2;
 
-/// Number of the newest request.
+/// Number of requests so far.
 static ASKED: AtomicU32 = AtomicU32::new(0);
-/// Sensors that have failed their last test, and those whose newest results, failed or passed, are to be told, as
-/// `MAV_SYS_STATUS_SENSOR`.
+/// Sensors that failed their last self-test, and sensors with a new result (failed, passed) to report, as
+/// `MAV_SYS_STATUS_SENSOR` bits.
 static FAILED: AtomicU32 = AtomicU32::new(0);
 static NEWS: [AtomicU32; 2] = [const { AtomicU32::new(0) }; 2];
 
-/// What a sensor's task remembers of the requests.
+/// Number of the last request that a sensor's task has seen.
 #[derive(Default)]
 pub struct Asked(u32);
 
 impl Asked {
-    /// True once for each request, if the vehicle is disarmed.
+    /// True once per request, if the vehicle is disarmed.
     pub fn is_new(&mut self) -> bool {
-        // Noted while armed, too: a test must not begin when the vehicle is disarmed later on.
+        // Also stored while armed, so that the self-test does not begin later, when the vehicle disarms.
         let asked = ASKED.load(Ordering::Relaxed);
         core::mem::replace(&mut self.0, asked) != asked && !control::armed()
     }
 }
 
-/// Has every sensor run its test.
+/// Requests a self-test of every sensor.
 pub(crate) fn ask() {
     ASKED.fetch_add(1, Ordering::Relaxed);
 }
 
-/// Puts the result of the test of the sensor with these bits.
+/// Stores the self-test result of the sensor with these bits.
 pub fn put(bits: u32, passes: bool) {
     let [failed, passed] = &NEWS;
     if passes {
@@ -48,7 +48,8 @@ pub fn put(bits: u32, passes: bool) {
     }
 }
 
-/// Makes sensors that have failed their test unhealthy, and returns what is to be told of one result.
+/// Marks sensors that failed their self-test as unhealthy, and returns the text of one new result and whether it
+/// passed.
 pub(crate) fn report(reported: &mut SensorBits) -> Option<(&'static str, bool)> {
     let failed = FAILED.load(Ordering::Relaxed);
     reported.present |= failed;

@@ -1,5 +1,5 @@
-//! Results of the control ticks, from the control task to the links': one queue, whose ticks have their details with
-//! them if a log is written.
+//! Queue of the control ticks' results, from the control task to the link task. Ticks carry details while a log is
+//! written.
 
 use crate::vehicle::Report;
 use afbc_onboard::TickDetails;
@@ -15,7 +15,7 @@ use embassy_sync::zerocopy_channel::{Channel, Receiver, Sender};
 use heapless::Deque;
 use static_cell::StaticCell;
 
-/// Details that wait, at most; further ticks are queued without, and are missing in logs.
+/// Number of details that can wait. Further ticks are queued without details and are missing in logs.
 const DETAILS: usize = 5;
 
 /// Result of one control tick.
@@ -23,28 +23,29 @@ const DETAILS: usize = 5;
 pub struct Tick {
     /// Report of the flight core.
     pub report: Report,
-    /// Duration, interrupts included \[core cycles\].
+    /// Duration of the tick, interrupts included \[core cycles\].
     pub cycles: u32,
-    /// True if its details are the next ones that wait.
+    /// True if the next waiting details belong to this tick.
     pub is_detailed: bool,
 }
 
-/// Results of the last ticks, and a signal that there are some. Not a channel, which panics when it is re-entered.
-// 20: with eight, ticks were lost on a processor of a quarter of the speed; with 20 or more, none was. With more, less
-// than a quarter of the RAM is free on a board with a black box and motor controllers that answer.
+/// Queued results, and a signal that there are some. Not an embassy channel, which panics when it is re-entered.
+// With 8 results, ticks were lost on a processor of a quarter of the speed; with 20, none were. More than 20 would
+// leave less than a quarter of the RAM free on a board with a black box and answering motor controllers.
 static TICKS: Mutex<CriticalSectionRawMutex, RefCell<Deque<Tick, 20>>> = Mutex::new(RefCell::new(Deque::new()));
 static TICKED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
-/// Where the control task puts details, and where the links' task finds them.
+/// Ends of the channel of details: the control task sends, the link task receives.
 pub(crate) type DetailsIn = Sender<'static, CriticalSectionRawMutex, TickDetails>;
 pub(crate) type DetailsOut = Receiver<'static, CriticalSectionRawMutex, TickDetails>;
 
-/// Both, until the tasks take them. Each is written in place, with interrupts on: it is too long to be copied.
+/// Both ends, until the tasks take them. Details are written in place, outside a lock, because they are too long to
+/// copy.
 static ENDS: Mutex<CriticalSectionRawMutex, RefCell<Ends>> = Mutex::new(RefCell::new((None, None)));
 type Ends = (Option<DetailsIn>, Option<DetailsOut>);
 
-/// Makes room for details, to be called once, before the first tick, by a board that may write logs: the others do not
-/// have its memory.
+/// Creates the channel of details, before the first tick. Must be called once, only by a board that may write logs;
+/// the others spend no memory on it.
 #[inline(never)]
 pub(crate) fn keep_details() {
     static HELD: StaticCell<[TickDetails; DETAILS]> = StaticCell::new();
@@ -54,21 +55,20 @@ pub(crate) fn keep_details() {
     ENDS.lock(|ends| ends.try_borrow_mut().ok().map(|mut ends| *ends = (Some(put), Some(take))));
 }
 
-/// Returns the control task's end, once; none if no room was made.
+/// Returns the control task's end, once; `None` if the channel was not created.
 pub(crate) fn details_in() -> Option<DetailsIn> {
     ENDS.lock(|ends| ends.try_borrow_mut().ok()?.0.take())
 }
 
-/// Returns the links' task's end, once; none if no room was made.
+/// Returns the link task's end, once; `None` if the channel was not created.
 pub(crate) fn details_out() -> Option<DetailsOut> {
     ENDS.lock(|ends| ends.try_borrow_mut().ok()?.1.take())
 }
 
-/// Waits for the result of the oldest tick not yet returned. A tick never waits: while twenty results are queued,
-/// further ones are dropped.
+/// Waits for the oldest queued result. The control tick never waits: if 20 results are queued, it drops the next one.
 pub fn next() -> impl Future<Output = Tick> {
     poll_fn(|context| {
-        // Registered before looking, so that no tick is missed.
+        // The waker is registered before the queue is read, so that no tick is missed.
         let _ = pin!(TICKED.wait()).poll(context);
         match TICKS.lock(|ticks| ticks.try_borrow_mut().ok()?.pop_front()) {
             Some(tick) => Poll::Ready(tick),
@@ -77,7 +77,8 @@ pub fn next() -> impl Future<Output = Tick> {
     })
 }
 
-/// Reports a tick; false if the links' task falls behind: then this tick is not reported.
+/// Queues the result of a tick. Returns false, and drops the result, if the queue is full because the link task is
+/// behind.
 pub fn push(tick: Tick) -> bool {
     let push = |ticks: &RefCell<Deque<_, _>>| ticks.try_borrow_mut().ok()?.push_back(tick).ok();
     let is_queued = TICKS.lock(push).is_some();

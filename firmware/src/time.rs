@@ -1,7 +1,7 @@
-//! Time base: embassy-time on SysTick, the one timer that all chips and the emulator share.
+//! Time base: embassy-time on SysTick, the one timer that all chips and the emulator have.
 //!
-//! Its period of 1 ms is the control period. The counter within it resolves 1 us, and measures the control tick in core
-//! cycles. Tasks are woken to the resolution of the period.
+//! SysTick's period of 1 ms is the control period. Its counter resolves 1 us, and measures the control tick in core
+//! cycles. Tasks wake with a resolution of one period.
 
 use core::cell::{Cell, RefCell};
 use core::task::Waker;
@@ -14,25 +14,25 @@ use embassy_time_driver::Driver;
 pub use embassy_time_driver::time_driver_impl;
 use embassy_time_queue_utils::Queue;
 
-/// Microseconds of one control period.
+/// Control period \[us\].
 const US_PER_TICK: u64 = 1000;
 
-/// The time base of a core with `CYCLES_PER_US` cycles per microsecond; [`image!`](crate::image!) installs it.
+/// embassy-time driver of a core with `CYCLES_PER_US` cycles per microsecond; [`image!`](crate::image!) installs it.
 pub struct SysTickDriver<const CYCLES_PER_US: u32>;
 
-/// Where it is.
+/// State of the time base.
 struct State {
     /// Start of the current period \[us\].
     period_us: Cell<u64>,
-    /// The tasks that wait for a time.
+    /// Tasks that wait for a time.
     waiting: RefCell<Queue>,
-    /// No task waits for an earlier time \[us\].
+    /// Earliest time that a task waits for \[us\].
     next_us: Cell<u64>,
 }
 
 impl State {
-    /// Wakes the tasks whose time has come. The queue is not borrowed elsewhere while interrupts are off, and nothing
-    /// here may panic, since nothing flies without it.
+    /// Wakes the tasks whose time has come. Must not panic, since no flight goes on without the time base. The borrow
+    /// succeeds, since nothing else borrows while interrupts are off.
     fn wake_due(&self) {
         let now_us = self.period_us.get();
         if now_us >= self.next_us.get()
@@ -46,10 +46,10 @@ impl State {
 static STATE: Mutex<State> =
     Mutex::new(State { period_us: Cell::new(0), waiting: RefCell::new(Queue::new()), next_us: Cell::new(u64::MAX) });
 
-/// Starts the time base of a core that runs at `core_hz`; its interrupt priority must be set before.
+/// Starts the time base of a core that runs at `core_hz`. The priority of its interrupt must be set before.
 pub(crate) fn start(mut syst: SYST, core_hz: u32) {
     syst.set_clock_source(SystClkSource::Core);
-    // The counter passes through 0 as well.
+    // One less, because the counter passes through 0 as well.
     syst.set_reload(core_hz / 1000 - 1);
     syst.clear_current();
     syst.enable_interrupt();
@@ -60,23 +60,24 @@ pub(crate) fn start(mut syst: SYST, core_hz: u32) {
 pub fn next_period() -> Instant {
     let period_us = critical_section::with(|cs| {
         let period_us = STATE.borrow(cs).period_us.get();
-        // With interrupts off, a period that has just ended is not counted yet.
+        // If a period has just ended, its interrupt is pending and the period not counted yet, since interrupts are
+        // off.
         if SCB::is_pendst_pending() { period_us + US_PER_TICK } else { period_us }
     });
     Instant::from_micros(period_us + US_PER_TICK)
 }
 
-/// A stopwatch in core cycles, for durations of less than one period.
+/// Stopwatch in core cycles, for durations shorter than one period.
 #[derive(Clone, Copy)]
 pub struct Stopwatch(u32);
 
 impl Stopwatch {
-    /// Starts it.
+    /// Starts a stopwatch.
     pub fn start() -> Self {
         Stopwatch(SYST::get_current())
     }
 
-    /// Returns the cycles since the start, of a core that runs at `core_hz`; the emulator counts instructions instead.
+    /// Returns the cycles since the start, on a core that runs at `core_hz`. The emulator counts instructions instead.
     pub fn cycles(&self, core_hz: u32) -> u32 {
         // SysTick counts down and wraps from 0 to its reload value.
         let (start, now) = (self.0, SYST::get_current());

@@ -1,24 +1,24 @@
-//! The vehicle that this image flies, from its file: `VEHICLE=... cargo fw` ([`build.rs`](../../build.rs)).
+//! The vehicle that this image flies, from the file that `VEHICLE=... cargo fw` names ([`build.rs`](../../build.rs)).
 //!
-//! Which one it is, is decided when the image is built, and everything about it is checked there.
+//! The build selects the vehicle and checks its file.
 
 use afbc_types::{Airframe, Choice, Parameters, Rotor};
 use nalgebra::Vector3;
 
-/// What the firmware is told of it.
+/// Configuration of the vehicle's flight software.
 pub type Configuration = afbc_onboard::Configuration<ROTORS>;
-/// Its parameters, from which the configuration is made.
+/// Parameters from which the configuration is made.
 pub type ParameterTable = afbc_onboard::parameters::ParameterTable<ROTORS>;
-/// A configuration ready to be flown.
+/// Configuration ready to fly.
 pub type Prepared = afbc_onboard::Prepared<ROTORS>;
-/// The vehicle under its law.
+/// The vehicle's flight software.
 pub type Flight = afbc_onboard::Flight<ROTORS>;
-/// What one of its ticks decided.
+/// Result of one tick.
 pub type Report = afbc_onboard::Report<ROTORS>;
 
 include!(concat!(env!("OUT_DIR"), "/vehicle.rs"));
 
-/// Where the vehicle's values are put. Each of these is replaced.
+/// Configuration into which the generated code puts the vehicle's values; it replaces all values of this airframe.
 const PLAIN: Configuration = Configuration::plain(Airframe {
     parameters: Parameters {
         mass_kg: 0.0,
@@ -32,7 +32,7 @@ const PLAIN: Configuration = Configuration::plain(Airframe {
     rotors: [Rotor { x: 0.0, y: 0.0, pushes_left: false }; ROTORS],
 });
 
-/// Returns the choice that files call `word`.
+/// Returns the choice that vehicle files call `word`.
 #[expect(clippy::indexing_slicing, reason = "evaluated by the compiler, which refuses an unknown word")]
 const fn choice<C: Choice>(word: &str) -> C {
     let mut index = 0;
