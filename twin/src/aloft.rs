@@ -1,5 +1,5 @@
-//! A flight that is in the air already: the board as a snapshot of its models, and what the plant was told until then,
-//! to be told again. So many faults begin in the same instant of one flight.
+//! Hovering flight, kept as a snapshot of the board's models and a record of the motor commands so far. Replaying the
+//! record brings the plant to the same state. Many faults can thus begin in the same instant of one flight.
 
 use crate::check::check;
 use crate::fly::{Flight, TICK_NS, images};
@@ -18,10 +18,10 @@ use std::error::Error;
 use std::marker::PhantomData;
 use std::path::Path;
 
-/// How long it has hovered [ms].
+/// Time in hover before the snapshot is taken [ms].
 const HOVERED_MS: u64 = 5_000;
 
-/// What the vehicle did in each millisecond: the throttles, and the bytes of its link.
+/// Record of each millisecond: the throttles, and the bytes that the board sent over the link.
 #[derive(Clone, Debug, Default)]
 struct Past(Vec<(Vec<u16>, Vec<u8>)>);
 
@@ -36,7 +36,7 @@ impl Store for Past {
     }
 }
 
-/// Both ends of the link: the bytes of a millisecond are passed on at its end.
+/// Both ends of the link. The bytes of a millisecond are delivered at its end.
 #[derive(Clone, Debug, Default)]
 pub struct Link {
     board: Wire,
@@ -44,20 +44,20 @@ pub struct Link {
 }
 
 impl Link {
-    /// Passes on what has been said, and returns what the board said.
+    /// Delivers the bytes in both directions, and returns those from the board.
     pub fn pass(&self) -> Vec<u8> {
         let from_board = self.board.take();
         self.board.send(&self.pilot.exchange(&from_board));
         from_board
     }
 
-    /// Puts bytes on the wire to the board.
+    /// Sends bytes to the board.
     pub fn flood(&self, bytes: &[u8]) {
         self.board.send(bytes);
     }
 }
 
-/// A vehicle in hover.
+/// Vehicle in hover.
 pub struct Aloft<M> {
     images: Vec<Image>,
     scenario: Scenario,
@@ -66,7 +66,7 @@ pub struct Aloft<M> {
     machine: PhantomData<M>,
 }
 
-/// Flies until the vehicle hovers.
+/// Driver that flies until the vehicle hovers.
 struct Climb {
     flight: Flight,
     link: Link,
@@ -88,9 +88,9 @@ impl<M: Machine> Driver<M> for Climb {
         let (_, signals) = pilot.advance(stop.at.0 / TICK_NS)?;
         session.board_mut().sense(&signals);
         let is_there = pilot.hovers_ms().is_some_and(|hovers_ms| hovers_ms >= HOVERED_MS);
-        // Not in the middle of a frame: what has been read of it is not in the snapshot.
+        // A frame that is being read is not part of the snapshot, so none is taken during a frame.
         if is_there && self.flight.pins.look_ns().is_none() {
-            // Held counters are the twin's doing: the snapshot is to have them as the image does.
+            // The twin holds the timers' counters. It releases them first, so that the snapshot has them as the image.
             self.flight.pins.release(session.mcu(), stop.at);
             self.taken = Some(take(session, host, stop, &self.firmware, &self.past).map(|taken| taken.file));
             return None;
@@ -119,8 +119,8 @@ fn board<M: Machine>(link: &Link) -> Result<Box<M>, Box<dyn Error>> {
 }
 
 impl<M: Machine> Aloft<M> {
-    /// Flies a scenario until the vehicle hovers, and keeps that in a file; or takes it from there, if it is of this
-    /// image.
+    /// Flies a scenario until the vehicle hovers, and keeps the snapshot in the file `kept`. If the file exists, reads
+    /// the snapshot from it; fails if it belongs to another image.
     pub fn of(image: &Path, scenario: &Path, kept: &Path) -> Result<Self, Box<dyn Error>> {
         let images = images::<M>(image, &[])?;
         let scenario = load(scenario)?;
@@ -151,7 +151,7 @@ impl<M: Machine> Aloft<M> {
         Ok(Aloft { images, scenario, snapshot: Snapshot::read(kept)?, past, machine: PhantomData })
     }
 
-    /// Goes on from there with what `driver` makes of the flight and its link.
+    /// Resumes the flight with the driver that `driver` makes of the flight, its link and the time \[ns\].
     pub fn resume<R: Driver<M> + 'static>(
         &self,
         driver: impl FnOnce(Flight, Link, u64) -> R,

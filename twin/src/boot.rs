@@ -1,5 +1,5 @@
-//! Boots the flight image of a board on register-level models of it and checks from outside, on bus and pins, that it
-//! ticks at 1 kHz, feeds its watchdog, drives its motor outputs and talks.
+//! Boots the flight image of a board on register-level models of it. Checks from outside, on bus and pins, that the
+//! image ticks at 1 kHz, feeds its watchdog, drives its motor outputs and sends telemetry.
 
 use crate::check::check;
 use crate::fly::images;
@@ -16,34 +16,34 @@ use rigless::time::VirtualNanos;
 use std::error::Error;
 use std::path::Path;
 
-/// The key that feeds the watchdog.
+/// Key that feeds the watchdog.
 const FEED: u64 = 0xAAAA;
-/// The station, as in [`Decoder::new`].
+/// Address of the ground station.
 const STATION: Address = Address { system: 255, component: 190 };
-/// DSHOT600 \[ns\]: the pulse of a zero, and the time of a bit; a stopped motor's frame has sixteen zeros.
+/// DSHOT600 \[ns\]: length of a zero's pulse, and period of a bit. The frame of a stopped motor has 16 zeros.
 const PULSE_NS: u64 = 625;
 const BIT_NS: u64 = 1_667;
 const BITS: u64 = 16;
-/// PWM \[ns\]: the pulse of a stopped motor, and the period.
+/// PWM \[ns\]: pulse of a stopped motor, and period.
 const STOPPED_NS: u64 = 1_000_000;
 const PERIOD_NS: u64 = 2_500_000;
-/// A count of the timers \[ns\], with PWM's prescaler.
+/// Resolution of the timers \[ns\], for DSHOT and with PWM's prescaler.
 const COUNT_NS: u64 = 5;
 const DIVIDED_COUNT_NS: u64 = 50;
 
-/// Virtual time of the run \[ns\]: two heartbeats. In its last ticks the outputs are looked at every
+/// Virtual time of the run \[ns\], enough for two heartbeats. In the last 10 ms, the outputs are sampled every
 /// microsecond.
 const END: u64 = 1_200_000_000;
 const LOOK_FROM: u64 = END - 10_000_000;
 const LOOK_EVERY: u64 = 1_000;
 const TICK: u64 = 1_000_000;
-/// What is seen from outside.
+/// Observations from outside.
 struct Seen {
-    /// When the watchdog was fed \[ns\].
+    /// Times at which the watchdog was fed \[ns\].
     feeds: Vec<u64>,
-    /// For each motor, in how many looks its pin carried a pulse.
+    /// Number of samples, for each motor, in which its pin carried a pulse.
     pulses: Vec<u64>,
-    /// Looks, and pulses that were not those of a stopped motor.
+    /// Number of samples, and pulses other than those of a stopped motor.
     looks: u64,
     wrong: Vec<String>,
     /// First word of the parameters' flash at the end.
@@ -120,7 +120,7 @@ pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
     check(feeds.len() as u64 + first >= END / TICK - 1, "no tick is missing")?;
     check(least.abs_diff(TICK) <= M::JITTER && most.abs_diff(TICK) <= M::JITTER, "1 kHz")?;
 
-    // A frame for each tick of the looks; PWM repeats its pulses.
+    // DSHOT sends one frame per tick; PWM repeats its pulses all the time.
     let carried = match M::SIGNAL {
         Signal::Dshot600(_) => looks * LOOK_EVERY / TICK * BITS * BIT_NS / LOOK_EVERY,
         Signal::Pwm400 => *looks,

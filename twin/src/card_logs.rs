@@ -1,22 +1,22 @@
-//! The logs that a board has kept, in files of this machine.
+//! Writes the logs that a board has stored to files of this machine.
 
 use crate::card::LogStorage;
 use std::error::Error;
 use std::fs;
 use std::path::Path;
 
-/// A log that was kept.
+/// Log found on a board's storage.
 #[derive(Debug)]
 pub struct CardLog {
     pub name: String,
     pub bytes: usize,
-    /// What its dropouts say [ms].
+    /// Total duration of the log's dropout records [ms].
     pub missing_ms: u64,
-    /// Bytes behind the last whole record.
+    /// Bytes after the last whole record.
     pub rest: usize,
 }
 
-/// Walks over the records of a log (PX4 User Guide, "ULog File Format"): length, kind, content.
+/// Walks through the records of a log (PX4 User Guide, "ULog File Format"): length, kind, content.
 fn walk(name: String, log: &[u8]) -> CardLog {
     // A file's header has 16 bytes.
     let (mut rest, mut missing_ms) = (log.get(16..).unwrap_or_default(), 0);
@@ -30,7 +30,7 @@ fn walk(name: String, log: &[u8]) -> CardLog {
     CardLog { name, bytes: log.len(), missing_ms, rest: rest.len() }
 }
 
-/// Writes the logs that are kept into a folder, and returns them.
+/// Writes the stored logs into a folder, and returns their descriptions.
 pub fn save(storage: &dyn LogStorage, folder: &Path) -> Result<Vec<CardLog>, Box<dyn Error>> {
     fs::create_dir_all(folder)?;
     let mut saved = Vec::new();

@@ -1,5 +1,6 @@
-//! Power cut at any instant while parameters are written or their flash is erased, at the chip's flash as it is: the
-//! next start must find each parameter as it was or as it was to be, whatever the interrupted word or sector holds.
+//! Cuts the power at any instant while parameters are written or their flash is erased, at the level of the chip's
+//! flash. At the next start, each parameter must have its old or its new value, whatever the interrupted word or
+//! sector holds.
 
 use crate::check::check;
 use crate::kept::Changes;
@@ -18,64 +19,64 @@ use std::error::Error;
 use std::path::Path;
 
 const STATION: Address = Address { system: 255, component: 190 };
-/// What is written, from which value to which, and what must stay as it is.
+/// Parameter that is written, with its old and new value, and a parameter that must keep its value.
 const WRITTEN: (&str, f32, f32) = ("MIS_TAKEOFF_ALT", 3.0, 4.5);
 const OTHER: (&str, f32) = ("RTL_RETURN_ALT", 22.0);
 /// MAV_PARAM_TYPE_REAL32.
 const REAL32: u8 = 9;
 
-/// The parameters' two sectors (RM0433, 4.3.4): bytes of each, and of a word that is programmed at once.
+/// Parameters' two sectors (RM0433, 4.3.4): bytes of a sector, of both, and of a word that is programmed at once.
 const SECTOR: u64 = 128 * 1024;
 const BYTES: u64 = 2 * SECTOR;
 const WORD: u64 = 32;
-/// Control register of the second bank (RM0433, 4.9.25), its bits START and SNB.
+/// Control register of the second bank (RM0433, 4.9.25), with its START bit and the position of SNB.
 const CR2: u64 = 0x5200_210C;
 const START: u64 = 1 << 7;
 const SECTOR_AT: u32 = 8;
-/// Times of the run [ns].
+/// One millisecond [ns].
 const MS: u64 = 1_000_000;
-/// Mean time between two cuts while a word is programmed, most of which are not kept.
+/// Mean time between two cuts while a word is programmed [ns]. Most of these cuts are thinned out later.
 const PROGRAM_APART_NS: u64 = 2_000;
-/// Time after which a word is programmed.
+/// Time after which a word counts as programmed [ns].
 const PROGRAMS_NS: u64 = 150_000;
-/// When the parameter is set, and when it is over.
+/// Time at which the parameter is set, and duration of its write [ns].
 const SET_NS: u64 = 150 * MS;
 const WRITES_NS: u64 = 30 * MS;
-/// Longest start: two erases.
+/// Longest start, with two erases [ns].
 const START_NS: u64 = 3_000 * MS;
 
-/// What a run is cut in.
+/// Operation that the power cuts interrupt.
 #[derive(Clone, Copy, PartialEq)]
 enum During {
-    /// A parameter that is set over the link.
+    /// Write of a parameter that is set over the link.
     Write,
-    /// A start that erases and copies.
+    /// Erase and copy at a start.
     Erase,
 }
 
-/// An operation of the flash that may not have ended.
+/// Flash operation that may not have ended.
 #[derive(Clone, Copy)]
 enum Pending {
     Program(u64, [u32; 8]),
     Erase(u64),
 }
 
-/// A board whose power is cut now and then: what its flash holds is kept, and it goes on.
+/// Run in which power cuts are simulated: at each cut, the flash content is kept, and the run goes on.
 struct Cut {
     during: During,
     wire: Wire,
     random: Random,
-    /// Mean time between two cuts in an erase [ns].
+    /// Mean time between two cuts during an erase [ns].
     erase_apart_ns: u64,
     pending: Option<Pending>,
-    /// When the pending operation began, and when the next cut is [ns].
+    /// Start of the pending operation, and time of the next cut [ns].
     since_ns: u64,
     next_ns: u64,
     is_set: bool,
     kept: Vec<Kept>,
 }
 
-/// What the flash held when the power was cut.
+/// Flash content at a power cut.
 struct Kept {
     at_ns: u64,
     in_erase: bool,
@@ -90,7 +91,7 @@ impl Cut {
             let (word, place) = (address / WORD * WORD, address % WORD / 4);
             let mut data = match self.pending {
                 Some(Pending::Program(at, data)) if at == word => data,
-                // What is not written of a word stays erased.
+                // Parts of a word that are not written stay erased.
                 _ => [u32::MAX; 8],
             };
             if let Some(part) = data.get_mut(place as usize) {
@@ -108,12 +109,12 @@ impl Cut {
         match self.pending {
             None => false,
             Some(Pending::Program(..)) => now_ns < self.since_ns + PROGRAMS_NS,
-            // Its end is not seen: a cut behind it sets bits that are set already.
+            // The end of an erase is not visible. A cut after it sets bits that are already set.
             Some(Pending::Erase(_)) => true,
         }
     }
 
-    /// Keeps what the flash holds if the power is cut now: of an operation that has not ended, some of its bits.
+    /// Keeps the flash content of a power cut now. An interrupted operation has changed only some of its bits.
     fn cut(&mut self, host: &mut dyn Host, now_ns: u64) -> Result<(), rigless::emulator::Error> {
         let mut bytes = Vec::with_capacity(BYTES as usize);
         for address in (MatekH743::STORE..MatekH743::STORE + BYTES).step_by(8) {
@@ -126,7 +127,7 @@ impl Cut {
                 let cells = &mut bytes[at..at + WORD as usize];
                 let whole: Vec<u8> = data.iter().flat_map(|part| part.to_le_bytes()).collect();
                 let has_ended = cells.iter().zip(&whole).all(|(cell, byte)| cell == byte);
-                // The firmware reads a word whose checksum is wrong as zero.
+                // The firmware reads a word with an uncorrectable error as zero.
                 let is_refused = self.random.next() % 2 == 0;
                 if !has_ended && is_refused {
                     cells.fill(0);
@@ -149,7 +150,7 @@ impl Cut {
         Ok(())
     }
 
-    /// Returns each bit with the probability of this share of 255.
+    /// Returns random bits, each set with the probability `share` / 255.
     fn some_bits(&mut self, share: u8) -> u8 {
         (0..8).fold(0, |bits, _| bits << 1 | u8::from((self.random.next() >> 16) as u8 <= share))
     }
@@ -179,7 +180,7 @@ impl Driver<MatekH743> for Cut {
             self.next_ns = now_ns + 1 + self.random.below(2 * apart_ns);
         }
         if session.pause().is_none() {
-            // The core may touch nothing until then, and a cut needs a stop.
+            // The core may access nothing until the next cut, and a cut needs a stop.
             session.pause_at(Some(VirtualNanos(self.next_ns)));
         }
     }
@@ -202,23 +203,24 @@ impl Driver<MatekH743> for Cut {
     }
 }
 
-/// Starts with what the cuts have left, one after another, each asked for the parameters.
+/// Run that starts the board with the flash content of each cut, and reads the parameters each time.
 struct Starts {
     wire: Wire,
     random: Random,
     decoder: Decoder<Downlink>,
     left: std::vec::IntoIter<Kept>,
-    /// When the cut was, and when it was started again [ns].
+    /// Time of the cut, and time of the start after it [ns].
     cut_ns: u64,
     started_ns: u64,
-    /// Of [`WRITTEN`] and [`OTHER`].
+    /// Values of [`WRITTEN`] and [`OTHER`] read so far.
     values: [Option<f32>; 2],
-    /// When a cut was, and what was there at the next start.
+    /// Time of each cut, and the values at the start after it.
     found: Vec<(u64, [Option<f32>; 2])>,
 }
 
 impl Starts {
-    /// Starts with the next flash, and with noise in all memories; none after the last.
+    /// Starts the board with the next flash content, and with noise in all memories. Returns `None` after the last
+    /// content.
     fn next(&mut self, session: &mut Session<MatekH743>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
         let Kept { at_ns, bytes, .. } = self.left.next()?;
         for (address, cells) in (MatekH743::STORE..).step_by(8).zip(bytes.as_chunks::<8>().0) {
@@ -229,7 +231,7 @@ impl Starts {
         }
         session.lose_memory(host, &mut self.random);
         session.reset_by_pin(stop.at, stop.instruction_count, host);
-        // What was on the wire before the cut is of another start.
+        // Bytes on the wire from before the cut belong to another start.
         self.wire.exchange(&[]);
         self.wire.take();
         (self.cut_ns, self.started_ns, self.values) = (at_ns, stop.at.0, [None; 2]);
@@ -258,7 +260,7 @@ impl Driver<MatekH743> for Starts {
             self.found.push((self.cut_ns, self.values));
             return self.next(session, stop, host);
         }
-        // Asked again and again, since a board that starts does not hear yet.
+        // Requested again and again, since a starting board does not receive yet.
         if (stop.at.0 - self.started_ns) % (20 * MS) != 0 {
             return Some(VirtualNanos(stop.at.0 + MS));
         }
@@ -289,7 +291,7 @@ fn flash(bytes: Vec<u8>) -> Result<Image, Box<dyn Error>> {
     Ok(Image::new(Path::new("parameters"), bytes, Some(MatekH743::STORE))?)
 }
 
-/// Starts with each flash, and returns when the power was cut, and the values that are there then.
+/// Starts the board with each flash content, and returns the time of each cut and the values after it.
 fn ask(image: &Image, left: Vec<Kept>, seed: u64) -> Result<Vec<(u64, [Option<f32>; 2])>, Box<dyn Error>> {
     let wire = Wire::default();
     let session = Session::new(board(&wire)?, 0, VirtualNanos(MS))?;
@@ -306,22 +308,22 @@ fn ask(image: &Image, left: Vec<Kept>, seed: u64) -> Result<Vec<(u64, [Option<f3
     Ok(run(session, &Start::new(std::slice::from_ref(image)), starts)?.driver.found)
 }
 
-/// Leaves so many of the cuts, as far apart as they were.
+/// Keeps about this many of the cuts, evenly spread.
 fn thinned(kept: Vec<Kept>, cuts: u64) -> Vec<Kept> {
     let (all, cuts) = (kept.len(), usize::try_from(cuts).unwrap_or(usize::MAX).clamp(1, kept.len().max(1)));
     let is_left = |at: usize| (at + 1) * cuts / all > at * cuts / all;
     kept.into_iter().enumerate().filter(|(at, _)| is_left(*at)).map(|(_, kept)| kept).collect()
 }
 
-/// Cuts the power so many times while the words of a parameter are programmed, and so many times in each of words and
-/// erases of a start that copies and erases.
+/// Runs the power cuts: `cuts` of them while a parameter's words are programmed, and as many each in the word writes
+/// and the erases of a start that copies and erases.
 pub fn cut_all(image: &Path, seed: u64, cuts: u64) -> Result<(), Box<dyn Error>> {
     let image = Image::read(image, None)?;
     let (name, old, new) = WRITTEN;
     for (during, what) in [(During::Write, "a parameter is written"), (During::Erase, "a start erases")] {
         let mut before = Changes::new()?;
         before.set(OTHER.0, OTHER.1)?;
-        // A sector that is nearly full is copied and erased at the start.
+        // A sector that is nearly full makes the start copy and erase.
         for change in 0..if during == During::Erase { 500 } else { 0 } {
             before.set(name, 1.0 + change as f32 * 1e-3)?;
         }

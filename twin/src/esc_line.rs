@@ -1,21 +1,22 @@
-//! Motor controllers that answer: KISS's telemetry over the board's UART for it, when the telemetry bit of a frame on
-//! their pin asks for it.
+//! Motor controllers with KISS telemetry on the board's UART. A controller answers when the telemetry bit of a DSHOT
+//! frame on its pin asks for it.
 
 use crate::wire::Wire;
 use afbc_drivers::esc_telemetry::EscReading;
 
-/// Magnetic poles of the motors, the vehicle's default.
+/// Magnetic poles of the motors, as in the vehicle's defaults.
 const POLES: u32 = 14;
-/// Voltage that the first tells, and what each further one tells more, to be told apart \[0.01 V\].
+/// Voltage in the first controller's telemetry, and step from one controller to the next, by which they can be told
+/// apart \[0.01 V\].
 const VOLTAGE_CV: u16 = 1500;
 const STEP_CV: u16 = 10;
 
-/// Returns the voltage that a motor's tells, from 0 \[0.01 V\].
+/// Returns the voltage that the controller of a motor, counted from 0, sends \[0.01 V\].
 pub fn voltage_cv(motor: usize) -> u16 {
     VOLTAGE_CV + motor as u16 * STEP_CV
 }
 
-/// The controllers on their line.
+/// Motor controllers on the telemetry UART.
 pub struct Escs {
     wire: Wire,
     asked: Vec<usize>,
@@ -26,12 +27,12 @@ impl Escs {
         Escs { wire, asked: Vec::new() }
     }
 
-    /// Takes who has been asked.
+    /// Stores the motors whose controllers are to answer.
     pub fn ask(&mut self, motors: Vec<usize>) {
         self.asked.extend(motors);
     }
 
-    /// Lets those who were asked answer what the rotors do \[rad/s\].
+    /// Sends the answers, with the speeds of the rotors \[rad/s\].
     pub fn answer(&mut self, speeds_rad_s: &[f64]) {
         for motor in self.asked.drain(..) {
             let speed_rad_s = speeds_rad_s.get(motor).copied().unwrap_or_default();

@@ -1,5 +1,5 @@
-//! Flights with motor controllers that answer: what the vehicle tells of them must be the plant's rotors, and a rotor
-//! that stops must be told in time.
+//! Flights with motor controllers that answer. The speeds that the vehicle reports must be the plant's, and it must
+//! report a stopped rotor in time.
 
 use crate::check::check;
 use crate::esc_line::voltage_cv;
@@ -11,24 +11,24 @@ use std::collections::VecDeque;
 use std::error::Error;
 use std::path::Path;
 
-/// How long the vehicle is listened to \[ms\], and how many messages must come in that time.
+/// Time for which messages are counted \[ms\], and least number of messages in that time.
 const LISTENED_MS: u64 = 3_000;
 const MESSAGES: u32 = 20;
-/// Longest time between a measurement and the message that tells it \[ms\], and the smallest step of a speed \[rad/s\].
+/// Longest time between a measurement and its message \[ms\], and resolution of a reported speed \[rad/s\].
 const OLD_MS: usize = 60;
 const COARSE_RAD_S: f64 = 1.5;
-/// Time within which a rotor that has stopped must be told \[ms\].
+/// Longest time until a stopped rotor must be reported \[ms\].
 const TOLD_MS: u64 = 100;
-/// Times of its stop for each rotor, so far apart \[ms\].
+/// Number of stop times tried for each rotor, and time between them \[ms\].
 const STOPS: u64 = 3;
 const APART_MS: u64 = 4;
 
-/// Compares what the vehicle tells with the plant.
+/// Compares reported speeds and voltages with the plant's.
 #[derive(Debug, Default)]
 struct Listens {
     on_lines: bool,
     since_ms: Option<u64>,
-    /// The rotors' speeds of late \[rad/s\].
+    /// Recent speeds of the rotors \[rad/s\].
     past: VecDeque<Vec<f64>>,
     heard_ms: Option<u64>,
     messages: u32,
@@ -58,7 +58,7 @@ impl Hand for Listens {
                     return Err(format!("rotor {rotor}: {told_rad_s:.1} rad/s told of {least:.1} to {most:.1}"));
                 }
                 let expected_v = f32::from(voltage_cv(rotor)) * 0.01;
-                // On the lines they tell their speeds alone.
+                // Bidirectional DSHOT reports speeds only.
                 if !self.on_lines && (voltage_v - expected_v).abs() > 0.005 {
                     return Err(format!("rotor {rotor}: {voltage_v} V told of {expected_v} V"));
                 }
@@ -68,14 +68,14 @@ impl Hand for Listens {
     }
 }
 
-/// Stops a rotor.
+/// Stops a rotor, and waits until the vehicle reports it.
 #[derive(Debug)]
 struct Stops {
     on_lines: bool,
     rotor: usize,
     late_ms: u64,
     began_ms: Option<u64>,
-    /// Time until the vehicle has said so \[ms\].
+    /// Time until the vehicle has reported the stop \[ms\].
     told_ms: Option<u64>,
 }
 
@@ -83,7 +83,7 @@ impl Hand for Stops {
     fn lead(&mut self, vehicle: &mut Vehicle, now_ms: u64) -> Result<Next, String> {
         let stops_ms = *self.began_ms.get_or_insert(now_ms) + 500 + self.late_ms;
         let says = format!("rotor {} has stopped", self.rotor + 1);
-        // One that answers every frame is out of step before it has stopped.
+        // A controller that answers every frame shows a wrong speed before the rotor has stopped.
         let also =
             if self.on_lines { format!("rotor {} does not turn as commanded", self.rotor + 1) } else { says.clone() };
         let is_said = |text: &str| text == says || text == also;
@@ -101,7 +101,7 @@ impl Hand for Stops {
     }
 }
 
-/// Flies with motor controllers that answer, and lets each rotor stop in the air.
+/// Flies with motor controllers that answer, and stops each rotor in flight.
 pub fn fly<M: Machine>(image: &Path, scenario: &Path, on_lines: bool) -> Result<(), Box<dyn Error>> {
     let listens = if on_lines { ANSWERS } else { "DSHOT_TEL_CFG" };
     let hover = Hover::<M>::of(image, scenario, &[(listens, 1.0)], Climb::default())?;

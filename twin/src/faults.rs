@@ -1,4 +1,4 @@
-//! Faults at the pins, in flight: what the vehicle makes of each, from the same instant of one flight.
+//! Injects faults at the pins in flight, all from the same instant of one flight, and judges how each flight ends.
 
 use crate::aloft::{Aloft, Link};
 use crate::check::check;
@@ -13,16 +13,16 @@ use rigless::session::Session;
 use rigless::time::VirtualNanos;
 use std::error::Error;
 
-/// When a fault begins, after the flight goes on: at a random time in between [ns].
+/// Range from which the start of a fault, after the flight resumes, is drawn [ns].
 const BEGINS_NS: [u64; 2] = [50_000_000, 250_000_000];
-/// What a vehicle that flies on may be off from where it was [m].
+/// Largest distance from its start at which a vehicle counts as flying on [m].
 const OFF_M: f64 = 6.0;
-/// Fastest touch-down that is a landing [m/s].
+/// Highest vertical speed at touch-down that counts as a landing [m/s].
 const TOUCH_M_S: f64 = 2.0;
-/// Time after which a vehicle that descends must have landed [ms].
+/// Time within which a descending vehicle must have landed [ms].
 const LANDS_MS: u64 = 45_000;
 
-/// A flight with a fault.
+/// Flight with a fault.
 struct Watched {
     flight: Flight,
     link: Link,
@@ -31,14 +31,14 @@ struct Watched {
     random: Random,
     begins_ns: u64,
     ends_ns: u64,
-    /// What a flight that does not end is given up at.
+    /// Time at which an undecided flight counts as lost.
     last_ns: u64,
     looks: u64,
     kept: u64,
     start_m: [f64; 3],
     off_m: f64,
     tilt_rad: f64,
-    /// Speed at touch-down, downwards.
+    /// Downward speed at touch-down.
     touch_m_s: Option<f64>,
     outcome: Option<Outcome>,
 }
@@ -67,7 +67,7 @@ impl Watched {
         }
     }
 
-    /// Looks at the vehicle from outside; true when its fate is decided.
+    /// Judges the vehicle's motion; returns true once its outcome is decided.
     fn judge(&mut self, now_ns: u64) -> bool {
         let pilot = &self.flight.pilot;
         let motion = pilot.motion();
@@ -130,7 +130,7 @@ impl<M: Machine> Driver<M> for Watched {
         self.link.pass();
         let (_, signals) = self.flight.pilot.watch(stop.at.0 / TICK_NS);
         let board = session.board_mut();
-        // By the fault's time, which the seed decides: the same flight again has the same noise.
+        // The fault's start, which depends on the seed, seeds the noise, so that a repeated flight has the same noise.
         board.draw(self.begins_ns, stop.at.0 / TICK_NS);
         board.sense(&signals);
         (!self.judge(stop.at.0)).then_some(VirtualNanos(stop.at.0 + TICK_NS))
@@ -171,8 +171,8 @@ fn fly<M: Machine>(aloft: &Aloft<M>, row: &'static Row, seed: u64) -> Result<boo
     Ok(is_well)
 }
 
-/// Flies the faults of which one of `names` is the beginning, or all if there are none, and fails if one becomes worse
-/// than expected. `in_turn`: one fault with each seed.
+/// Flies all faults, or those whose names begin with one of `names`. Fails if an outcome is worse than expected. With
+/// `in_turn`, each seed flies only one fault, the next seed the next one.
 pub fn fly_all<M: Machine>(
     aloft: &Aloft<M>,
     seeds: std::ops::Range<u64>,

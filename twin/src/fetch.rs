@@ -1,15 +1,16 @@
-//! A station that lists the logs of a memory card, downloads both ends of the first one, and has all of them erased.
+//! Ground station that lists the logs of a memory card, downloads beginning and end of the first log, and erases all
+//! logs.
 
 use crate::check::check;
 use afbc_link::{Decoder, LogEntry, LogMessage, LogRequest, Question, Uplink};
 use std::error::Error;
 
-/// Time from the end of the flight until the log has ended, and between two tries of a request [ms].
+/// Time after the flight until the log has ended, and between two attempts of a request [ms].
 const WAIT_MS: u64 = 3_000;
 const AGAIN_MS: u64 = 1_000;
-/// Time within which all must be done [ms].
+/// Time within which all of this must be done [ms].
 pub const PATIENCE_MS: u64 = 60_000;
-/// Bytes of each end.
+/// Bytes downloaded of the log's beginning, and of its end.
 const END: u32 = 20_000;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,23 +18,23 @@ enum Step {
     Lists,
     Begins,
     Ends,
-    /// All is here that is to be compared with the card.
+    /// The downloads are complete, and are to be compared with the card before it is erased.
     Erases,
     ListsAgain,
     Done,
 }
 
-/// The station.
+/// Ground station's state.
 pub struct Fetch {
     decoder: Decoder<LogMessage>,
     step: Step,
-    /// When it began, and when it has asked last [ms].
+    /// Start of the step, and time of the last request [ms].
     since_ms: u64,
     asked_ms: u64,
     entries: Vec<LogEntry>,
-    /// The beginning, and the end.
+    /// Downloaded beginning and end of the log.
     parts: [Vec<u8>; 2],
-    /// For how long each has come [ms].
+    /// Duration of each download [ms].
     took_ms: [u64; 2],
 }
 
@@ -50,7 +51,7 @@ impl Fetch {
         }
     }
 
-    /// True once all is downloaded that will be, and before it is erased.
+    /// True when all downloads are complete and nothing has been erased yet.
     pub fn has_all(&self) -> bool {
         self.step == Step::Erases && self.asked_ms == 0
     }
@@ -73,7 +74,7 @@ impl Fetch {
         (self.step, self.since_ms, self.asked_ms) = (step, now_ms, 0);
     }
 
-    /// Hears the vehicle.
+    /// Processes messages from the vehicle.
     pub fn hear(&mut self, bytes: &[u8], now_ms: u64) {
         let mut messages = Vec::new();
         self.decoder.feed(bytes, |_, message| messages.push(message));
@@ -91,13 +92,13 @@ impl Fetch {
                     let part = usize::from(self.step == Step::Ends);
                     let [offset, length] = self.span(part);
                     let held = &mut self.parts[part];
-                    // In order; the rest is asked for again.
+                    // Only data in order are kept; missing data are requested again.
                     if data.offset == offset + held.len() as u32 {
                         held.extend_from_slice(&data.data[..data.count.into()]);
                     }
                     if held.len() as u32 >= length {
                         self.took_ms[part] = now_ms - self.since_ms;
-                        // What is on the card is looked at before it is erased.
+                        // Wait before the erase, so that the card can be compared first.
                         self.go_to(if part == 0 { Step::Ends } else { Step::Erases }, now_ms + 10 * part as u64);
                     }
                 }
@@ -112,7 +113,7 @@ impl Fetch {
         }
     }
 
-    /// Returns what is asked for in this millisecond.
+    /// Returns the request to send in this millisecond, if any.
     pub fn next(&mut self, now_ms: u64) -> Option<Uplink> {
         if self.since_ms == 0 {
             self.since_ms = now_ms + WAIT_MS;
@@ -130,7 +131,7 @@ impl Fetch {
                 LogRequest::Data { log: 0, offset: offset + held, bytes: length - held }
             }
             Step::Erases => {
-                // Nothing answers but the list.
+                // An erase has no answer; only a new list shows its success.
                 self.go_to(Step::ListsAgain, now_ms);
                 (self.since_ms, self.asked_ms) = (now_ms + AGAIN_MS, 1);
                 LogRequest::Erase
@@ -140,7 +141,7 @@ impl Fetch {
         Some(Uplink::Question(Question::Log(request)))
     }
 
-    /// Compares with the logs on the card, by place.
+    /// Compares the list and the downloads with the logs on the card.
     pub fn compare(&self, logs: &[Vec<u8>]) -> Result<(), Box<dyn Error>> {
         let sizes: Vec<_> = self.entries.iter().map(|entry| entry.size as usize).collect();
         println!("listed {sizes:?} bytes; {END} bytes each in {:?} ms", self.took_ms);

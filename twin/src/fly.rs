@@ -1,5 +1,5 @@
-//! A flight of the image as flashed, in lockstep with the plant: the instruments' readings at the registers of the
-//! board's sensors, motor commands from its pins, a station at its telemetry UART.
+//! Flies the image, as flashed, in lockstep with the plant. The instruments' readings appear in the registers of the
+//! board's sensors, motor commands are read from its pins, and a ground station is connected to its telemetry UART.
 
 use crate::card::CardTrouble;
 use crate::card_logs::{self, CardLog};
@@ -22,10 +22,10 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 pub(crate) const TICK_NS: u64 = 1_000_000;
-/// Most that may be missing of a log on a card with which nothing is wrong: its beginning fills the queue [ms].
+/// Largest total of dropouts in a log on a faultless card [ms]; the start of a log fills the queue.
 const DROPOUTS_MS: u64 = 100;
 
-/// Who hears the exact log on the second link.
+/// Receiver of the exact log on the second link.
 pub(crate) enum Hearer {
     Uart(Wire),
     Usb(UsbRing),
@@ -43,47 +43,46 @@ impl Hearer {
 pub(crate) struct Flight {
     pub(crate) pilot: Pilot,
     pub(crate) hearer: Option<Hearer>,
-    /// In place of the board's own one.
+    /// u-blox receiver that replaces the board's own GNSS receiver.
     pub(crate) receiver: Option<UbloxPeer>,
     pub(crate) pins: MotorPins,
-    /// Where what the card holds at some times is kept.
+    /// Times at which the card's content is kept.
     pub(crate) cuts: Option<Cuts>,
-    /// The logs as they were before they were erased.
+    /// Logs as they were before they were erased.
     pub(crate) fetched: Option<Result<Vec<CardLog>, String>>,
 }
 
-/// When what the card holds is kept, as if the power was cut then.
+/// Times at which the card's content is kept, as if the power were cut then.
 pub(crate) struct Cuts {
     folder: PathBuf,
     at_ms: Vec<u64>,
 }
 
-/// What is to be flown.
+/// Description of the flight.
 pub struct Order<'a> {
-    /// The scenario's file.
+    /// File of the scenario.
     pub scenario: &'a Path,
-    /// How long it hovers [ms].
+    /// Duration of the hover [ms].
     pub hover_ms: u64,
-    /// A mission in the place of a hover.
+    /// True to fly a mission instead of a hover.
     pub is_mission: bool,
-    /// A receiver of u-blox's, in the place of the board's own.
+    /// u-blox receiver that replaces the board's own GNSS receiver.
     pub receiver: Option<Generation>,
-    /// Where the exact log is kept.
+    /// File for the exact log.
     pub log: Option<&'a Path>,
-    /// The folder where the logs of the memory card are kept.
+    /// Folder for the logs of the memory card.
     pub card: Option<&'a Path>,
-    /// What goes wrong with that card.
+    /// Faults of the memory card.
     pub card_trouble: CardTrouble,
-    /// Its room, if it is nearly full [kB].
+    /// Free space of a nearly full card [kB].
     pub full_kb: Option<u64>,
-    /// When what it holds is kept, as if the power was cut then [ms].
+    /// Times at which the card's content is kept, as if the power were cut then [ms].
     pub cuts_ms: &'a [u64],
-    /// True if the logs are downloaded and erased after the flight.
+    /// True to download and erase the logs after the flight.
     pub fetches: bool,
 }
 
-/// Flies what is ordered. The exact log, if it is to be kept in a file, must be flown again with the same result to the
-/// last bit.
+/// Flies as ordered. If an exact log is kept, replays it, and fails unless the replay is the same to the last bit.
 pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Error>> {
     let &Order { scenario, hover_ms, is_mission, receiver, log, card, card_trouble, full_kb, cuts_ms, fetches } = order;
     let scenario = load(scenario)?;
@@ -97,7 +96,7 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
         if let Some(kb) = full_kb {
             storage.fill(kb * 1024);
         }
-        // Without a place for its logs, the slot is empty.
+        // Without a folder for the logs, the slot is empty.
         if card.is_none() {
             storage.remove();
         }
@@ -118,7 +117,7 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     let pilot = if fetches { pilot.fetching() } else { pilot };
     let cuts = card.map(|folder| Cuts { folder: folder.into(), at_ms: cuts_ms.to_vec() });
     let flight = Flight { pilot, hearer, receiver, pins, cuts, fetched: None };
-    // Some 75 bytes for each tick are too much for a UART at the default rate.
+    // About 75 bytes per tick are too much for a UART at the default rate.
     let to_log: &[_] = if log.is_some() { &[("LOG_PORT", 2.0), ("SER_TEL1_BAUD", 921_600.0)] } else { &[] };
     let images = images::<M>(image, to_log)?;
     let session = Session::new(board, 0, VirtualNanos(TICK_NS))?;
@@ -136,7 +135,7 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     if let Some(receiver) = &receiver {
         println!("{}", receiver.told());
     }
-    // Judged last: log and card of a flight that failed are kept, too.
+    // Checked at the end, so that log and card of a failed flight are kept too.
     let verdict = pilot.verdict();
     let mut same = Ok(());
     if let (Some(log), Some(mut hearer)) = (log, hearer) {
@@ -175,7 +174,7 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
 }
 
 impl Flight {
-    /// Takes what pulses say that the pins repeat, if they carry such.
+    /// Reads the motor commands from PWM pulses, which the pins repeat, if the board uses PWM.
     pub(crate) fn hear_pulses<M: Machine>(&mut self, session: &mut Session<M>) {
         if M::SIGNAL == Signal::Pwm400 {
             self.pins.take_pulses(&session.board_mut().motors());
@@ -185,7 +184,7 @@ impl Flight {
 }
 
 impl Flight {
-    /// Keeps what the card holds when it is time to.
+    /// Keeps the card's content if it is time to, and compares downloaded logs.
     fn look_at_card<M: Machine>(&mut self, session: &mut Session<M>, now_ms: u64) {
         let (Some(cuts), Some(storage)) = (&self.cuts, session.board_mut().log_storage()) else { return };
         if cuts.at_ms.contains(&now_ms) {
@@ -207,7 +206,7 @@ impl Flight {
     }
 }
 
-/// Returns the image, and the parameters with these values in the flash beside what the board's motors need.
+/// Returns the image, and the parameters' flash with these values and those that the board's motor protocol needs.
 pub(crate) fn images<M: Machine>(image: &Path, parameters: &[(&str, f32)]) -> Result<Vec<Image>, Box<dyn Error>> {
     let pwm = (M::SIGNAL == Signal::Pwm400).then_some(("MOT_PROTOCOL", PWM400));
     let kept: Vec<_> = pwm.into_iter().chain(parameters.iter().copied()).collect();

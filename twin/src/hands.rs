@@ -1,38 +1,39 @@
-//! What a pilot does with sticks and switches, and what the vehicle must do then.
+//! Pilots: each moves sticks and switches, and checks the vehicle's reaction.
 
 use crate::led::{Hand, Next, Vehicle};
 use crate::transmitter::{ARM, KILL, PITCH, THROTTLE};
 
-/// Time from which on the pilot tries to arm, after which the switch is moved again, and that is given up \[ms\].
+/// Time of the first attempt to arm, time between attempts, and time after which arming has failed \[ms\].
 const ARMS_MS: u64 = 12_000;
 const AGAIN_MS: u64 = 2_000;
 const PATIENCE_MS: u64 = 45_000;
-/// Height at which the throttle is centred, and the times of climb and hover \[m, ms\].
+/// Height at which the throttle is centred \[m\], and longest climb and duration of the hover \[ms\].
 const HEIGHT_M: f64 = 4.0;
 const CLIMB_MS: u64 = 15_000;
 const HOVER_MS: u64 = 5_000;
-/// What a hover may be off, and the vehicle be tilted by in it \[m, rad\].
+/// Largest position error \[m\] and tilt \[rad\] in a hover.
 const OFF_M: f64 = 2.5;
 const TILT_RAD: f64 = 0.5;
-/// How long motors are watched that are to stop \[ms\].
+/// Time for which the motors are watched after the start of a kill \[ms\].
 const KILLS_MS: u64 = 80;
-/// Silence: until when the sticks are held, and after which the vehicle must hold its place \[ms\].
+/// Receiver loss \[ms\]: earliest time at which it may be reported, time by which the vehicle must hold its position,
+/// and duration of the silence.
 const HELD_MS: u64 = 450;
 const LOST_MS: u64 = 750;
 const SILENT_MS: u64 = 5_000;
-/// How long a receiver that is back must be heard without anything, and how long the stick is forward \[ms\].
+/// Time without stick input after the receiver is back, and time for which the stick is forward \[ms\].
 const BACK_MS: u64 = 3_000;
 const FORWARD_MS: u64 = 5_000;
-/// Way that the vehicle must have gone by then \[m\].
+/// Least distance that the vehicle must fly while the stick is forward \[m\].
 const WAY_M: f64 = 4.0;
 const LANDS_MS: u64 = 25_000;
 
-/// Where the vehicle is \[m\].
+/// Returns the vehicle's true position \[m\].
 fn place_m(vehicle: &Vehicle) -> [f64; 3] {
     vehicle.pilot.motion().position_m.into()
 }
 
-/// Checks that the vehicle is armed and upright, not far from a place; returns how far \[m\].
+/// Checks that the vehicle is armed, upright and near `start_m`; returns the distance \[m\].
 fn hovers(vehicle: &Vehicle, start_m: [f64; 3]) -> Result<f64, String> {
     let attitude_rad = vehicle.pilot.motion().attitude_rad;
     let tilt_rad = attitude_rad.x.hypot(attitude_rad.y);
@@ -44,12 +45,12 @@ fn hovers(vehicle: &Vehicle, start_m: [f64; 3]) -> Result<f64, String> {
     Err(format!("it does not hover: {armed}, {off_m:.2} m off, tilted by {tilt_rad:.2} rad"))
 }
 
-/// Arms by the switch, climbs by the throttle and hovers.
+/// Pilot that arms by the switch, climbs by the throttle and hovers.
 #[derive(Debug, Default)]
 pub struct Climb {
-    /// When it armed \[ms\].
+    /// Time of arming \[ms\].
     armed_ms: Option<u64>,
-    /// When it was up, and where \[ms, m\].
+    /// Time \[ms\] and position \[m\] at the end of the climb.
     up: Option<(u64, [f64; 3])>,
 }
 
@@ -58,7 +59,7 @@ impl Hand for Climb {
         let is_armed = vehicle.pilot.armed();
         let us = &mut vehicle.transmitter.channels.us;
         let Some(armed_ms) = self.armed_ms else {
-            // Moved again and again until the vehicle is ready.
+            // The switch is moved again and again until the vehicle is ready.
             let is_on = now_ms >= ARMS_MS && now_ms % AGAIN_MS >= AGAIN_MS / 2;
             us[ARM] = if is_on || is_armed { 2000 } else { 1000 };
             if is_armed {
@@ -86,11 +87,11 @@ impl Hand for Climb {
     }
 }
 
-/// Moves the kill switch.
+/// Pilot that moves the kill switch.
 #[derive(Debug, Default)]
 pub struct Kill {
     began_ms: Option<u64>,
-    /// When no motor was driven any more, for good \[ns\].
+    /// Time at which the last motor stopped for good \[ns\].
     pub stopped_ns: Option<u64>,
 }
 
@@ -110,7 +111,7 @@ impl Hand for Kill {
     }
 }
 
-/// Parts of a flight whose receiver falls silent.
+/// Parts of a flight with a loss of the receiver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Part {
     #[default]
@@ -120,13 +121,14 @@ enum Part {
     Lands,
 }
 
-/// Flies on without a receiver, and with one that is back, and lands by the sticks.
+/// Pilot who loses the receiver, gets it back, flies forward and lands by the sticks.
 #[derive(Debug, Default)]
 pub struct Loss {
     part: Part,
     since_ms: Option<u64>,
     start_m: [f64; 3],
-    /// Time from the last frame until the vehicle said so \[ms\], how far it was off meanwhile, and went then \[m\].
+    /// Time from the last frame until the vehicle reported the loss \[ms\], largest position error until the stick is
+    /// moved \[m\], and distance flown forward \[m\].
     lost_ms: Option<u64>,
     off_m: f64,
     way_m: f64,
@@ -201,7 +203,7 @@ impl Hand for Loss {
 }
 
 impl Loss {
-    /// Returns how it went.
+    /// Returns a summary of the flight.
     pub fn told(&self) -> String {
         let Loss { lost_ms, off_m, way_m, .. } = self;
         format!(

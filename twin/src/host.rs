@@ -1,5 +1,6 @@
-//! The same flight with the firmware's code in this process: to compare, and to see in a second what a change does. Its
-//! GNSS receiver is the board's, which speaks NMEA; the other readings are taken as they are.
+//! Flies a scenario with the firmware's code in this process, for comparison with the image, and to see the effect of a
+//! change within a second. The GNSS receiver is the board's model, which sends NMEA; the other readings are passed on
+//! directly.
 
 use crate::pilot::Pilot;
 use crate::wire::Wire;
@@ -18,7 +19,7 @@ use rigless::time::VirtualNanos;
 use std::error::Error;
 use std::path::Path;
 
-/// Flies a scenario, with a mission if wanted.
+/// Flies a scenario, with a mission if `is_mission` is set.
 pub fn fly(file: &Path, is_mission: bool) -> Result<(), Box<dyn Error>> {
     let wire = Wire::default();
     let pilot = Pilot::new(&load(file)?, wire.clone())?;
@@ -36,12 +37,12 @@ pub fn fly(file: &Path, is_mission: bool) -> Result<(), Box<dyn Error>> {
     pilot.verdict()
 }
 
-/// The receiver, its wire at 38,400 baud, and its driver.
+/// GNSS receiver, its UART at 38,400 baud, and its driver.
 struct Gnss {
     receiver: Receiver,
     decoder: NmeaDecoder,
     frame: FixFrame,
-    /// When the epoch's first byte came, and the last byte \[ms\].
+    /// Times of the epoch's first byte and of the newest byte \[ms\].
     began_ms: u64,
     last_ms: u64,
 }
@@ -52,17 +53,16 @@ impl Gnss {
         Gnss { receiver, decoder, frame: FixFrame::NEW, began_ms: 0, last_ms: 0 }
     }
 
-    /// Puts the fix that is complete in this millisecond in the place of the instruments'.
+    /// Replaces the instruments' fix by the one that the receiver completes in this millisecond, if any.
     fn replace(&mut self, readings: &mut Readings, signals: &Signals, now_ms: u64) {
         self.receiver.set_position(signals.position);
         self.receiver.set_velocity(signals.velocity);
         let mut aids: Vec<_> = readings.aids.into_iter().flatten().collect();
         aids.retain(|aid| !matches!(aid.value, Measurement::Gnss { .. }));
-        // Four bytes in a millisecond at 38,400 baud.
-        // None before the first position.
+        // 38,400 baud are four bytes per millisecond. Nothing is sent before the first position.
         for _ in 0..if signals.position == at_the_place().position { 0 } else { 4 } {
             let Some(byte) = self.receiver.transmit(VirtualNanos(now_ms * 1_000_000)) else { break };
-            // Bytes of an epoch follow one another: a pause has ended the last one.
+            // The bytes of an epoch follow each other without a pause, so a pause marks the start of the next one.
             if now_ms - self.last_ms > 20 {
                 self.began_ms = now_ms;
             }

@@ -1,4 +1,4 @@
-//! Flights by somebody's hand, at the sticks of a transmitter, and a hover from which many of them go on.
+//! Flights controlled by a pilot's transmitter, and a hover from which many of them resume.
 
 use crate::check::check;
 use crate::esc_line::Escs;
@@ -20,52 +20,52 @@ use std::error::Error;
 use std::marker::PhantomData;
 use std::path::Path;
 
-/// Time between two frames of the receiver, as ExpressLRS usually has it \[ns\].
+/// Usual time between two frames of an ExpressLRS receiver \[ns\].
 pub const FRAME_NS: u64 = 4_000_000;
-/// Time between two looks at pins that repeat their pulses, where that is asked for \[ns\].
+/// Time between two samples of PWM pins, for pilots that set `LOOKS` \[ns\].
 const PULSES_NS: u64 = 50_000;
 
-/// Whether a flight goes on.
+/// Decision of a pilot whether the flight goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Next {
     GoesOn,
     Ends,
 }
 
-/// A pilot's hand.
+/// Pilot at the transmitter.
 pub trait Hand: Send {
-    /// True if pins that repeat their pulses are to be looked at more than once per millisecond.
+    /// True if PWM pins are to be sampled more than once per millisecond.
     const LOOKS: bool = false;
 
     /// Moves sticks and switches, once per millisecond.
     fn lead(&mut self, vehicle: &mut Vehicle, now_ms: u64) -> Result<Next, String>;
 
-    /// Sees what the motors were told at a time \[ns\].
+    /// Observes the motor commands at a time \[ns\].
     fn see(&mut self, _: &Vehicle, _: u64) {}
 }
 
-/// The vehicle, and what the pilot has in hand.
+/// Vehicle in its world, with its motor pins and the pilot's transmitter.
 pub struct Vehicle {
     pub pilot: Pilot,
     pub pins: MotorPins,
     pub transmitter: Transmitter,
     pub escs: Escs,
     signal: Signal,
-    /// When the plant goes on \[ns\].
+    /// Time of the plant's next step \[ns\].
     tick_ns: u64,
 }
 
-/// A flight by somebody's hand.
+/// Flight controlled by a pilot.
 pub struct Led<H> {
     pub vehicle: Vehicle,
     pub hand: H,
-    /// Of what a snapshot is taken at its end.
+    /// Digest of the images, if a snapshot is to be taken at the end of the flight.
     firmware: Option<[u8; 32]>,
     taken: Option<Result<Vec<u8>, SnapshotError>>,
     error: Option<String>,
 }
 
-/// Snapshots keep the board alone.
+/// Host state of a snapshot: none, since these snapshots keep the board alone.
 struct Nothing;
 
 impl Store for Nothing {
@@ -78,7 +78,7 @@ impl Store for Nothing {
     }
 }
 
-/// What is wired to a board.
+/// Wires connected to a board.
 #[derive(Default)]
 struct Wires {
     link: Wire,
@@ -87,7 +87,7 @@ struct Wires {
 }
 
 impl Wires {
-    /// Returns the board between them, and the `RC_PORT` of the receiver.
+    /// Returns the board connected to these wires, and the `RC_PORT` of the radio receiver.
     fn board<M: Machine>(&self) -> Result<(Box<M>, f32), Box<dyn Error>> {
         let mut board = M::built()?;
         board.sense(&at_the_place());
@@ -98,7 +98,7 @@ impl Wires {
     }
 }
 
-/// Returns how a flight ended, or what was wrong with it.
+/// Returns the finished flight, or the error that ended it.
 fn flown<M: Machine, H>(finished: Finished<M, Led<H>>) -> Result<Led<H>, Box<dyn Error>> {
     let led = finished.driver;
     if let Some(error) = led.error {
@@ -114,7 +114,7 @@ fn flown<M: Machine, H>(finished: Finished<M, Led<H>>) -> Result<Led<H>, Box<dyn
     Ok(led)
 }
 
-/// A hover, from which flights go on.
+/// Hover from which flights resume.
 pub struct Hover<M> {
     images: Vec<Image>,
     snapshot: Snapshot,
@@ -123,7 +123,7 @@ pub struct Hover<M> {
 }
 
 impl<M: Machine> Hover<M> {
-    /// Flies a scenario with these parameters by a hand that ends in a hover.
+    /// Flies a scenario with these parameters, controlled by a pilot whose flight ends in a hover.
     pub fn of<H: Hand + 'static>(
         image: &Path,
         scenario: &Path,
@@ -147,7 +147,7 @@ impl<M: Machine> Hover<M> {
         let session = Session::new(board, 0, VirtualNanos(TICK_NS))?;
         let finished = run(session, &Start::new(&images), led)?;
         let Led { vehicle, taken, .. } = flown(finished)?;
-        // Snapshots are read from files.
+        // Snapshots can only be read from files.
         let path = std::env::temp_dir().join(format!("twin-hover-{}", std::process::id()));
         std::fs::write(&path, taken.ok_or("it does not hover")??)?;
         let snapshot = Snapshot::read(&path);
@@ -155,13 +155,13 @@ impl<M: Machine> Hover<M> {
         Ok(Hover { images, snapshot: snapshot?, vehicle, machine: PhantomData })
     }
 
-    /// Returns the vehicle there.
+    /// Returns the vehicle in hover.
     pub fn vehicle(&self) -> &Vehicle {
         &self.vehicle
     }
 
-    /// Goes on from there by somebody's hand, with frames of the receiver so far apart, and so much after a
-    /// millisecond.
+    /// Resumes the hover, controlled by `hand`. The receiver's frames are `period_ns` apart; the first comes `late_ns`
+    /// after a millisecond.
     pub fn goes_on<H: Hand + 'static>(&self, period_ns: u64, late_ns: u64, hand: H) -> Result<Led<H>, Box<dyn Error>> {
         let wires = Wires::default();
         let (board, _) = wires.board::<M>()?;
@@ -184,7 +184,7 @@ impl<M: Machine> Hover<M> {
 }
 
 impl Vehicle {
-    /// True if the motors' wires said last that none is to turn.
+    /// True if the newest commands on the motor pins stop all motors.
     pub fn is_stopped(&self) -> bool {
         let stopped = match self.signal {
             Signal::Dshot600(_) => 0,
@@ -199,7 +199,7 @@ impl<H: Hand> Led<H> {
         Led { vehicle, hand, firmware: None, taken: None, error: None }
     }
 
-    /// Takes what the motors' wires say.
+    /// Passes on the newest motor commands and telemetry requests.
     fn command(&mut self, at: VirtualNanos) {
         self.vehicle.pilot.command(self.vehicle.pins.take());
         self.vehicle.escs.ask(self.vehicle.pins.take_asked());
@@ -241,7 +241,7 @@ impl<M: Machine, H: Hand> Driver<M> for Led<H> {
             self.vehicle.pins.turn(self.vehicle.pilot.rotor_speeds_rad_s());
             match self.hand.lead(&mut self.vehicle, stop.at.0 / TICK_NS) {
                 Ok(Next::GoesOn) => {}
-                // Not while a frame is read from the pins.
+                // No snapshot while a frame is being read from the pins.
                 Ok(Next::Ends) if self.vehicle.pins.look_ns().is_some() => {}
                 Ok(Next::Ends) => {
                     if let Some(firmware) = &self.firmware {

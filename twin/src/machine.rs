@@ -1,4 +1,4 @@
-//! The boards: what of each is to be known to look at it from outside, and to put a world around it.
+//! Boards: the facts about each that are needed to observe it from outside and to connect a world to it.
 
 use crate::card::{LogStorage, SdSlot};
 use crate::impairments::Impairments;
@@ -20,137 +20,137 @@ use rigless::soc::{Error, Width};
 use rigless::time::VirtualNanos;
 use std::ops::Range;
 
-/// What the motors' outputs carry.
+/// Signal on the motor outputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Signal {
-    /// DSHOT600, the default, by the DMA of these timers.
+    /// DSHOT600, the default, sent by the DMA of these timers.
     Dshot600(&'static [FrameTimer]),
-    /// PWM at 400 Hz, since no DMA of the models serves a timer.
+    /// PWM at 400 Hz, for models in which no DMA serves a timer.
     Pwm400,
 }
 
-/// A timer whose frames DMA sends.
+/// Timer whose frames are sent by DMA.
 #[derive(Debug, PartialEq)]
 pub struct FrameTimer {
-    /// Its control register, whose lowest bit lets it count.
+    /// Address of the control register, whose lowest bit enables the counter.
     pub counter: u64,
-    /// Control register of the stream; its lowest bit starts a frame.
+    /// Address of the stream's control register, whose lowest bit starts a frame.
     pub stream: u64,
-    /// Its motors, from 0.
+    /// Motors of the timer, counted from 0.
     pub motors: Range<usize>,
-    /// Where the port of its pins is, if their motors' controllers can be heard there.
+    /// Port of the motor pins, if motor controllers can answer there.
     pub lines: Option<Lines>,
 }
 
-/// A UART's divider and its clock.
+/// Baud rate divider of a UART, and its clock.
 #[derive(Clone, Copy, Debug)]
 pub struct Divider {
     /// Address of the register.
     pub register: u64,
-    /// The clock \[Hz\].
+    /// Clock \[Hz\].
     pub clock_hz: u64,
 }
 
-/// A board.
+/// Board in the emulator, with the facts and connections that the twin needs.
 pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
-    /// Key register of the watchdog.
+    /// Address of the watchdog's key register.
     const WATCHDOG: u64;
-    /// First word of the parameters' flash.
+    /// Address of the parameters' flash.
     const STORE: u64;
-    /// Bytes of the flash that a word of four bytes takes.
+    /// Bytes of flash that a word of 4 bytes takes.
     const STORE_WORD: usize;
-    /// True if the models have a flash that can be written.
+    /// True if the models' flash can be written.
     const STORES: bool;
-    /// The outputs of its motors.
+    /// Indices of the motor outputs in use.
     const MOTORS: Range<usize>;
-    /// What they carry.
+    /// Signal on the motor outputs.
     const SIGNAL: Signal;
-    /// The divider of the GNSS receiver's UART.
+    /// Divider of the GNSS receiver's UART.
     const RECEIVER: Divider;
-    /// Its inertial sensors, in the order of the firmware, by their places among [`Edge::CHIPS`].
+    /// Inertial sensors in the order of the firmware, as indices of [`Edge::CHIPS`].
     const IMUS: &'static [usize];
     /// Interrupts of the UARTs of the first link and the GNSS receiver.
     const UART_INTERRUPTS: [u16; 2];
 
-    /// What sensors, at a higher priority, may delay a tick by \[ns\]: most while IMUs are set up, at the start, and
-    /// after a second in which nothing moves, as in `boot`, again.
+    /// Longest delay of a tick by sensor tasks, which have a higher priority \[ns\]. The delay is longest while IMUs
+    /// are set up: at the start, and again after a second without motion, as in `boot`.
     const JITTER: u64;
-    /// Voltage of the battery that the models have at rest, if the image measures it \[mV\].
+    /// Battery voltage of the models at rest, if the image measures it \[mV\].
     const BATTERY_MV: Option<u16>;
-    /// Registers that the chip has and the models do not.
+    /// Registers that the chip has and the models lack.
     const UNMAPPED: &[u64];
-    /// First register of the ports of pins, and the pins that must not float.
+    /// Address of the first GPIO port, and the pins that must not float.
     const PORTS: u64;
     const STEADY: &'static [SteadyPin];
-    /// Interrupt status of the USB core, if the models have it as a register only.
+    /// Interrupt status register of the USB core, if the models have it as plain memory.
     const USB_STATUS: Option<u64> = None;
 
-    /// Returns the board as it is built.
+    /// Creates the board.
     fn built() -> Result<Box<Self>, Error>;
 
-    /// Returns the pins of its motors.
+    /// Returns the motor outputs.
     fn motors(&mut self) -> Vec<Actuator>;
 
-    /// Hangs a wire on the first link.
+    /// Connects a wire to the first link.
     fn attach_link(&mut self, wire: Wire) -> bool {
         self.attach_host("serial1", Box::new(wire))
     }
 
-    /// Hangs a wire on the second link; false if that is by USB.
+    /// Connects a wire to the second link; returns false if that is on USB.
     fn attach_second_link(&mut self, wire: Wire) -> bool;
 
-    /// Hangs a radio receiver on a UART, and returns its `RC_PORT`; none if there is no such UART here.
+    /// Connects a radio receiver to a UART, and returns its `RC_PORT`; `None` if there is no such UART.
     fn attach_radio(&mut self, wire: Wire) -> Option<f32> {
         self.attach_second_link(wire).then_some(2.0)
     }
 
-    /// Hangs a wire on the UART that hears the motor controllers, if there is one.
+    /// Connects a wire to the UART for motor controller telemetry, if there is one.
     fn attach_escs(&mut self, wire: Wire) {
         drop(wire);
     }
 
-    /// Hangs a GNSS receiver on its UART, in the place of the one that was there.
+    /// Replaces the GNSS receiver on its UART.
     fn attach_receiver(&mut self, receiver: Box<dyn Peer>);
 
-    /// Puts a card of today into a slot that has another, or none.
+    /// Inserts a card that follows today's specification, in place of the models' card or none.
     fn insert_card(&mut self) {}
 
-    /// Returns where it keeps logs: in a card of ours, or in a chip.
+    /// Returns the log storage: a memory card of this crate, or a flash chip. Boards without either return `None`.
     fn log_storage(&mut self) -> Option<&mut dyn LogStorage> {
         None
     }
 
-    /// Adds to what an access does where the models leave something out.
+    /// Adds effects of an access that the models leave out.
     fn complete(session: &mut Session<Self>, access: &Access) {
         let _ = (session, access);
     }
 
-    /// Lets this be wrong with its parts, and nothing else.
+    /// Sets the faults of the board's parts, replacing earlier ones.
     fn impair(&mut self, impairments: &Impairments);
 
-    /// Returns what is wrong with the wire of the first link to the board.
+    /// Returns the transmission errors of the first link's wire to the board.
     fn link_errors(&mut self) -> &mut Errors;
 
-    /// Feels the world, with a receiver of its own kind, which the board tells what it feels.
+    /// Attaches the models' own GNSS receiver, which `sense` requires, and passes the signals on.
     fn sense_with_own_receiver(&mut self, signals: &Signals) {
         self.attach_receiver(Box::new(nmea::Receiver::new()));
         self.sense(signals);
     }
 }
 
-/// The pins of the Matek H743's motors (RM0433, table 8, 11.4.4).
+/// Ports of the Matek H743's motor pins (RM0433, table 8, 11.4.4).
 const PORT_A: Lines = Lines { pulls: 0x5802_000C, first: 0 };
 const PORT_D: Lines = Lines { pulls: 0x5802_0C0C, first: 12 };
 
 impl Machine for MatekH743 {
-    /// RM0433, 45.4.
+    /// IWDG1_KR (RM0433, 45.4).
     const WATCHDOG: u64 = 0x5800_4800;
     const STORE: u64 = 0x0810_0000;
     const STORE_WORD: usize = 32;
     const STORES: bool = true;
-    /// PWM3 to PWM10.
+    /// Outputs PWM3 to PWM10.
     const MOTORS: Range<usize> = 2..10;
-    /// DMA1's streams 0 and 1, for TIM5 and TIM4 (RM0433, 15.5.5).
+    /// Streams 0 and 1 of DMA1, for TIM5 and TIM4 (RM0433, 15.5.5).
     const SIGNAL: Signal = Signal::Dshot600(&[
         FrameTimer { counter: 0x4000_0C00, stream: 0x4002_0010, motors: 0..4, lines: Some(PORT_A) },
         FrameTimer { counter: 0x4000_0800, stream: 0x4002_0028, motors: 4..8, lines: Some(PORT_D) },
@@ -163,10 +163,10 @@ impl Machine for MatekH743 {
     const JITTER: u64 = 150_000;
     const BATTERY_MV: Option<u16> = Some(16_800);
     const UNMAPPED: &[u64] = &[];
-    /// RX of UART7, USART1, USART2 and UART8.
+    /// RX pins of UART7, USART1, USART2 and UART8.
     const PORTS: u64 = 0x5802_0000;
     const STEADY: &'static [SteadyPin] = &[(4, 7, PulledUp), (0, 10, PulledUp), (3, 6, PulledUp), (4, 0, PulledUp)];
-    /// RM0433, 57.14.6.
+    /// OTG_GINTSTS (RM0433, 57.14.6).
     const USB_STATUS: Option<u64> = Some(0x4008_0014);
 
     fn built() -> Result<Box<Self>, Error> {
@@ -177,18 +177,18 @@ impl Machine for MatekH743 {
         self.drive().actuators().get(Self::MOTORS).unwrap_or_default().to_vec()
     }
 
-    /// USART1.
+    /// The second link is on USART1.
     fn attach_second_link(&mut self, wire: Wire) -> bool {
         self.mcu.usart[0].attach(wire);
         true
     }
 
-    /// UART8.
+    /// Motor controller telemetry comes in on UART8.
     fn attach_escs(&mut self, wire: Wire) {
         self.mcu.usart[7].attach(wire);
     }
 
-    /// USART2.
+    /// The GNSS receiver is on USART2.
     fn attach_receiver(&mut self, receiver: Box<dyn Peer>) {
         self.mcu.usart[1].attach_boxed(receiver);
     }
@@ -212,14 +212,14 @@ impl Machine for MatekH743 {
         });
     }
 
-    /// UART7.
+    /// The first link is on UART7.
     fn link_errors(&mut self) -> &mut Errors {
         self.mcu.usart[6].errors_mut()
     }
 }
 
 impl Machine for Pixracer {
-    /// RM0090, 21.4.
+    /// IWDG_KR (RM0090, 21.4).
     const WATCHDOG: u64 = 0x4000_3000;
     const STORE: u64 = 0x0800_4000;
     const STORE_WORD: usize = 4;
@@ -232,12 +232,12 @@ impl Machine for Pixracer {
     const IMUS: &'static [usize] = &[0, 1];
     /// USART2 and UART4 (RM0090, table 63).
     const UART_INTERRUPTS: [u16; 2] = [38, 52];
-    /// Two IMUs on one SPI.
+    /// Longer, since two IMUs share one SPI.
     const JITTER: u64 = 350_000;
     const BATTERY_MV: Option<u16> = Some(16_800);
-    /// USB: the core's fourth hardware configuration register.
+    /// The USB core's fourth hardware configuration register.
     const UNMAPPED: &[u64] = &[0x5000_0050];
-    /// RX of USART2, USART3, UART4 and USART6; the supplies of sensors and of what is connected, and the heater.
+    /// RX pins of USART2, USART3, UART4 and USART6; power switches of sensors and peripherals; switch of the heater.
     const PORTS: u64 = 0x4002_0000;
     const STEADY: &'static [SteadyPin] = &[
         (3, 6, PulledUp),
@@ -248,7 +248,7 @@ impl Machine for Pixracer {
         (2, 5, Output(true)),
         (2, 6, Output(false)),
     ];
-    /// RM0090, 34.16.2.
+    /// OTG_FS_GINTSTS (RM0090, 34.16.2).
     const USB_STATUS: Option<u64> = Some(0x5000_0014);
 
     fn built() -> Result<Box<Self>, Error> {
@@ -259,8 +259,8 @@ impl Machine for Pixracer {
         self.mcu.sdio.attach(SdSlot::new());
     }
 
-    /// The interface of a memory card waits for the block that it reads; the models' looks for one when its data path
-    /// is switched on, and not again if the command for it comes later.
+    /// Restarts a data path that reads, after each command. The real interface waits for the block that it reads. The
+    /// model looks for a block only when the data path is enabled, so it misses one whose command comes later.
     fn complete(session: &mut Session<Self>, access: &Access) {
         if access.kind == AccessKind::Write && access.address == SDIO_COMMAND {
             let at = access.virtual_time;
@@ -282,19 +282,19 @@ impl Machine for Pixracer {
         self.drive().actuators().get(Self::MOTORS).unwrap_or_default().to_vec()
     }
 
-    /// USART3.
+    /// The second link is on USART3.
     fn attach_second_link(&mut self, wire: Wire) -> bool {
         self.mcu.usart[2].attach(wire);
         true
     }
 
-    /// USART6, the board's own for it.
+    /// USART6, which the board reserves for a radio receiver.
     fn attach_radio(&mut self, wire: Wire) -> Option<f32> {
         self.mcu.usart[3].attach(wire);
         Some(0.0)
     }
 
-    /// UART4.
+    /// The GNSS receiver is on UART4.
     fn attach_receiver(&mut self, receiver: Box<dyn Peer>) {
         self.mcu.usart[6].attach_boxed(receiver);
     }
@@ -319,27 +319,27 @@ impl Machine for Pixracer {
         });
     }
 
-    /// USART2.
+    /// The first link is on USART2.
     fn link_errors(&mut self) -> &mut Errors {
         self.mcu.usart[1].errors_mut()
     }
 }
 
-/// Registers of the interface to memory cards: its command and the control of its data path (RM0090, 31.9.4 and
-/// 31.9.8), with the bits that switch it on and that read.
+/// Registers of the memory card interface: command, and control of the data path (RM0090, 31.9.4 and 31.9.8), with the
+/// bits that enable it and select reading.
 const SDIO_COMMAND: u64 = 0x4001_2C0C;
 const SDIO_DATA_CONTROL: u64 = 0x4001_2C2C;
 const READS: u64 = 0b11;
 
-/// What the register before the interrupt status, which resets the core, reads like once that is done.
+/// Value of the USB core's reset register, just before the interrupt status, once a reset has finished.
 const USB_IDLE: u64 = 1 << 31;
 
-/// Keeps USB still where the models have registers of it, but not what they do: a flag that is cleared by writing a
-/// one stays set, and a reset never ends; the driver, which looks at them, would never end, and nothing else of its
-/// priority or below begin.
+/// Keeps the USB driver idle on models that have the USB registers as plain memory. There, a flag cleared by writing
+/// one stays set, and a reset never ends. The driver would wait for ever, and no task of its priority or below would
+/// run.
 pub fn quiet_usb<M: Machine>(session: &mut Session<M>, at: VirtualNanos) {
     if let Some(status) = M::USB_STATUS {
-        // Nothing to be done about a core that is not clocked.
+        // Fails only if the USB core has no clock, which needs no handling.
         let _ = session.mcu().write(at, status, Width::W32, 0);
         let _ = session.mcu().write(at, status - 4, Width::W32, USB_IDLE);
     }

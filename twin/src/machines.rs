@@ -1,19 +1,19 @@
-//! The list of machines.
+//! List of the boards.
 
-/// Declares the boards: name on the command line, and type.
+/// Declares the boards: name on the command line and type of each.
 macro_rules! machines {
     ($count:literal: $($name:ident $text:literal $machine:ty,)+) => {
-        /// The boards.
+        /// Board, selected by name.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum MachineName {
             $($name,)+
         }
 
         impl MachineName {
-            /// All of them.
+            /// All boards.
             pub const ALL: [Self; $count] = [$(MachineName::$name),+];
 
-            /// Returns its name on the command line.
+            /// Returns the name on the command line.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(MachineName::$name => $text,)+
@@ -38,7 +38,7 @@ machines! {
     Stm32f405 "stm32f405" crate::f405::F405<6>,
 }
 
-/// Evaluates an expression in which a type's name stands for the machine of this name.
+/// Evaluates `$call` with `$machine` as an alias of the board's type.
 #[macro_export]
 macro_rules! with_machine {
     ($name:expr, $machine:ident => $call:expr) => {

@@ -1,6 +1,6 @@
-//! The flight image of a board on register-level models of it, as it is flashed.
+//! Runs the flight image of a board, as flashed, on register-level models of the board.
 //!
-//! Models and processor are those of `rigless`, which nobody of this project wrote.
+//! Models and processor are those of `rigless`, which is independent of this project.
 #![forbid(unsafe_code)]
 
 mod aloft;
@@ -50,7 +50,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use ublox::Generation;
 
-/// GNSS receivers by name: the board's own, and new ones of u-blox's.
+/// GNSS receivers by name: the board's own model, and factory-new u-blox receivers.
 const RECEIVERS: [(&str, Option<Generation>); 3] =
     [("nmea", None), ("m8", Some(Generation::Eight)), ("m10", Some(Generation::Ten))];
 
@@ -137,7 +137,7 @@ fn command() -> Command {
         )
 }
 
-/// Declares the command that flies, and what may happen to the card meanwhile.
+/// Declares the command `fly`, with its options for the memory card.
 fn fly_command() -> Command {
     let receiver = Arg::new("receiver")
         .long("receiver")
@@ -179,17 +179,17 @@ fn fly_command() -> Command {
     ])
 }
 
-/// Returns the file that an argument names.
+/// Returns the path given for an argument.
 fn path<'a>(matches: &'a ArgMatches, name: &str) -> Result<&'a Path, Box<dyn Error>> {
     Ok(matches.get_one::<PathBuf>(name).ok_or("no file")?)
 }
 
-/// Returns the number that an argument names.
+/// Returns the number given for an argument.
 fn number(matches: &ArgMatches, name: &str) -> Result<u64, Box<dyn Error>> {
     Ok(*matches.get_one(name).ok_or("no number")?)
 }
 
-/// Returns the machine that an argument names.
+/// Returns the board given on the command line.
 fn chosen(matches: &ArgMatches) -> Result<MachineName, Box<dyn Error>> {
     let name = matches.get_one::<String>("machine").ok_or("no machine")?;
     Ok(MachineName::ALL.into_iter().find(|machine| machine.name() == name).ok_or("no such machine")?)

@@ -1,4 +1,4 @@
-//! A flight seen from outside: the plant with its instruments, a station at the telemetry UART, and what must hold.
+//! Flight seen from outside: the plant with its instruments, a ground station at the telemetry UART, and the checks.
 
 use crate::check::check;
 use crate::fetch::{self, Fetch};
@@ -19,27 +19,27 @@ use std::error::Error;
 
 /// Time between heartbeats [ms].
 const HEARTBEAT_MS: u64 = 1_000;
-/// Height of the hover above where it stood [m], and its time, if it is not said [ms].
+/// Height of the hover above the start [m], and default duration of the hover [ms].
 const HEIGHT_M: f32 = 5.0;
 const HOVER_MS: u64 = 30_000;
-/// Time of the hover before logs are fetched [ms].
+/// Longest hover if logs are fetched afterwards [ms].
 const SHORT_HOVER_MS: u64 = 6_000;
-/// Time within which it must arm, climb, and land and disarm [ms].
+/// Longest times until it is armed, for the climb, and for landing and disarming [ms].
 const PATIENCE_MS: [u64; 3] = [40_000, 15_000, 40_000];
-/// Time for which a log goes on once the vehicle is disarmed, with its last blocks [ms].
+/// Time from disarming until the log's last blocks are written [ms].
 const REST_MS: u64 = 1_500;
-/// Time within which it must fly the mission, and have disarmed [ms].
+/// Longest time for the mission until it is disarmed [ms].
 const TOUR_MS: u64 = 160_000;
-/// What the hover may be off on average, and the vehicle be tilted by at any time, in gusts, and on a mission, which
-/// begins each leg with an acceleration [m, rad].
+/// Largest mean position error of the hover [m], and largest tilt in gusts [rad]. A mission may tilt more, since each
+/// leg begins with an acceleration.
 const OFF_M: f64 = 2.5;
 const TILT_RAD: f64 = 0.7;
 const TOUR_TILT_RAD: f64 = 0.9;
 
-/// Time between two states of a tracker [ms].
+/// Time between two states from an external tracker [ms].
 const TRACKED_MS: u64 = 10;
 
-/// Parts of the flight.
+/// Phase of the flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
     Wakes,
@@ -48,53 +48,53 @@ enum Phase {
     Tours,
     Lands,
     Fetches,
-    /// Disarmed, until the log on its card has ended.
+    /// Disarmed, waiting for the log on the card to end.
     Rests,
     Done,
 }
 
-/// The world around a vehicle, and who leads it through the flight.
+/// World around the vehicle, and ground station that commands the flight.
 pub struct Pilot {
     world: World,
     transducers: Transducers,
     throttles: Vec<u16>,
-    /// True speeds of the rotors [rad/s], and the one that is not driven any more.
+    /// True speeds of the rotors [rad/s], and a rotor that is no longer driven.
     rotor_speeds_rad_s: Vec<f64>,
     stopped_rotor: Option<usize>,
     speed_max_rad_s: f32,
     wire: Wire,
     client: Client,
     phase: Phase,
-    /// Milliseconds, and when the phase began.
+    /// Current time, and start of the phase [ms].
     now_ms: u64,
     since_ms: u64,
     armed: bool,
-    /// Where it hovers, by the truth [m].
+    /// True position at the start of the climb [m]; below, sum [m] and number of the position errors in hover.
     start_m: [f64; 3],
     off_m: (f64, u64),
-    /// Durations of armed ticks, as the vehicle tells them: sum, number; the longest since power-up [us]; late ones.
+    /// Durations of armed ticks from telemetry [us]: sum and number; longest since power-up; number of late ticks.
     ticks_us: (f64, u64),
     longest_us: f32,
     late: u32,
-    /// How long it hovers [ms].
+    /// Duration of the hover [ms].
     hover_ms: u64,
-    /// The mission that is flown in the place of a hover.
+    /// Mission that replaces the hover.
     tour: Option<Tour>,
-    /// Waits for the log's end afterwards.
+    /// True to wait for the end of the log after the flight.
     logs: bool,
-    /// Fetches the logs afterwards.
+    /// Download of the logs after the flight.
     fetch: Option<Fetch>,
     tilt_rad: f64,
     error: Option<String>,
-    /// What it has said of its motor controllers last, with the time [ms].
+    /// Newest telemetry of the motor controllers, with its time [ms].
     escs: Option<(u64, EscStatus)>,
-    /// What the vehicle has said, with the time [ms], and whether it is printed.
+    /// Status texts of the vehicle, with their times [ms], and whether they are printed.
     heard: Vec<(u64, String)>,
     prints: bool,
 }
 
 impl Pilot {
-    /// At the start of a scenario, at the other end of the wire.
+    /// Creates the world of a scenario, and a station at the other end of the wire.
     pub fn new(scenario: &Scenario, wire: Wire) -> Result<Self, Box<dyn Error>> {
         Ok(Pilot {
             world: World::released(scenario, 1e-3)?,
@@ -102,7 +102,7 @@ impl Pilot {
             throttles: vec![0; scenario.rotors.len()],
             rotor_speeds_rad_s: vec![0.0; scenario.rotors.len()],
             stopped_rotor: None,
-            // Of `vehicles/paper.toml`, which the images are built for.
+            // As in `vehicles/paper.toml`, for which the images are built.
             speed_max_rad_s: 1000.0,
             wire,
             client: client(),
@@ -127,13 +127,13 @@ impl Pilot {
         })
     }
 
-    /// Prints nothing on the way.
+    /// Turns progress messages off.
     #[must_use]
     pub fn quiet(self) -> Self {
         Pilot { prints: false, ..self }
     }
 
-    /// Returns one in the same world, at the other end of another wire, who is quiet and has heard nothing yet.
+    /// Returns a copy in the same world, on another wire, without progress messages and without received data.
     pub fn again(&self, wire: Wire) -> Self {
         Pilot {
             world: self.world.clone(),
@@ -152,37 +152,37 @@ impl Pilot {
         }
     }
 
-    /// Has it hover for so long [ms].
+    /// Sets the duration of the hover [ms].
     #[must_use]
     pub fn hovering(self, hover_ms: u64) -> Self {
         Pilot { hover_ms, ..self }
     }
 
-    /// Has it fly a mission, from take-off to landing, in the place of a hover.
+    /// Replaces the hover by a mission, from take-off to landing.
     #[must_use]
     pub fn touring(self) -> Self {
         Pilot { tour: Some(Tour::new()), ..self }
     }
 
-    /// Waits for the end of the vehicle's log after the flight.
+    /// Waits after the flight until the vehicle's log has ended.
     #[must_use]
     pub fn logging(self) -> Self {
         Pilot { logs: true, ..self }
     }
 
-    /// Has it list, download and erase the vehicle's logs after the flight.
+    /// Lists, downloads and erases the vehicle's logs after the flight.
     #[must_use]
     pub fn fetching(self) -> Self {
         let fetch = Some(Fetch::new(Decoder::new(Client::STATION)));
         Pilot { fetch, hover_ms: self.hover_ms.min(SHORT_HOVER_MS), ..self }
     }
 
-    /// Returns what has been downloaded, once all is, and before it is erased.
+    /// Returns the downloaded logs when all are complete and not yet erased.
     pub fn fetched(&self) -> Option<&Fetch> {
         self.fetch.as_ref().filter(|fetch| fetch.has_all())
     }
 
-    /// Returns what the motors' wires said last.
+    /// Returns the newest motor commands.
     pub fn throttles(&self) -> &[u16] {
         &self.throttles
     }
@@ -192,12 +192,12 @@ impl Pilot {
         &self.rotor_speeds_rad_s
     }
 
-    /// Drives a rotor no more.
+    /// Stops driving a rotor.
     pub fn stop_rotor(&mut self, rotor: usize) {
         self.stopped_rotor = Some(rotor);
     }
 
-    /// Returns what the vehicle has said of its motor controllers last, and when [ms].
+    /// Returns the newest telemetry of the motor controllers, and its time [ms].
     pub fn escs(&self) -> Option<(u64, EscStatus)> {
         self.escs
     }
@@ -207,36 +207,37 @@ impl Pilot {
         self.world.plant().motion()
     }
 
-    /// True if the vehicle has said so last.
+    /// True if the vehicle's newest heartbeat says that it is armed.
     pub fn armed(&self) -> bool {
         self.armed
     }
 
-    /// Returns what the vehicle has said, with the times [ms].
+    /// Returns the status texts of the vehicle, with their times [ms].
     pub fn heard(&self) -> &[(u64, String)] {
         &self.heard
     }
 
-    /// Returns for how long it has hovered [ms].
+    /// Returns the time in hover so far [ms].
     pub fn hovers_ms(&self) -> Option<u64> {
         (self.phase == Phase::Hovers).then(|| self.now_ms - self.since_ms)
     }
 
-    /// Takes what the motors' wires say; none keeps what was said before.
+    /// Sets the motor commands; `None` keeps a motor's former command.
     pub fn command(&mut self, throttles: impl IntoIterator<Item = Option<u16>>) {
         for (known, new) in self.throttles.iter_mut().zip(throttles) {
             *known = new.unwrap_or(*known);
         }
     }
 
-    /// Advances to this millisecond, and returns what the transducers feel there; none at the end.
+    /// Advances to this millisecond, commands the flight, and returns the instruments' readings. Returns `None` at the
+    /// flight's end.
     pub fn advance(&mut self, now_ms: u64) -> Option<(Readings, Signals)> {
         let felt = self.watch(now_ms);
         self.supervise();
         (self.error.is_none() && self.phase != Phase::Done).then_some(felt)
     }
 
-    /// The same, but leaves the vehicle to itself, whatever it does.
+    /// Advances like `advance`, but sends no flight commands and never ends.
     pub fn watch(&mut self, now_ms: u64) -> (Readings, Signals) {
         self.now_ms = now_ms;
         let mut speeds = RotorSpeeds::<ROTORS_MAX>::default();
@@ -253,7 +254,7 @@ impl Pilot {
             self.rotor_speeds_rad_s.iter_mut().zip(&effects.rotor_speeds_rad_s).for_each(|(known, new)| *known = *new);
         }
         let readings = self.world.readings().copied().unwrap_or_default();
-        // A vehicle without instruments has a tracker.
+        // A vehicle without instruments gets its state from a tracker.
         if let Some(state) = view.state.filter(|_| self.world.readings().is_none() && now_ms % TRACKED_MS == 0) {
             self.say(&Uplink::State { sent_us: now_ms * 1000, state, sigmas: PoseSigmas::UNKNOWN });
         }
@@ -262,7 +263,7 @@ impl Pilot {
         (readings, signals)
     }
 
-    /// Prints how the flight was, and fails if it was not well flown.
+    /// Prints a summary of the flight, and fails if it was not flown well.
     pub fn verdict(self) -> Result<(), Box<dyn Error>> {
         let Pilot { error, off_m: (sum, count), tour, tilt_rad, now_ms, phase, .. } = self;
         let (ticks_us, ticks) = self.ticks_us;
@@ -298,7 +299,7 @@ impl Pilot {
         self.client.send(|_, frame| self.wire.send(frame));
     }
 
-    /// Hears the vehicle.
+    /// Processes messages from the vehicle.
     fn talk(&mut self) {
         let bytes = self.wire.take();
         let now_ms = self.now_ms;
@@ -335,7 +336,7 @@ impl Pilot {
         self.send();
     }
 
-    /// Leads it through the flight, and watches.
+    /// Commands the flight, and checks it.
     fn supervise(&mut self) {
         let motion = self.world.plant().motion();
         let [x, y, z]: [f64; 3] = motion.position_m.into();

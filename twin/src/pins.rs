@@ -1,7 +1,7 @@
-//! Motor commands, read from the pins: DSHOT600 bit by bit, or lengths of pulses. With [`ANSWERS`] set, frames are
-//! inverted, and controllers answer them.
+//! Reads motor commands from the pins: DSHOT600 bit by bit, or lengths of PWM pulses. With the parameter [`ANSWERS`]
+//! set, DSHOT frames are inverted and motor controllers answer them.
 //!
-//! Between two frames the timers' counters are held: their updates, 600,000 a second, change no pin and would take a
+//! The timers' counters are held between two frames. Their updates, 600,000 per second, change no pin and would take a
 //! quarter of the emulator's time.
 
 use crate::line_answers::LineAnswers;
@@ -13,70 +13,70 @@ use rigless::mcu::{Mcu, Operate};
 use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 
-/// The parameter with which motor controllers answer on their lines.
+/// Parameter that enables answers on the motors' signal lines.
 pub const ANSWERS: &str = "DSHOT_BIDIR_EN";
-/// Bits of a frame.
+/// Bits of a DSHOT frame.
 const BITS: u64 = 16;
-/// Place of a stream's direction in its control register (RM0090, 10.5.5; RM0433, 15.5.5).
+/// Bit position of the transfer direction in a stream's control register (RM0090, 10.5.5; RM0433, 15.5.5).
 const DIRECTION: u32 = 6;
-/// Time of a bit \[ns\].
+/// Period of a bit \[ns\].
 const BIT_NS: f64 = 1e9 / 600e3;
-/// Lengths of the pulses of a zero and of a one \[ns\], and what a count of the timers may change \[ns\].
+/// Pulse lengths of a zero and of a one \[ns\], and resolution of the timers \[ns\].
 const PULSES_NS: [u64; 2] = [625, 1_250];
 const COUNT_NS: u64 = 6;
-/// Time between two looks for the first bit of a frame \[ns\], and their number.
+/// Time between two samples while waiting for a frame's first bit \[ns\], and largest number of samples.
 const LOOK_NS: u64 = 200;
 const LOOKS: u32 = 100;
-/// PWM: pulse of a stopped motor, what full throttle adds, the period, and what a count may change \[ns\].
+/// PWM \[ns\]: pulse of a stopped motor, increment at full throttle, period, and resolution.
 const STOPPED_NS: u64 = 1_000_000;
 const SPAN_NS: u64 = 1_000_000;
 const PERIOD_NS: u64 = 2_500_000;
 const DIVIDED_COUNT_NS: u64 = 50;
-/// Wrong signals that are told, at most.
+/// Largest number of wrong signals that are recorded.
 const TOLD: usize = 10;
 
-/// Reading the frames of a timer.
+/// State of reading a timer's frames.
 #[derive(Clone, Copy, Debug)]
 enum Sampling {
     Idle,
-    /// Looks left for the first bit.
+    /// Samples left while waiting for the first bit.
     Waits(u32),
-    /// Bits taken, of a frame whose first was seen at this time \[ns\]. After the last the line is looked at once more.
+    /// Time of the first bit \[ns\], and bits read so far. After the last bit, the line is sampled once more.
     Reads(u64, u64),
 }
 
-/// The frames of a timer's motors while they are sent.
+/// Frames of a timer's motors.
 #[derive(Clone, Debug)]
 struct Frames {
     timer: &'static FrameTimer,
     sampling: Sampling,
-    /// When the pins are looked at next \[ns\].
+    /// Time of the next sample \[ns\].
     look_ns: Option<u64>,
     bits: Vec<u16>,
-    /// When the last one was over \[ns\].
+    /// End of the last frame \[ns\].
     ended_ns: u64,
-    /// The counter is held.
+    /// True while the counter is held.
     held: bool,
-    /// Who answers, if they are to.
+    /// Answers of the motor controllers, if enabled.
     answers: Option<LineAnswers>,
 }
 
-/// The motors' pins.
+/// Motor pins of a board.
 #[derive(Clone, Debug)]
 pub struct MotorPins {
     frames: Vec<Frames>,
-    /// Commands as they were last sent: 0, or 48 to 2047.
+    /// Newest command of each motor: 0, or 48 to 2047.
     throttles: Vec<Option<u16>>,
     /// Motors whose telemetry bit was set.
     asked: Vec<usize>,
-    /// Frames of a timer, or ticks with a pulse on each pin.
+    /// Number of DSHOT frames, or of ticks with a PWM pulse on each pin.
     pub sent: u64,
-    /// What was neither frame nor pulse.
+    /// Signals that were neither a frame nor a valid pulse.
     pub wrong: Vec<String>,
 }
 
 impl MotorPins {
-    /// Of so many motors.
+    /// Creates the pins of this many motors.
     pub fn new(signal: Signal, motors: usize) -> Self {
         let timers = match signal {
             Signal::Dshot600(timers) => timers,
@@ -100,7 +100,7 @@ impl MotorPins {
         }
     }
 
-    /// With controllers that answer, if that is among the image's parameters and they can be heard.
+    /// Adds motor controllers that answer, if the parameters enable them and the board supports it.
     pub fn answering(mut self, parameters: &[(&str, f32)]) -> Self {
         if parameters.iter().any(|(name, value)| *name == ANSWERS && *value != 0.0) {
             for frames in &mut self.frames {
@@ -111,7 +111,7 @@ impl MotorPins {
         self
     }
 
-    /// Sets what the rotors do \[rad/s\].
+    /// Sets the speeds of the rotors \[rad/s\].
     pub fn turn(&mut self, speeds_rad_s: &[f64]) {
         for frames in &mut self.frames {
             let speeds_rad_s = speeds_rad_s.get(frames.timer.motors.start..).unwrap_or_default();
@@ -119,23 +119,24 @@ impl MotorPins {
         }
     }
 
-    /// Returns the motors whose controllers were asked for their telemetry since the last time.
+    /// Returns the motors whose telemetry was requested since the last call.
     pub fn take_asked(&mut self) -> Vec<usize> {
         std::mem::take(&mut self.asked)
     }
 
-    /// Returns what each motor was last told, and forgets it.
+    /// Returns the command of each motor since the last call, if any.
     pub fn take(&mut self) -> Vec<Option<u16>> {
         self.throttles.iter_mut().map(Option::take).collect()
     }
 
-    /// Sees an access of the image, which may start a frame; returns true if the time of the next look has changed.
+    /// Observes an access of the image, which may start a frame. Returns true if the time of the next sample has
+    /// changed.
     pub fn watch(&mut self, access: &Access, value: u64, mcu: &mut dyn Mcu) -> bool {
         let starts = |frames: &&mut Frames| {
             (access.kind, access.address, value & 1) == (AccessKind::Write, frames.timer.stream, 1)
         };
         let Some(frames) = self.frames.iter_mut().find(starts) else { return false };
-        // From the pins, not to them.
+        // Transfer from the pins: the firmware samples answers.
         if value >> DIRECTION & 0b11 == 0
             && let Some(answers) = &mut frames.answers
         {
@@ -149,17 +150,17 @@ impl MotorPins {
         true
     }
 
-    /// Lets all counters count, as the image has them.
+    /// Releases all counters, as the image has set them.
     pub fn release(&mut self, mcu: &mut dyn Mcu, at: VirtualNanos) {
         self.frames.iter_mut().for_each(|frames| frames.hold(mcu, at, false));
     }
 
-    /// Returns when the pins are to be looked at next \[ns\].
+    /// Returns the time of the next sample \[ns\].
     pub fn look_ns(&self) -> Option<u64> {
         self.frames.iter().filter_map(Frames::next_ns).min()
     }
 
-    /// Looks at the pins for bits of frames. Returns true if a frame is complete.
+    /// Samples the pins for the bits of frames. Returns true if a frame is complete.
     pub fn look(&mut self, pins: &[Actuator], mcu: &mut dyn Mcu, at: VirtualNanos) -> bool {
         let mut complete = false;
         for frames in &mut self.frames {
@@ -186,7 +187,7 @@ impl MotorPins {
                 let first = frames.timer.motors.start;
                 for (motor, bits) in (first..).zip(&mut frames.bits) {
                     let Some(throttle) = self.throttles.get_mut(motor) else { continue };
-                    // By a complemented checksum controllers know that they are to answer.
+                    // Inverted frames have an inverted checksum, by which controllers know that they must answer.
                     let complement = if frames.answers.is_some() { 0xF } else { 0 };
                     let read = frame_of(std::mem::take(bits) ^ complement);
                     *throttle = read.map(|(throttle, _)| throttle);
@@ -201,10 +202,10 @@ impl MotorPins {
         complete
     }
 
-    /// Takes the lengths of the pulses that the pins repeat.
+    /// Reads the lengths of the PWM pulses.
     pub fn take_pulses(&mut self, pins: &[Actuator]) {
         for (throttle, pin) in self.throttles.iter_mut().zip(pins) {
-            // None before the outputs start.
+            // No pulse before the outputs start.
             let Some(pulse) = pin.pulse.filter(|pulse| pulse.width.0 > 0) else { continue };
             let [width, period] = [pulse.width.0, pulse.period.0];
             let longest = STOPPED_NS + SPAN_NS + DIVIDED_COUNT_NS;
@@ -221,7 +222,7 @@ impl MotorPins {
 }
 
 impl Frames {
-    /// Looks at the timer's pins; returns when to look again.
+    /// Samples the timer's pins; returns the time of the next sample.
     fn sample(&mut self, pins: &[Actuator], now_ns: u64, wrong: &mut Vec<String>) -> Option<u64> {
         let (first_ns, taken) = match self.sampling {
             Sampling::Idle => return None,
@@ -247,17 +248,17 @@ impl Frames {
         }
         let taken = taken + 1;
         self.sampling = Sampling::Reads(first_ns, taken);
-        // From the first bit on, so that what is rounded does not add up.
+        // Counted from the first bit, so that rounding errors do not add up.
         Some(first_ns + (taken as f64 * BIT_NS) as u64)
     }
 
-    /// Returns when the pins are to be looked at, or what drives them changes \[ns\].
+    /// Returns the time of the next sample, or of the next change by an answer \[ns\].
     fn next_ns(&self) -> Option<u64> {
         let answers_ns = self.answers.as_ref().and_then(LineAnswers::next_ns);
         self.look_ns.into_iter().chain(answers_ns).min()
     }
 
-    /// Returns the length of the pulse on a pin \[ns\]: of a low one, if it rests high.
+    /// Returns the length of the pulse on a pin \[ns\]; of the low pulse, if the line idles high.
     fn pulse_ns(&self, pin: &Actuator) -> u64 {
         pin.pulse.map_or(0, |pulse| {
             let [width, period] = [pulse.width.0, pulse.period.0];
@@ -265,12 +266,12 @@ impl Frames {
         })
     }
 
-    /// True if all bits are taken.
+    /// True if all bits are read.
     fn is_complete(&self) -> bool {
         matches!(self.sampling, Sampling::Reads(_, BITS))
     }
 
-    /// Holds the counter, if it counts, or lets one that was held go on.
+    /// Holds or releases the counter. A counter that the image has stopped stays as it is.
     fn hold(&mut self, mcu: &mut dyn Mcu, at: VirtualNanos, held: bool) {
         let Ok(control) = mcu.read(at, self.timer.counter, Width::W32) else { return };
         if held == self.held || (held && control & 1 == 0) {
@@ -278,12 +279,12 @@ impl Frames {
         }
         self.held = held;
         let control = if held { control & !1 } else { control | 1 };
-        // The timer is clocked, since its register was read.
+        // Succeeds, since a timer whose register could be read has a clock.
         let _ = mcu.write(at, self.timer.counter, Width::W32, control);
     }
 }
 
-/// Returns the throttle of a frame, and whether its telemetry bit is set; none if its checksum is wrong.
+/// Returns throttle and telemetry bit of a frame; `None` if its checksum is wrong.
 fn frame_of(frame: u16) -> Option<(u16, bool)> {
     let data = frame >> 4;
     let checksum = (data ^ (data >> 4) ^ (data >> 8)) & 0xF;

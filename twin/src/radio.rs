@@ -1,6 +1,6 @@
-//! Flights by radio of the image as flashed: a CRSF receiver at a UART of the board. The pilot arms by a switch, climbs
-//! and hovers by the sticks. From that hover on, again and again: the kill switch, at times that are spread over a
-//! control period, which the motors' pins must show in time; and a receiver that falls silent and comes back.
+//! Flies the image, as flashed, by radio, with a CRSF receiver at a UART of the board. The pilot arms by a switch,
+//! then climbs and hovers by the sticks. From that hover, many flights resume. Some move the kill switch, at times
+//! spread over a control period, and check how soon the motor pins stop. Another loses the receiver and gets it back.
 
 use crate::check::check;
 use crate::fly::TICK_NS;
@@ -10,17 +10,17 @@ use crate::machine::Machine;
 use std::error::Error;
 use std::path::Path;
 
-/// Time from the last byte of the first frame with the switch on until no motor is driven, at most \[ns\].
+/// Longest time from the last byte of the first frame with the switch on until all motors are stopped \[ns\].
 const KILL_NS: u64 = 20_000_000;
 
-/// What is flown, the frames per second at which the kill switch is tried, and at how many times each.
+/// Description of the flights: the scenario, the frame rates of the kill tests \[1/s\], and their number of phases.
 pub struct Order<'a> {
     pub scenario: &'a Path,
     pub rates: &'a [u64],
     pub phases: u64,
 }
 
-/// Flies by radio, and checks all of it.
+/// Runs all flights by radio, and checks their results.
 pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Error>> {
     let hover = Hover::<M>::of(image, order.scenario, &[("RC_MAP_KILL_SW", 7.0)], Climb::default())?;
     let (shown, wrong) = hover.vehicle().transmitter.shown();
@@ -36,7 +36,8 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     check(most_ns <= KILL_NS, "the motors stop within 20 ms")
 }
 
-/// Kills at this many times of a control period; returns the longest time until the motors were told \[ns\].
+/// Moves the kill switch at this many phases of a control period. Returns the longest time until the motors stopped
+/// \[ns\].
 fn kill<M: Machine>(hover: &Hover<M>, rate: u64, phases: u64) -> Result<u64, Box<dyn Error>> {
     let mut took_ns = Vec::new();
     for phase in 0..phases {

@@ -1,25 +1,25 @@
-//! Random numbers of a seed.
+//! Random numbers from a seed.
 
-/// A generator: Marsaglia's xorshift.
+/// Generator: Marsaglia's xorshift.
 #[derive(Clone, Copy, Debug)]
 pub struct Random(u64);
 
 impl Random {
-    /// With a seed, and what it is for.
+    /// Creates a generator from a seed and the name of its use.
     pub fn new(seed: u64, name: &str) -> Self {
         let mix = name
             .bytes()
             .fold(seed ^ 0x9E37_79B9_7F4A_7C15, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3));
-        // Zero would stay zero.
+        // A state of zero would stay zero.
         let mut random = Random(mix | 1);
-        // Seeds that differ in a few bits begin alike.
+        // The first numbers of similar seeds are alike, and are skipped.
         for _ in 0..16 {
             random.next();
         }
         random
     }
 
-    /// Returns 64 bits.
+    /// Returns 64 random bits.
     pub fn next(&mut self) -> u64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
@@ -27,7 +27,7 @@ impl Random {
         self.0
     }
 
-    /// Returns a number below `end`.
+    /// Returns a random number below `end`.
     pub fn below(&mut self, end: u64) -> u64 {
         self.next() % end.max(1)
     }

@@ -1,11 +1,11 @@
-//! The same bits: the flight again on this machine, from the exact log that the board has kept.
+//! Replays a board's exact log on this machine, and compares every bit.
 
 use crate::check::check;
 use afbc_onboard::Configuration;
 use afbc_log::exact::{Frames, ReplayStep, Replayer};
 use std::error::Error;
 
-/// Flies a log of the image's default vehicle again, and fails at the first tick that differs.
+/// Replays a log of the image's default vehicle, and fails at the first tick that differs.
 pub fn check_log(log: &[u8]) -> Result<(), Box<dyn Error>> {
     let mut replayer = Replayer::new(Configuration::<4>::default())?;
     let mut frames = Frames::default();
@@ -22,6 +22,6 @@ pub fn check_log(log: &[u8]) -> Result<(), Box<dyn Error>> {
     }
     println!("{ticks} ticks, {flown} of them armed, the same again to the last bit");
     check(frames.damaged() == 0, &format!("{} damaged frames of the log", frames.damaged()))?;
-    // Nothing at all would be the same, too.
+    // An empty log would pass as well.
     check(ticks > 1_000, "a log")
 }

@@ -1,29 +1,30 @@
-//! Pins that must not float, by the registers of their ports: the models' lines are always driven, and a board's are
-//! not. A pin that receives is pulled up, for a line that nothing drives reads as noise; a pin that switches a part of
-//! the board is driven.
+//! Finds pins that would float on a board, by the registers of their ports. In the models, lines are always driven; on
+//! a board, they are not. An input must have its pull-up, since an open line reads as noise. A pin that switches a
+//! part of the board must be driven.
 
-/// What a pin must be like while the board runs.
+/// Required state of a pin while the board runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Steady {
-    /// An input that is pulled up.
+    /// Input with pull-up.
     PulledUp,
-    /// An output, and its level.
+    /// Output with this level.
     Output(bool),
 }
 
-/// A pin: its port from 0 (A), its number, and what it must be like.
+/// Pin: its port, counted from A = 0, its number, and its required state.
 pub type SteadyPin = (u64, u32, Steady);
 
-/// A port's registers are so far apart, and these so far from its first one (RM0090, 8.4; RM0433, 11.4).
+/// Distance between the registers of two ports, and offsets of a port's mode, pull and output registers (RM0090, 8.4;
+/// RM0433, 11.4).
 const PORT: u64 = 0x400;
 const MODES: u64 = 0x00;
 const PULLS: u64 = 0x0C;
 const OUTPUTS: u64 = 0x14;
-/// An output, and a pull to the supply.
+/// Register values of an output and of a pull-up.
 const OUTPUT: u64 = 0b01;
 const UP: u64 = 0b01;
 
-/// Returns those pins that are not as they must be, by the registers from `ports` on.
+/// Returns the pins that are not in their required state. `ports` is the address of the first port.
 pub fn floating(ports: u64, pins: &[SteadyPin], mut read: impl FnMut(u64) -> u64) -> Vec<SteadyPin> {
     let mut is_steady = |&(port, pin, steady): &SteadyPin| {
         let mut register = |offset: u64| read(ports + PORT * port + offset);

@@ -1,27 +1,27 @@
-//! The faults.
+//! Table of the faults.
 
 use crate::trouble::{Outcome, Trouble};
 use rigless::chip::uart::Rate;
 use rigless::time::VirtualNanos;
 
-/// A fault.
+/// Fault at a board's pins.
 pub struct Row {
     pub name: &'static str,
     pub what: &'static str,
-    /// What a board must have for it: so many inertial sensors.
+    /// Number of inertial sensors that a board needs for this fault.
     pub imus: usize,
-    /// The worst that it may lead to on a board with no inertial sensor, with one, and with two.
+    /// Worst acceptable outcome on a board with no, one and two inertial sensors.
     expected: [Outcome; 3],
-    /// For how long the vehicle is watched at least [ms].
+    /// Least time for which the flight is watched [ms].
     pub watch_ms: u64,
-    /// What it does, from its beginning on, at every access and stop of the models.
+    /// Action of the fault, called from its start at every access and stop of the models.
     pub act: fn(&mut Trouble<'_>),
 }
 
-/// Inertial sensors.
+/// Indices of the inertial sensors.
 const FIRST: usize = 0;
 const SECOND: usize = 1;
-/// UARTs, as in `Machine::UART_INTERRUPTS`.
+/// Indices of the UARTs in `Machine::UART_INTERRUPTS`.
 const TELEMETRY: usize = 0;
 const GNSS: usize = 1;
 
@@ -38,29 +38,29 @@ const fn row(
 }
 
 impl Row {
-    /// The same, for boards with two inertial sensors alone.
+    /// Restricts the fault to boards with two inertial sensors.
     const fn of_two(self) -> Self {
         Row { imus: 2, ..self }
     }
 
-    /// The same, also for boards without sensors.
+    /// Extends the fault to boards without sensors.
     const fn of_any(self) -> Self {
         Row { imus: 0, ..self }
     }
 
-    /// The same, but a board with one inertial sensor may become this: nothing else could save it.
+    /// Sets the worst outcome for boards with one inertial sensor, which have no second one to switch to.
     const fn with_one(self, expected: Outcome) -> Self {
         let [none, _, two] = self.expected;
         Row { expected: [none, expected, two], ..self }
     }
 
-    /// The same, but a board without sensors may be lost, whose state comes over the link.
+    /// Accepts the loss of a board without sensors, whose state comes over the link.
     const fn lost_without(self) -> Self {
         let [_, one, two] = self.expected;
         Row { expected: [Outcome::Lost, one, two], ..self }
     }
 
-    /// Returns the worst that it may lead to on a board with so many inertial sensors.
+    /// Returns the worst acceptable outcome on a board with this many inertial sensors.
     pub fn expected(&self, imus: usize) -> Outcome {
         self.expected[imus.min(2)]
     }
@@ -68,7 +68,7 @@ impl Row {
 
 use Outcome::{FliesOn, Lands, Lost};
 
-/// All.
+/// All faults.
 pub const ROWS: &[Row] = &[
     row("none", "nothing", FliesOn, 3_000, |_| ()).of_any(),
     row("imu-1-silent", "the first IMU answers no more", FliesOn, 3_000, |t| t.impairments.imus[FIRST].silent = true)
@@ -115,7 +115,7 @@ pub const ROWS: &[Row] = &[
             t.impairments.imus[FIRST].silent = t.random.next() % 2 == 0;
         }
     })
-    // Of a part that is silent for 20 ms and set up again nothing comes for 0.15 s.
+    // An IMU that is silent for 20 ms is set up again, which takes 0.15 s without readings.
     .with_one(Lost),
     row("imu-1-noisy", "noise of 20 deg/s and 0.3 g on the first IMU", FliesOn, 3_000, |t| {
         t.impairments.imus[FIRST].rate.noise = [20_000; 3];
@@ -212,7 +212,7 @@ pub const ROWS: &[Row] = &[
 ];
 
 impl Trouble<'_> {
-    /// Makes the next byte of a chip random.
+    /// Makes the next byte of an IMU random.
     fn garble(&mut self, chip: usize) {
         let mask = self.random.next() & 0xFF;
         if let Some(place) = self.patient.imu(chip) {
@@ -220,7 +220,7 @@ impl Trouble<'_> {
         }
     }
 
-    /// Changes one bit of the next byte of a chip.
+    /// Inverts one random bit of the next byte of an IMU.
     fn flip_a_bit(&mut self, chip: usize) {
         let bit = self.random.below(8);
         if let Some(place) = self.patient.imu(chip) {
@@ -228,7 +228,7 @@ impl Trouble<'_> {
         }
     }
 
-    /// Loses every third transfer of a chip.
+    /// Drops every third transfer of an IMU.
     fn drop_every_third(&mut self, chip: usize) {
         if let Some(place) = self.patient.imu(chip)
             && place.ended() > *self.kept + 2
@@ -238,7 +238,7 @@ impl Trouble<'_> {
         }
     }
 
-    /// True at random times, on average so far apart.
+    /// Returns true at random times, `apart_ns` apart on average.
     fn now_and_then(&mut self, apart_ns: u64) -> bool {
         let is_due = self.since_ns >= *self.kept;
         if is_due {
@@ -247,7 +247,7 @@ impl Trouble<'_> {
         is_due
     }
 
-    /// Keeps the wire to the vehicle busy.
+    /// Keeps the wire to the vehicle busy with random bytes.
     fn flood(&mut self) {
         if self.now_and_then(MS) {
             let bytes: Vec<u8> = (0..64).map(|_| self.random.next() as u8).collect();
@@ -255,7 +255,7 @@ impl Trouble<'_> {
         }
     }
 
-    /// Raises an interrupt every 5 us for two seconds, at the accesses and stops that there are.
+    /// Raises an interrupt every 5 us for two seconds, at the next access or stop of the models.
     fn storm(&mut self, uart: usize) {
         if self.since_ns > 2_000 * MS || self.since_ns < *self.kept {
             return;

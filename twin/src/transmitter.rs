@@ -1,41 +1,42 @@
-//! The pilot's transmitter, with its receiver at a UART of the board: CRSF.
+//! Pilot's transmitter, with a CRSF receiver at a UART of the board.
 
 use crate::wire::Wire;
 use afbc_radio::{Channels, CrsfDecoder, CrsfFrame};
 use std::collections::BTreeSet;
 
-/// Time of a byte on the line, of ten bits at 420,000 baud \[ns\].
+/// Duration of a byte of ten bits at 420,000 baud \[ns\].
 const BYTE_NS: u64 = 10 * 1_000_000_000 / 420_000;
 
-/// Channels, from 0.
+/// Channels, counted from 0.
 pub const PITCH: usize = 1;
 pub const THROTTLE: usize = 2;
 pub const ARM: usize = 4;
 pub const KILL: usize = 6;
 
-/// Frames with telemetry, by type.
+/// Telemetry frames: type and name.
 const NAMES: [(u8, &str); 4] = [(0x02, "place"), (0x08, "battery"), (0x1E, "attitude"), (0x21, "mode")];
 
-/// A transmitter, and the receiver's wire to the board.
+/// Transmitter, and the receiver's wire to the board.
 pub struct Transmitter {
     wire: Wire,
     pub channels: Channels,
-    /// True if the receiver sends what it is told.
+    /// True while the receiver sends frames.
     pub is_heard: bool,
-    /// Time between two frames, and when the next is sent \[ns\].
+    /// Time between two frames, and time of the next frame \[ns\].
     period_ns: u64,
     next_ns: u64,
-    /// When the last byte of the first frame with the kill switch on was on the wire \[ns\].
+    /// Time at which the last byte of the first frame with the kill switch on was sent \[ns\].
     pub killed_ns: Option<u64>,
     kills: bool,
-    /// What comes back: the bytes of a frame that is not complete, and types of those that were.
+    /// Telemetry received: bytes of an incomplete frame, a decoder that counts wrong checksums, and types of complete
+    /// frames.
     back: Vec<u8>,
     checker: CrsfDecoder,
     shown: BTreeSet<u8>,
 }
 
 impl Transmitter {
-    /// With sticks centred, the throttle down and all switches off.
+    /// Creates a transmitter with sticks centred, throttle down and all switches off.
     pub fn new(wire: Wire, period_ns: u64, next_ns: u64) -> Self {
         let mut us = [1000; 16];
         us[..4].fill(1500);
@@ -54,17 +55,17 @@ impl Transmitter {
         }
     }
 
-    /// Returns one whose sticks and switches are as these, at another receiver's wire.
+    /// Returns a transmitter with the same stick and switch positions, on another receiver's wire.
     pub fn again(&self, wire: Wire, period_ns: u64, next_ns: u64) -> Self {
         Transmitter { channels: self.channels, ..Transmitter::new(wire, period_ns, next_ns) }
     }
 
-    /// When it is to be looked at next \[ns\].
+    /// Returns the time of the next frame \[ns\].
     pub fn next_ns(&self) -> u64 {
         self.next_ns
     }
 
-    /// Sends what is due, and takes what has come back.
+    /// Sends a frame if it is due, and reads telemetry.
     pub fn step(&mut self, now_ns: u64) {
         if self.kills && self.killed_ns.is_none() {
             self.killed_ns = self.wire.emptied_ns().map(|begun_ns| begun_ns + BYTE_NS);
@@ -79,7 +80,7 @@ impl Transmitter {
         let bytes = self.wire.take();
         self.checker.feed(&bytes, now_ns / 1000, |_| ());
         self.back.extend(bytes);
-        // CRSF's length counts neither the address nor itself.
+        // CRSF's length field counts neither the address nor itself.
         while let [_, length, kind, ..] = *self.back
             && self.back.len() >= usize::from(length) + 2
         {
@@ -88,7 +89,7 @@ impl Transmitter {
         }
     }
 
-    /// Returns what the transmitter shows, and in how many frames a checksum was wrong.
+    /// Returns the names of the telemetry received, and the number of frames with a wrong checksum.
     pub fn shown(&self) -> (Vec<&'static str>, u32) {
         let shown = NAMES.into_iter().filter(|(kind, _)| self.shown.contains(kind)).map(|(_, name)| name).collect();
         (shown, self.checker.bad_frames())

@@ -1,4 +1,4 @@
-//! What a fault sees of the models, and what became of a vehicle.
+//! Interface between a fault and the models, and outcomes of a flight.
 
 use crate::aloft::Link;
 use crate::impairments::Impairments;
@@ -12,14 +12,14 @@ use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 use std::fmt;
 
-/// What became of a vehicle.
+/// Outcome of a flight, from worst to best.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Outcome {
-    /// It fell, or turned over.
+    /// The vehicle fell or turned over.
     Lost,
-    /// It came down, upright and slowly, and disarmed.
+    /// The vehicle came down upright and slowly, and disarmed.
     Lands,
-    /// It went on as it was ordered.
+    /// The vehicle kept flying as ordered.
     FliesOn,
 }
 
@@ -33,24 +33,24 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// What a fault may do to a board, whichever it is.
+/// Actions that a fault may take on any board.
 pub trait Patient {
-    /// Returns an inertial sensor's place on its bus, if the board has so many.
+    /// Returns an inertial sensor's place on its bus, if the board has this sensor.
     fn imu(&mut self, number: usize) -> Option<&mut dyn Placed>;
 
-    /// Lets so many of a million bytes to the board arrive wrong.
+    /// Makes this many bytes per million to the board arrive wrong.
     fn garble_link(&mut self, per_million: u32);
 
-    /// Raises the interrupt of the first link's UART (0) or of the receiver's (1).
+    /// Raises the interrupt of the first link's UART (0) or of the GNSS receiver's (1).
     fn raise(&mut self, uart: usize, host: &mut dyn Host);
 
-    /// Stops the models at a time, if nothing else does before.
+    /// Stops the models at a time, unless a stop is already set.
     fn stop_at(&mut self, at: VirtualNanos);
 
     /// Resets the chip.
     fn reset(&mut self, at: VirtualNanos, instructions: u64, host: &mut dyn Host);
 
-    /// Fills the memories with noise, as they are after a start.
+    /// Fills the memories with noise, as after power-up.
     fn lose_memory(&mut self, host: &mut dyn Host, random: &mut Random);
 }
 
@@ -70,7 +70,7 @@ impl<M: Machine> Patient for Session<M> {
     }
 
     fn stop_at(&mut self, at: VirtualNanos) {
-        // One that is there may be for a look at the motors' pins, which must not be missed.
+        // A stop that is already set may be for a sample of the motor pins, which must not be missed.
         if self.pause().is_none() {
             self.pause_at(Some(at));
         }
@@ -90,7 +90,7 @@ impl<M: Machine> Patient for Session<M> {
     }
 }
 
-/// The models while a fault is there.
+/// Models and state that a fault works on.
 pub struct Trouble<'a> {
     pub patient: &'a mut dyn Patient,
     pub host: &'a mut dyn Host,
@@ -101,7 +101,7 @@ pub struct Trouble<'a> {
     pub instructions: u64,
     /// Time since the fault began.
     pub since_ns: u64,
-    /// Times that the fault has looked at the models before, and what it keeps.
+    /// Number of earlier calls of the fault, and a number that the fault may store.
     pub looks: u64,
     pub kept: &'a mut u64,
 }

@@ -1,5 +1,5 @@
-//! A u-blox receiver at the board's UART, new from its maker: what the board's own model of one has no part in, its
-//! configuration and its baud rate.
+//! Factory-new u-blox receiver at the board's UART. It covers configuration and baud rate, which the board's own
+//! receiver model does not have.
 
 #[allow(dead_code, reason = "shared with the drivers' tests, which use all of it")]
 #[path = "../../crates/drivers/tests/ublox_model/mod.rs"]
@@ -18,7 +18,7 @@ use std::sync::{Arc, Mutex};
 pub(crate) use ublox_model::Generation;
 use ublox_model::{Model, Truth};
 
-/// What a period may be shorter than configured, for the instruments' jitter [us].
+/// Margin by which fixes may come earlier than the configured period, because of the instruments' jitter [us].
 const JITTER_US: u64 = 50_000;
 
 #[derive(Debug)]
@@ -31,20 +31,20 @@ struct Line {
 }
 
 impl Line {
-    /// Returns a byte as it arrives at the other end.
+    /// Returns a byte as it arrives at the other end of the line.
     fn carry(&self, byte: u8) -> u8 {
-        // Baud rates within 2 % understand each other.
+        // Baud rates within 2 % work together.
         let is_good = self.baud.abs_diff(self.model.baud.into()) * 50 <= self.baud;
         if is_good { byte } else { byte.rotate_left(3) ^ 0x5A }
     }
 }
 
-/// A receiver. Clones are the same one.
+/// u-blox receiver. Clones share one receiver.
 #[derive(Clone, Debug)]
 pub struct UbloxPeer(Arc<Mutex<Line>>);
 
 impl UbloxPeer {
-    /// A new one, at a UART with this divider.
+    /// Creates a receiver at a UART with this divider.
     pub fn new(generation: Generation, divider: Divider) -> Self {
         UbloxPeer(Arc::new(Mutex::new(Line { model: Model::new(generation), divider, baud: 0, sent_us: 0 })))
     }
@@ -53,7 +53,7 @@ impl UbloxPeer {
         change(&mut self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
     }
 
-    /// Sees what the image does to the UART's divider.
+    /// Observes the image's writes to the UART's divider, for the baud rate.
     pub fn watch(&self, settled: &Settled) {
         let Settled::Access { access, value } = settled else { return };
         if access.kind == AccessKind::Write {
@@ -65,8 +65,8 @@ impl UbloxPeer {
         }
     }
 
-    /// Lets the board feel what its transducers do, this receiver with it: a fix of the instruments, which has its
-    /// delay, is sent when it arrives.
+    /// Passes signals to the board, and queues a new fix in this receiver. The instruments' fixes already have their
+    /// delay.
     pub fn sense(&self, board: &mut impl Machine, at: VirtualNanos, (readings, signals): (&Readings, &Signals)) {
         let now_us = at.0 / 1000;
         self.with(|line| {
@@ -75,7 +75,7 @@ impl UbloxPeer {
                 let Measurement::Gnss { horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s, .. } = aid.value else {
                     continue;
                 };
-                // The instruments may have fixes more often than this receiver is told to send them.
+                // The instruments may have fixes more often than this receiver is configured to send.
                 if now_us - line.sent_us < period_us {
                     continue;
                 }
@@ -96,12 +96,12 @@ impl UbloxPeer {
         board.attach_receiver(Box::new(self.clone()));
     }
 
-    /// True if it was told to send solutions alone, often.
+    /// True if the receiver is configured to send only solutions, at 5 Hz or more.
     pub fn is_configured(&self) -> bool {
         self.with(|line| line.model.solves && !line.model.nmea && line.model.period_us <= 200_000)
     }
 
-    /// Says how it is configured.
+    /// Returns the receiver's configuration as text.
     pub fn told(&self) -> String {
         self.with(|line| {
             let Model { baud, period_us, solves, nmea, dynamic_model, .. } = &line.model;

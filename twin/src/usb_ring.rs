@@ -1,5 +1,5 @@
-//! What the image gives to its USB link, of which the models have no bus: taken from the ring in its RAM in which the
-//! bytes wait for the port (`chip_stm32::usb`), as its task would.
+//! Reads the bytes that the image sends over USB. The models have no USB bus. The bytes are therefore taken from the
+//! ring buffer in RAM where they wait for the port (`chip_stm32::usb`), as the USB task would take them.
 
 use object::{Object, ObjectSymbol};
 use rigless::emulator::Host;
@@ -7,14 +7,14 @@ use rigless::soc::Width;
 use std::error::Error;
 use std::path::Path;
 
-/// Part of the ring's name in the image.
+/// Part of the ring buffer's symbol name in the image.
 const NAME: &str = "chip_stm323usb4SENT";
-/// Words behind the ring's bytes: the state of an `embassy_sync::pipe::Pipe` that nobody waits for. All are zero but
-/// the end of what is in it, if that begins at the start.
+/// Number of words after the ring's bytes: the state of an `embassy_sync::pipe::Pipe` without waiting tasks. If its
+/// content begins at the start, all words are zero except the content's end.
 const WORDS: u64 = 8;
 const LENGTH: u64 = 1024;
 
-/// The ring, and what was taken from it.
+/// Ring buffer, and the bytes taken from it.
 #[derive(Debug)]
 pub struct UsbRing {
     address: u64,
@@ -22,7 +22,7 @@ pub struct UsbRing {
 }
 
 impl UsbRing {
-    /// Finds it in an image.
+    /// Finds the ring buffer in an image.
     pub fn find(image: &Path) -> Result<Self, Box<dyn Error>> {
         let file = std::fs::read(image)?;
         let file = object::File::parse(file.as_slice())?;
@@ -34,7 +34,7 @@ impl UsbRing {
         Ok(UsbRing { address: ring.address(), bytes: Vec::new() })
     }
 
-    /// Empties it, unless the image is about to write.
+    /// Empties the ring buffer, unless the image is just writing to it.
     pub fn drain(&mut self, host: &mut dyn Host) {
         let mut set = (0..WORDS).filter_map(|word| {
             let address = self.address + LENGTH + 4 * word;

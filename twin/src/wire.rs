@@ -1,4 +1,4 @@
-//! Both ends of the telemetry UART.
+//! Wire to a UART of the board.
 
 use rigless::chip::Timeline;
 use rigless::chip::uart::Peer;
@@ -7,16 +7,17 @@ use rigless::time::VirtualNanos;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
 
-/// What is on its way, to and from the board.
+/// Bytes on their way to and from the board.
 #[derive(Debug, Default)]
 struct Bytes {
     to_board: VecDeque<u8>,
     from_board: Vec<u8>,
-    /// When the last byte to the board was begun, since one was sent; not kept in a snapshot \[ns\].
+    /// Time at which the last queued byte to the board was begun; `None` while bytes wait, and not stored in snapshots
+    /// \[ns\].
     emptied_ns: Option<u64>,
 }
 
-/// A wire, whose bytes move at the pace of the board's UART. Clones are the same wire.
+/// Wire whose bytes move at the pace of the board's UART. Clones share one wire.
 #[derive(Clone, Debug, Default)]
 pub struct Wire(Arc<Mutex<Bytes>>);
 
@@ -33,17 +34,17 @@ impl Wire {
         });
     }
 
-    /// When the last byte of what was sent last was begun; none while some are on their way \[ns\].
+    /// Returns the time at which the last queued byte was begun; `None` while bytes wait \[ns\].
     pub fn emptied_ns(&self) -> Option<u64> {
         self.with(|wire| wire.emptied_ns)
     }
 
-    /// Takes what the board has sent.
+    /// Takes the bytes that the board has sent.
     pub fn take(&self) -> Vec<u8> {
         self.with(|wire| std::mem::take(&mut wire.from_board))
     }
 
-    /// The board's end: takes all that is on its way, and sends this.
+    /// Acts as the board's end: takes all bytes on their way to the board, and sends `from_board`.
     pub fn exchange(&self, from_board: &[u8]) -> Vec<u8> {
         self.with(|wire| {
             wire.from_board.extend(from_board);

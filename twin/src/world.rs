@@ -1,4 +1,4 @@
-//! The plant with its instruments, as the board's transducers feel it.
+//! Converts the readings of the plant's instruments into signals of the board's transducers.
 
 use afbc_estimator::{Measurement, Origin};
 use afbc_onboard::Readings;
@@ -6,14 +6,14 @@ use nalgebra::Vector3;
 use rigless::chip::nmea::Position;
 use rigless::machine::flight::{AT_REST, Signals};
 
-/// Where the local frame's origin is: PX4's usual place near Zurich \[degrees, m\].
+/// Origin of the local frame: PX4's usual place near Zurich \[degrees, m\].
 const PLACE: [f64; 3] = [47.397_742, 8.545_594, 488.0];
-/// The standard atmosphere's, of which the barometer's driver makes a height.
+/// Pressure of the standard atmosphere at sea level, from which the barometer's driver computes a height.
 const SEA_LEVEL_PA: f64 = 101_325.0;
 const GRAVITY_M_S2: f64 = 9.806_65;
 
-/// Returns what the transducers feel at the start, where the vehicle stands: a receiver's first fix is the origin of
-/// the local frame.
+/// Returns the signals at the start, where the vehicle stands. The receiver's first fix becomes the origin of the
+/// local frame.
 pub fn at_the_place() -> Signals {
     let [latitude, longitude, altitude] = PLACE;
     let [latitude, longitude] = [latitude, longitude].map(|degrees| (degrees * 1e7).round() as i32);
@@ -21,11 +21,11 @@ pub fn at_the_place() -> Signals {
     Signals { position, ..AT_REST }
 }
 
-/// Keeps what the transducers feel between two readings of an instrument.
+/// Signals of the transducers, kept between two readings of an instrument.
 #[derive(Clone)]
 pub struct Transducers {
     signals: Signals,
-    /// Metres per ten-millionth of a degree to the north and to the east.
+    /// Metres per 1e-7 degrees to the north and to the east.
     scale: [f64; 2],
     fix_m: [f64; 3],
     height_m: f64,
@@ -40,7 +40,7 @@ impl Transducers {
         Transducers { signals: at_the_place(), scale, fix_m: [0.0; 3], height_m: 0.0 }
     }
 
-    /// Returns the newest fix, in the world's frame [m].
+    /// Returns the newest fix in the world's frame [m].
     pub fn fix_m(&self) -> [f64; 3] {
         self.fix_m
     }
@@ -50,7 +50,7 @@ impl Transducers {
         self.height_m
     }
 
-    /// Returns what the transducers feel when the instruments read this.
+    /// Updates the signals by the instruments' readings, and returns them.
     pub fn feel(&mut self, readings: &Readings) -> Signals {
         if let Some(imu) = &readings.imu {
             let [rates, force] = imu.value.map(frd);
@@ -65,7 +65,7 @@ impl Transducers {
                     let pressure_pa = SEA_LEVEL_PA * (1.0 - height_m / 44_330.77).powf(1.0 / 0.190_263_2);
                     self.signals.pressure = pressure_pa.round() as u32;
                 }
-                // In units of the earth's field near Zurich \[nT\].
+                // The field's unit is the earth's field near Zurich \[nT\].
                 Measurement::MagneticField { field, .. } => {
                     self.signals.magnetic_field = frd(field).map(|field| (field * 1e3).round() as i32);
                 }
@@ -88,7 +88,7 @@ impl Transducers {
     }
 }
 
-/// Returns a vector with y right (east) and z down.
+/// Converts a vector to y right (east) and z down.
 fn frd(vector: Vector3<f32>) -> [f64; 3] {
     [vector.x.into(), (-vector.y).into(), (-vector.z).into()]
 }

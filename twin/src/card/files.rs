@@ -1,14 +1,14 @@
-//! The files on a card, read by a FAT that is not the firmware's.
+//! Reads the files on a card with a FAT implementation other than the firmware's.
 
 use rigless::chip::memory_card::MemoryCard;
 use std::error::Error;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 
 const BLOCK: usize = 512;
-/// Where the card's table of partitions has the first block of the first one.
+/// Offset in the partition table of the first partition's first block.
 const FIRST: usize = 446 + 8;
 
-/// The first partition of a card. It cannot be written.
+/// First partition of a card, read-only.
 struct CardVolume<'a> {
     card: &'a MemoryCard,
     start: u64,

@@ -1,4 +1,4 @@
-//! A serial NOR flash chip of 16 MiB: Winbond's W25Q128JV (revision F: commands in section 8, times in 9.6).
+//! Serial NOR flash chip of 16 MiB: Winbond's W25Q128JV (revision F: commands in section 8, times in 9.6).
 
 use super::{CardTrouble, LogStorage};
 use rigless::chip::Timeline;
@@ -12,21 +12,21 @@ const SECTOR: usize = 65_536;
 const SECTORS: usize = 256;
 const PAGE: usize = 256;
 const BLANK: u8 = 0xFF;
-/// A line at rest.
+/// Byte read from an idle line.
 const REST: u32 = 0xFF;
 const PROGRAM_NS: u64 = 700_000;
 const ERASE_NS: u64 = 150_000_000;
-/// Winbond, serial flash of 3 V, 2^24 bytes.
+/// Manufacturer Winbond, 3 V serial flash, 2^24 bytes.
 const ID: [u8; 3] = [0xEF, 0x40, 0x18];
-/// What it knows of a command: its byte and three of an address.
+/// Bytes of a command with its address of three bytes.
 const ADDRESSED: usize = 4;
 
-/// A chip.
+/// Flash chip on SPI.
 #[derive(Debug)]
 pub struct FlashChip {
     /// Sectors that are not blank.
     sectors: BTreeMap<usize, Vec<u8>>,
-    /// What it has heard since it was selected.
+    /// Bytes received since the chip was selected.
     heard: Vec<u8>,
     now: Now,
 }
@@ -52,7 +52,7 @@ impl FlashChip {
         self.sectors.get(&(address / SECTOR % SECTORS)).map_or(BLANK, |sector| sector[address % SECTOR])
     }
 
-    /// Does what it was told, once it is not selected any more.
+    /// Executes the received command when the chip is deselected.
     fn execute(&mut self, now_ns: u64) {
         let takes_ns = match self.heard.first() {
             Some(0x06) => {
@@ -63,7 +63,7 @@ impl FlashChip {
                 let at = self.address();
                 let sector = self.sectors.entry(at / SECTOR % SECTORS).or_insert_with(|| vec![BLANK; SECTOR]);
                 let page = at % SECTOR / PAGE * PAGE;
-                // Beyond a page's end it goes on at its beginning.
+                // A write beyond the end of a page wraps to its beginning.
                 for (index, byte) in self.heard[ADDRESSED..].iter().enumerate() {
                     sector[page + (at + index) % PAGE] &= byte;
                 }
@@ -96,7 +96,7 @@ impl Peer for FlashChip {
         if is_out || is_busy && command != 0x05 {
             return REST;
         }
-        // Of what is read, the place counts.
+        // Bytes sent during a read have no meaning; only their number counts.
         if place < ADDRESSED || command == 0x02 || command == 0xD8 {
             self.heard.push(mosi as u8);
         } else {
@@ -125,13 +125,13 @@ impl LogStorage for FlashChip {
         self.now.trouble = trouble;
     }
 
-    /// Something else is in the sectors before.
+    /// Fills the first sectors with data other than logs, up to `room` free bytes.
     fn fill(&mut self, room: u64) {
         let free = room.div_ceil(SECTOR as u64) as usize;
         self.sectors = (0..SECTORS.saturating_sub(free)).map(|sector| (sector, vec![0xA5; SECTOR])).collect();
     }
 
-    /// By the layout in docs/ulog.md: a sector begins with a page that names log and part.
+    /// Follows the layout in docs/ulog.md: a sector begins with a page that names the log and the sector's part of it.
     fn logs(&self) -> Result<Vec<(String, Vec<u8>)>, Box<dyn AnyError>> {
         let word = |sector: &[u8], at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|byte| sector[at + byte]));
         let pair = |sector: &[u8], at: usize, other: usize| {
@@ -146,7 +146,7 @@ impl LogStorage for FlashChip {
         let whole = |(log, sectors): (u32, Vec<&[u8]>)| {
             let (last, full) = sectors.split_last()?;
             let written = last[PAGE..].chunks(PAGE).rposition(|page| page.iter().any(|byte| *byte != BLANK));
-            // Of a log that has not ended, the last page may be torn.
+            // A log without an end may have a torn last page, which is left out.
             let length = pair(last, 24, 28).map_or(written.unwrap_or(0) * PAGE, |length| length as usize);
             let rooms = full.iter().map(|sector| &sector[PAGE..]).chain([last.get(PAGE..PAGE + length)?]);
             Some((format!("log{log:03}.ulg"), rooms.flatten().copied().collect()))

@@ -1,5 +1,5 @@
-//! Where a board keeps logs: in the slot of a memory card, the models' own, or in a flash chip. How long they write and
-//! stall is of here.
+//! Storage of a board's logs: a memory card in its slot, which the emulator's models provide, or a flash chip. This
+//! module adds write times and stalls.
 
 mod files;
 mod flash;
@@ -16,42 +16,43 @@ pub use flash::FlashChip;
 pub use sd::SdSlot;
 pub use spi::SpiSlot;
 
-/// Blocks of the card, as its registers can tell them, and the first one of its volume.
+/// Number of blocks of the card, a size that its registers can express, and first block of its volume.
 const BLOCKS: usize = 70 * 1024;
 const VOLUME: usize = 63;
-/// Bytes of a cluster: with one of a block, each block of a file takes seven writes of the table beside its own.
+/// Bytes of a cluster. With one block per cluster, each block of a file would take seven further writes, to the
+/// allocation table.
 const CLUSTER: u32 = 8 * 1024;
-/// What a block takes usually [ns]: of an ordinary card.
+/// Usual time to write a block on an ordinary card [ns].
 const USUAL_NS: u64 = 800_000;
 
-/// What goes wrong with a card. Times are since power-up [ms].
+/// Faults of a card. Times count from power-up [ms].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CardTrouble {
-    /// The first block after this time takes so much longer.
+    /// Time and duration of a stall: the first block after the time takes longer by the duration.
     pub stall_ms: Option<[u64; 2]>,
-    /// It is out between these times.
+    /// Times at which the card is removed and inserted again.
     pub out_ms: Option<[u64; 2]>,
 }
 
-/// Keeps logs.
+/// Storage of logs.
 pub trait LogStorage {
-    /// Lets this be wrong with it, or nothing.
+    /// Sets the faults of the storage, replacing earlier ones.
     fn trouble(&mut self, trouble: CardTrouble);
 
-    /// Has no card; a chip stays.
+    /// Removes the card; does nothing to a flash chip.
     fn remove(&mut self) {}
 
-    /// Leaves so many bytes of room.
+    /// Fills the storage up to this many free bytes.
     fn fill(&mut self, room: u64);
 
-    /// Returns what is kept: the logs with their names.
+    /// Returns the names and contents of the stored logs.
     fn logs(&self) -> Result<Vec<(String, Vec<u8>)>, Box<dyn AnyError>>;
 
-    /// Blocks, or pages, that were written.
+    /// Returns the number of blocks, or pages, written so far.
     fn written(&self) -> u64;
 }
 
-/// A card in its slot.
+/// Card in its slot.
 #[derive(Debug)]
 pub struct CardSlot {
     card: MemoryCard,
@@ -61,8 +62,8 @@ pub struct CardSlot {
     written: u64,
 }
 
-/// Returns a card with an empty FAT16 in its first partition, or one with so many bytes of room. The models' own has no
-/// partitions.
+/// Returns a card whose first partition has an empty FAT16, or one filled up to `room` free bytes. The emulator's own
+/// card has no partitions.
 fn formatted(room: Option<u64>) -> MemoryCard {
     let mut bytes = vec![0; BLOCKS * 512];
     let options = fatfs::FormatVolumeOptions::new().fat_type(fatfs::FatType::Fat16).bytes_per_cluster(CLUSTER);
@@ -71,7 +72,7 @@ fn formatted(room: Option<u64>) -> MemoryCard {
     if let Some(room) = room {
         fill(&mut bytes[VOLUME * 512..], room).expect("it has room");
     }
-    // The master boot record: type (FAT16), first block and length of its one partition, and the mark at its end.
+    // Master boot record: type (FAT16), first block and length of its one partition, and the signature at its end.
     bytes[450] = 0x06;
     bytes[454..458].copy_from_slice(&(VOLUME as u32).to_le_bytes());
     bytes[458..462].copy_from_slice(&((BLOCKS - VOLUME) as u32).to_le_bytes());
@@ -79,7 +80,7 @@ fn formatted(room: Option<u64>) -> MemoryCard {
     MemoryCard::holding(&bytes)
 }
 
-/// Fills a volume with a file, up to so many bytes.
+/// Fills a volume with one file, up to `room` free bytes.
 fn fill(volume: &mut [u8], room: u64) -> std::io::Result<()> {
     let volume = fatfs::FileSystem::new(Cursor::new(volume), fatfs::FsOptions::new())?;
     let free = u64::from(volume.stats()?.free_clusters()) * u64::from(volume.cluster_size());
@@ -98,7 +99,8 @@ impl CardSlot {
         }
     }
 
-    /// True if the card is out, and whether that is new: then it has lost its supply.
+    /// Returns whether the card is out, and whether it has just been removed or inserted. Either makes it lose its
+    /// supply.
     fn is_out(&mut self, now_ns: u64) -> (bool, bool) {
         let is_out = self.trouble.out_ms.is_some_and(|[from, to]| (from..to).contains(&(now_ns / 1_000_000)));
         let is_new = is_out != self.was_out;
@@ -110,7 +112,7 @@ impl CardSlot {
         (is_out, is_new)
     }
 
-    /// Notes that a block has been written: the models' card has it at once.
+    /// Counts a written block and starts its programming time. The emulator's card stores the block at once.
     fn write(&mut self, now_ns: u64) {
         self.written += 1;
         self.busy_until_ns = now_ns + USUAL_NS;

@@ -1,38 +1,39 @@
-//! A card by a chip's own interface to it, of the second version of the specification as all are today. The models' own
-//! is of the first on this bus: what the second has beside it is added (SD Physical Layer Simplified Specification).
+//! Memory card on a chip's SD interface, of the second version of the specification, like all cards of today. The
+//! emulator's card follows the first version on this bus; this module adds the differences (SD Physical Layer
+//! Simplified Specification).
 
 use super::CardSlot;
 use rigless::chip::Timeline;
 use rigless::chip::sd::{Answer, Card, Outcome, command};
 use rigless::snapshot::{Error, Reader, Store, Writer};
 
-/// Application commands that send registers (4.7.4): the SD status and the configuration.
+/// Application commands that send a register (4.7.4): the SD status and the configuration (SCR).
 const SD_STATUS: u8 = 13;
 const SEND_SCR: u8 = 51;
-/// Bits of the operating conditions (5.1): the power-up is done, the card addresses blocks, at 3.2 to 3.3 V.
+/// Operating conditions (5.1): power-up done, block addressing, 3.2 to 3.3 V.
 const CONDITIONS: u32 = 1 << 31 | 1 << 30 | 1 << 20;
-/// The configuration (5.6): version 3, one line or four.
+/// Configuration (5.6): version 3; one data line or four.
 const CONFIGURATION: [u8; 8] = [0x02, 0x35, 0x80, 0, 0, 0, 0, 0];
-/// The SD status (4.10.2): four lines.
+/// SD status (4.10.2): four data lines in use.
 const STATUS: [u8; 64] = {
     let mut status = [0; 64];
     status[0] = 0x80;
     status
 };
-/// Bits of the card's status (4.10.1): it takes no data, and programs.
+/// Fields of the card's status (4.10.1), by which a card that is programming refuses data.
 const READY_FOR_DATA: u32 = 1 << 8;
 const STATE: u32 = 0xF << 9;
 const PROGRAMMING: u32 = 7 << 9;
 
-/// A slot.
+/// Card slot on an SD interface.
 #[derive(Debug)]
 pub struct SdSlot {
     pub slot: CardSlot,
-    /// The next command is an application command.
+    /// True if the next command is an application command.
     is_escaped: bool,
-    /// The register that is read next in the place of a block: none, configuration or status.
+    /// Command whose register is read next in place of a block: 0 for none, `SEND_SCR` or `SD_STATUS`.
     register: u8,
-    /// A block has come, since when is to be seen.
+    /// True if a block has come whose write time is still to be counted.
     has_come: bool,
 }
 
@@ -50,14 +51,14 @@ impl Card for SdSlot {
             return Answer::None;
         }
         let is_escaped = std::mem::replace(&mut self.is_escaped, index == command::APP_CMD);
-        // The model takes a block without a clock: it counts from the next command on.
+        // The model takes a block without a time, so writing counts from the next command.
         if std::mem::take(&mut self.has_come) {
             self.slot.write(now_ns);
         }
         self.register = if is_escaped && [SD_STATUS, SEND_SCR].contains(&index) { index } else { 0 };
         let answer = self.slot.card.command(index, argument, context);
         match (index, answer) {
-            // It repeats voltage and pattern (4.3.13).
+            // The card echoes voltage and check pattern (4.3.13).
             (command::SEND_IF_COND, _) if !is_escaped => Answer::Short(argument & 0xFFF),
             (command::SD_SEND_OP_COND, Answer::Short(_)) if is_escaped => Answer::Short(CONDITIONS),
             (_, Answer::Short(status)) if now_ns < self.slot.busy_until_ns => {

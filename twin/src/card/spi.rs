@@ -1,4 +1,4 @@
-//! A card by SPI.
+//! Memory card on SPI.
 
 use super::CardSlot;
 use rigless::chip::Timeline;
@@ -6,33 +6,33 @@ use rigless::chip::spi::Peer;
 use rigless::snapshot::{Error, Reader, Store, Writer};
 use serde::{Deserialize, Serialize};
 
-/// Commands that write a block, as frames begin with them, and bytes of a frame (SD Physical Layer Simplified
+/// First byte of the command that writes a block, and bytes of a command frame (SD Physical Layer Simplified
 /// Specification 6.00, 7.3.1.1).
 const WRITE_BLOCK: u8 = 0x40 | 24;
 const FRAME: usize = 6;
-/// The byte before a block (7.3.3.2), and the bytes of a block with its checksum.
+/// Token before a block (7.3.3.2), and bytes of a block with its checksum.
 const START_BLOCK: u8 = 0xFE;
 const BLOCK: usize = 512 + 2;
-/// A line at rest, and that of a card that is busy.
+/// Levels of an idle line and of a busy card.
 const REST: u32 = 0xFF;
 const BUSY: u32 = 0x00;
 
-/// Where the host is.
+/// State of the host's transfer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 enum Heard {
     #[default]
     Nothing,
-    /// So many bytes of a frame are to come; true if it writes a block.
+    /// Bytes left of a command frame; true if the command writes a block.
     Frame(usize, bool),
-    /// The answer, and the byte before the block.
+    /// Waiting for the token before the block.
     Waits,
-    /// So many bytes of the block are to come.
+    /// Bytes left of the block.
     Block(usize),
-    /// The card's verdict on it.
+    /// Waiting for the card's response to the block.
     Verdict,
 }
 
-/// A slot whose card is selected by a pin.
+/// Card slot on SPI.
 #[derive(Debug)]
 pub struct SpiSlot {
     pub slot: CardSlot,
@@ -44,7 +44,7 @@ impl SpiSlot {
         SpiSlot { slot: CardSlot::new(), heard: Heard::Nothing }
     }
 
-    /// Follows the host's bytes to the end of each block that it writes.
+    /// Follows the host's bytes, and counts each block that it writes.
     fn hear(&mut self, mosi: u8, answer: u32, now_ns: u64) {
         self.heard = match self.heard {
             Heard::Nothing if mosi & 0xC0 == 0x40 => Heard::Frame(FRAME - 1, mosi == WRITE_BLOCK),
@@ -76,7 +76,7 @@ impl Peer for SpiSlot {
             return REST;
         }
         let answer = self.slot.card.transfer(mosi, bits, context);
-        // The model writes at once: how long a card takes is added here.
+        // The model writes at once; the busy time is added here.
         if now_ns < self.slot.busy_until_ns {
             return BUSY;
         }

@@ -1,4 +1,4 @@
-//! A BMI270 on SPI: the registers that its driver is tested against, and the bytes on the wire around them.
+//! BMI270 on SPI: the register model of the driver's tests, and the SPI protocol around it.
 
 #[allow(dead_code, reason = "shared with the driver's tests, which use all of it")]
 #[path = "../../../crates/drivers/tests/bmi270_model/mod.rs"]
@@ -9,28 +9,28 @@ use rigless::chip::Timeline;
 use rigless::chip::spi::Peer;
 use rigless::snapshot::{Error, Reader, Store, Writer};
 
-/// Of CHIP_ID.
+/// Value of the register CHIP_ID.
 const IDENTITY: u8 = 0x24;
-/// Registers.
+/// Number of registers.
 const REGISTERS: usize = 128;
-/// Bit of the first byte that asks for a reading, which begins after one byte of no meaning (5.2 of the data sheet's
-/// section on its interfaces).
+/// Bit of the first byte that requests a read. The data begin after one dummy byte (data sheet, section on interfaces,
+/// 5.2).
 const READS: u8 = 0x80;
 
-/// Where a transfer is.
+/// Phase of a transfer.
 #[derive(Debug, Default)]
 enum Phase {
     #[default]
     Idle,
     Address,
     Dummy(u8),
-    /// What is read, and the next byte of it.
+    /// Data being read, and index of the next byte.
     Reads(Vec<u8>, usize),
-    /// What is written from this register on.
+    /// First register being written, and the data so far.
     Writes(u8, Vec<u8>),
 }
 
-/// A BMI270.
+/// BMI270 on SPI.
 #[derive(Debug)]
 pub struct Bmi270 {
     registers: Bmi270Registers,
@@ -39,14 +39,15 @@ pub struct Bmi270 {
 
 impl Bmi270 {
     pub fn new() -> Self {
-        // Its words have the plant's noise.
+        // No noise of its own: the plant's readings already have noise.
         let mut registers = Bmi270Registers::new(IDENTITY, |_, _| 0.0);
         registers.rates_deg_s = [0.0; 3];
         registers.force_g = [0.0, 0.0, 1.0];
         Bmi270 { registers, phase: Phase::Idle }
     }
 
-    /// Feels rates [mdeg/s], specific force [1e-6 g] and a temperature [0.01 degrees C], on its own axes.
+    /// Sets the measured rates [mdeg/s], specific force [1e-6 g] and temperature [0.01 degrees C], in the sensor's
+    /// axes.
     pub fn feel(&mut self, rate: [i32; 3], force: [i32; 3], temperature: i32) {
         self.registers.rates_deg_s = rate.map(|rate| f64::from(rate) * 1e-3);
         self.registers.force_g = force.map(|force| f64::from(force) * 1e-6);
@@ -91,7 +92,7 @@ impl Peer for Bmi270 {
     }
 }
 
-/// A snapshot is taken between two transfers.
+/// Snapshots are taken between transfers, so the transfer's phase is not stored.
 impl Store for Bmi270 {
     fn store(&self, to: &mut Writer) -> Result<(), Error> {
         let Bmi270Registers { registers, is_spi, reset_us, awake_us, loaded, started_us, on_us, .. } = &self.registers;

@@ -1,6 +1,6 @@
-//! Boards with an STM32F405, of the models of an STM32F427, which has nearly the STM32F405's map and shares its manual.
-//! What each has, and where, is a row of [`wiring::WIRINGS`]; at its I2C and its receiver's UART there is the usual
-//! module with receiver and compass. Where the models differ from all of these boards:
+//! Boards with an STM32F405, on models of an STM32F427, which has nearly the same memory map and the same manual. Each
+//! board is a row of [`wiring::WIRINGS`]. A common module with GNSS receiver and compass is connected to its I2C and
+//! UART. The models differ from all of these boards as follows:
 //!
 //! | here | on the board |
 //! |---|---|
@@ -51,24 +51,24 @@ use wiring::{Inertial, LogWiring, Sensors, StorageKind, Timer, UART4, WIRINGS, W
 const CRYSTAL_HZ: u64 = 8_000_000;
 const RAIL_MV: u32 = 3_300;
 const LINK_WIRE: HostWire = HostWire { name: "serial1", port: 5760 };
-/// SPI1, and the place of the IMU on it.
+/// SPI1, and the IMU's place on it.
 const SPI: usize = 0;
 const IMU: usize = 0;
-/// Volts of the battery per volt at its pin.
+/// Battery voltage per volt at the converter's pin.
 const DIVIDER: u32 = 11;
 /// Place of the memory card or flash chip on its SPI.
 const LOGS: usize = 0;
-/// Places on the I2C.
+/// Places of barometer and compass on the I2C.
 const BAROMETER: usize = 0;
 const COMPASS: usize = 1;
 const CURVE: Curve = Curve { zero: VirtualNanos(1_000_000), full: VirtualNanos(2_000_000) };
-/// The names of the noise on each quantity, by which it is drawn.
+/// Names by which the noise of each quantity is drawn.
 const RATE_NOISE: [&str; 3] = ["rate.noise.x", "rate.noise.y", "rate.noise.z"];
 const FORCE_NOISE: [&str; 3] = ["force.noise.x", "force.noise.y", "force.noise.z"];
 const FIELD_NOISE: [&str; 3] = ["field.noise.x", "field.noise.y", "field.noise.z"];
 const PRESSURE_NOISE: [&str; 1] = ["pressure.noise"];
 
-/// What the chips were given last, on the body's axes.
+/// Newest readings given to the sensor models, in body axes.
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Handed {
     rate: Sensed<i32, 3>,
@@ -77,7 +77,7 @@ struct Handed {
     pressure: Sensed<u32, 1>,
 }
 
-/// The board of a row of [`WIRINGS`].
+/// Board described by a row of [`WIRINGS`].
 #[derive(Debug)]
 pub struct F405<const ROW: usize> {
     mcu: Part,
@@ -89,7 +89,7 @@ pub struct F405<const ROW: usize> {
 impl<const ROW: usize> F405<ROW> {
     const WIRING: Wiring = WIRINGS[ROW];
 
-    /// Returns the board as it is built, at rest.
+    /// Returns the board at rest.
     fn new() -> Result<Self, Error> {
         let mut board = F405 {
             mcu: Part::new(&Self::WIRING)?,
@@ -127,7 +127,7 @@ impl<const ROW: usize> F405<ROW> {
         Ok(board)
     }
 
-    /// The core, as that of every STM32F4 (PM0214).
+    /// Returns the configuration of the core, the same for every STM32F4 (PM0214).
     fn config(&self) -> armv7m::Config {
         let bus = self.mcu.bus();
         let core = armv7m::Core {
@@ -197,15 +197,15 @@ impl<const ROW: usize> Board for F405<ROW> {
     }
 }
 
-/// The body's axes (forward, right, down) as an inertial sensor (x, y to the left of x, z up) has them that is turned
-/// clockwise by so many quarters, seen from above.
+/// Rotates body axes (forward, right, down) into those of an inertial sensor (x, y to the left of x, z up) that is
+/// turned clockwise by this many quarter turns, seen from above.
 fn of_imu([x, y, z]: [i32; 3], quarter_turns: u8) -> [i32; 3] {
     let turn = |[x, y]: [i32; 2], _| [y, x.saturating_neg()];
     let [x, y] = (0..quarter_turns).fold([x, y], turn);
     [x, y.saturating_neg(), z.saturating_neg()]
 }
 
-/// The body's axes as the compass of the module has them: its x points to the right, its z down.
+/// Rotates body axes into those of the module's compass: x to the right, z down.
 fn of_compass([x, y, z]: [i32; 3]) -> [i32; 3] {
     [y, x.saturating_neg(), z]
 }
@@ -275,7 +275,7 @@ impl<const ROW: usize> Edge for F405<ROW> {
             part.i2c[i2c].silence(COMPASS, impairments.compass.silent),
             part.usart[receiver.index].silence(impairments.receiver.silent),
         ];
-        // A fault of a part that is not there would be none, and its flight would pass.
+        // A fault of a part that is missing would do nothing, and its test flight would pass.
         assert_eq!(are_there, [true; 4]);
         let errors = part.usart[receiver.index].errors_mut();
         errors.noise = uart::Rate { name: "gps.noise_errors", per_million: impairments.receiver.noise_errors };
@@ -321,7 +321,7 @@ impl<const ROW: usize> Edge for F405<ROW> {
 }
 
 impl<const ROW: usize> Machine for F405<ROW> {
-    /// RM0090, 21.4.
+    /// IWDG_KR (RM0090, 21.4).
     const WATCHDOG: u64 = 0x4000_3000;
     const STORE: u64 = 0x0800_4000;
     const STORE_WORD: usize = 4;
@@ -333,11 +333,11 @@ impl<const ROW: usize> Machine for F405<ROW> {
     const RECEIVER: Divider = Self::WIRING.receiver().divider;
     const JITTER: u64 = 300_000;
     const BATTERY_MV: Option<u16> = if Self::WIRING.sensors.is_some() { Some(16_800) } else { None };
-    /// USB: the core's fourth hardware configuration register.
+    /// The USB core's fourth hardware configuration register.
     const UNMAPPED: &[u64] = &[0x5000_0050];
     const PORTS: u64 = 0x4002_0000;
     const STEADY: &'static [SteadyPin] = Self::WIRING.steady;
-    /// RM0090, 34.16.2.
+    /// OTG_FS_GINTSTS (RM0090, 34.16.2).
     const USB_STATUS: Option<u64> = Some(0x5000_0014);
 
     fn built() -> Result<Box<Self>, Error> {
@@ -348,18 +348,18 @@ impl<const ROW: usize> Machine for F405<ROW> {
         self.drive().actuators().to_vec()
     }
 
-    /// The second link is by USB.
+    /// The second link is on USB.
     fn attach_second_link(&mut self, _: Wire) -> bool {
         false
     }
 
-    /// The board's own for it.
+    /// The UART that the board reserves for a radio receiver.
     fn attach_radio(&mut self, wire: Wire) -> Option<f32> {
         self.mcu.stm32.usart[Self::WIRING.radio?].attach(wire);
         Some(0.0)
     }
 
-    /// UART5, on all of them that have one for it.
+    /// UART5, on all boards that have a UART for motor controllers.
     fn attach_escs(&mut self, wire: Wire) {
         if Self::WIRING.sensors.is_some() {
             self.mcu.stm32.usart[7].attach(wire);
@@ -389,7 +389,7 @@ impl<const ROW: usize> Machine for F405<ROW> {
 }
 
 impl Wiring {
-    /// Its receiver's UART; where there is none, one that it has no pads of.
+    /// Returns the GNSS receiver's UART. A board without a receiver returns one for which it has no pads.
     const fn receiver(&self) -> wiring::Uart {
         match self.sensors {
             Some(sensors) => sensors.receiver,

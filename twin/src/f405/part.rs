@@ -1,6 +1,6 @@
-//! The microcontroller, with what the models of its relative leave out: DMA serves the motors' timers, and an I2C does
-//! not acknowledge the last byte that DMA reads (`LAST`: RM0090, 27.3.7), without which it reads one byte more, which
-//! the next transfer takes for its first.
+//! STM32F405 as a model of an STM32F427, with two additions. DMA serves the motors' timers. The I2C does not
+//! acknowledge the last byte that DMA reads (`LAST`: RM0090, 27.3.7). Without this, the I2C would read one byte more,
+//! which the next transfer would take as its first.
 
 use super::wiring::{Sensors, Wiring};
 use rigless::device::{ErasedDevice, ResetCause};
@@ -15,8 +15,8 @@ use rigless::soc::{Bus, Error};
 use rigless::time::VirtualNanos;
 use std::sync::LazyLock;
 
-/// What the updates of the motors' timers ask of DMA1 and DMA2 (RM0090, tables 42 and 43), which the models leave out;
-/// and what they have.
+/// DMA requests of DMA1 and DMA2: those of the models, and the updates of the motors' timers, which the models lack
+/// (RM0090, tables 42 and 43).
 static WIRINGS: LazyLock<[Vec<Wire>; 2]> = LazyLock::new(|| {
     let timer = |instance, channel, streams| Wire { instance, request: UPDATE_REQUEST, channel, streams };
     let first = [timer("TIM3", 5, &[2]), timer("TIM4", 2, &[6]), timer("TIM5", 6, &[0, 6])];
@@ -30,13 +30,14 @@ static WIRINGS: LazyLock<[Vec<Wire>; 2]> = LazyLock::new(|| {
 #[derive(Debug)]
 pub struct Part {
     pub stm32: Stm32f427,
-    /// Where the sensors' I2C and DMA1 are on its bus, and control and count of the stream that receives from it.
+    /// Bus slot of the sensors' I2C, with control and count registers of the DMA stream that receives from it; below,
+    /// the slot of DMA1.
     i2c: Option<(usize, [Register; 2])>,
     dma: usize,
 }
 
 impl Part {
-    /// The part of a board.
+    /// Creates the part of a board.
     pub fn new(wiring: &Wiring) -> Result<Self, Error> {
         let stm32 = Stm32f427::new()?;
         let dma = stm32.bus().slot("DMA1")?;
@@ -49,8 +50,8 @@ impl Part {
         Ok(part)
     }
 
-    /// Withholds the acknowledgement of the byte that the I2C is reading, if it is the last for its stream. Asked for
-    /// before the model is told that the byte has come.
+    /// Withholds the acknowledgement of the byte that the I2C is reading, if it is the stream's last. Must be called
+    /// before the model learns that the byte has come.
     fn withhold_acknowledgement(&mut self, slot: usize) {
         let Some((i2c, [control, count])) = self.i2c.filter(|(i2c, _)| *i2c == slot) else { return };
         let bus = self.stm32.bus_mut();
@@ -71,7 +72,7 @@ impl Part {
     }
 }
 
-/// Returns control and count of a stream that receives from an I2C of some board.
+/// Returns control and count registers of a stream that receives from an I2C on one of the boards.
 fn stream(number: usize) -> [Register; 2] {
     match number {
         0 => [Register::S0cr, Register::S0ndtr],
@@ -91,7 +92,7 @@ impl Mcu for Part {
 
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
         self.stm32.reset(at, cause);
-        // The models make all of the part anew.
+        // The reset of the models recreates the DMA without the additions.
         self.wire();
     }
 

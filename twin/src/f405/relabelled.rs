@@ -1,5 +1,5 @@
-//! An ICM-20608-G that calls itself another part of its family, which shares its registers of readings, of ranges and
-//! of power. Where the MPU-6000 differs, it is not that part: no ACCEL_CONFIG_2, another thermometer, another filter.
+//! ICM-20608-G with the identity of another part of its family that shares its registers for readings, ranges and
+//! power. It is no full MPU-6000: that has no ACCEL_CONFIG_2, another thermometer and another filter.
 
 use rigless::chip::Timeline;
 use rigless::chip::icm20608::Icm20608;
@@ -13,14 +13,14 @@ const READS: u8 = 0x80;
 pub struct Relabelled {
     pub inner: Icm20608,
     identity: u8,
-    /// The register that the next byte of a reading is from; none outside a reading.
+    /// Register of the next byte read; `None` outside a read.
     register: Option<u8>,
-    /// The next byte is the first.
+    /// True if the next byte is the first of a transfer.
     is_first: bool,
 }
 
 impl Relabelled {
-    /// A part with this identity.
+    /// Creates a part with this identity.
     pub fn new(identity: u8) -> Self {
         Relabelled { inner: Icm20608::new(), identity, register: None, is_first: false }
     }
@@ -53,7 +53,7 @@ impl Peer for Relabelled {
     }
 }
 
-/// A snapshot is taken between two transfers.
+/// Snapshots are taken between transfers, so the transfer's state is not stored.
 impl Store for Relabelled {
     fn store(&self, to: &mut Writer) -> Result<(), Error> {
         self.inner.store(to)

@@ -1,64 +1,64 @@
-//! The boards with an STM32F405: what of each matters to its models.
+//! Wiring of the boards with an STM32F405, as far as the models need it.
 //!
-//! Wired as ArduPilot's and Betaflight's descriptions of the boards and their makers' manuals have them. An inertial
-//! sensor's turns are Betaflight's alignments.
+//! Sources: ArduPilot's and Betaflight's descriptions of the boards, and the manufacturers' manuals. The rotations of
+//! the inertial sensors are Betaflight's alignments.
 
 use crate::machine::{Divider, FrameTimer};
 use crate::steady::Steady::{Output, PulledUp};
 use crate::steady::SteadyPin;
 
-/// A board.
+/// Wiring of a board.
 #[derive(Clone, Copy, Debug)]
 pub struct Wiring {
     pub name: &'static str,
     pub link: Uart,
-    /// The UART that is left to a radio receiver, among the part's.
+    /// Index of the UART left for a radio receiver, among the chip's UARTs.
     pub radio: Option<usize>,
-    /// None has sensors of its own: its state comes over the link.
+    /// Sensors; `None` for a board whose state comes over the link.
     pub sensors: Option<Sensors>,
-    /// Where it keeps logs.
+    /// Storage of the logs.
     pub logs: Option<LogWiring>,
-    /// Pins that must not float: RX of its UARTs, and what switches its Bluetooth.
+    /// Pins that must not float: RX of the board's UARTs, and the switch of its Bluetooth module.
     pub steady: &'static [SteadyPin],
-    /// The timers of its motors, with DMA.
+    /// Timers of the motors, with their DMA.
     pub timers: &'static [FrameTimer],
     /// Name, timer and channel of motors 1 to 4.
     pub motors: [(&'static str, Timer, u8); 4],
 }
 
-/// A UART.
+/// UART of a board.
 #[derive(Clone, Copy, Debug)]
 pub struct Uart {
-    /// Its place among the part's.
+    /// Index among the chip's UARTs.
     pub index: usize,
     pub divider: Divider,
     pub interrupt: u16,
 }
 
-/// Sensors: the IMU on SPI1, the others on one I2C.
+/// Sensors of a board: the IMU on SPI1, the others on one I2C.
 #[derive(Clone, Copy, Debug)]
 pub struct Sensors {
     pub imu: Inertial,
-    /// Port and pin that select it.
+    /// Port and pin of its chip select.
     pub select: (&'static str, u8),
-    /// Quarters by which it is turned clockwise, seen from above.
+    /// Clockwise quarter turns of the IMU, seen from above.
     pub quarter_turns: u8,
-    /// The I2C among the part's, and the stream of DMA1 that receives from it.
+    /// Index of the I2C among the chip's, and number of the DMA1 stream that receives from it.
     pub i2c: usize,
     pub i2c_stream: usize,
     pub receiver: Uart,
     pub battery: Battery,
 }
 
-/// Where the battery's voltage, by a divider of 11, and current come in: channels of the converter, and amperes of a
-/// volt, in tenths.
+/// Converter channels of the battery's voltage (by a divider of 11) and current, and the current per volt at the pin
+/// \[0.1 A/V\].
 #[derive(Clone, Copy, Debug)]
 pub struct Battery {
     pub channels: [u8; 2],
     pub deciamperes_per_volt: u32,
 }
 
-/// What keeps logs on an SPI: its place among the part's, and port and pin that select it.
+/// Storage of logs on an SPI: its kind, index of the SPI among the chip's, and port and pin of its chip select.
 #[derive(Clone, Copy, Debug)]
 pub struct LogWiring {
     pub storage: StorageKind,
@@ -66,38 +66,38 @@ pub struct LogWiring {
     pub select: (&'static str, u8),
 }
 
-/// A slot of a memory card, or a flash chip.
+/// Kind of log storage: a memory card or a flash chip.
 #[derive(Clone, Copy, Debug)]
 pub enum StorageKind {
     Card,
     Flash,
 }
 
-/// An inertial sensor.
+/// Model of inertial sensor.
 #[derive(Clone, Copy, Debug)]
 pub enum Inertial {
     Icm42688p,
     Bmi270,
-    /// An ICM-20608-G that calls itself another part of its family.
+    /// An ICM-20608-G with the identity of another part of its family.
     Relabelled(u8),
 }
 
-/// A timer among those of the part of its kind: TIM2 to TIM5, or TIM1 and TIM8.
+/// Timer, with its index among the chip's timers of its kind: TIM2 to TIM5, or TIM1 and TIM8.
 #[derive(Clone, Copy, Debug)]
 pub enum Timer {
     General(usize),
     Advanced(usize),
 }
 
-/// RX of the usual UARTs: of USART2, USART3, UART5 and USART6 (RM0090).
+/// RX pins of USART2, USART3, UART5 and USART6 (RM0090).
 const RX2: SteadyPin = (0, 3, PulledUp);
 const RX3: SteadyPin = (2, 11, PulledUp);
 const RX5: SteadyPin = (3, 2, PulledUp);
 const RX6: SteadyPin = (2, 7, PulledUp);
-/// And of USART1 and UART4.
+/// RX pins of USART1 and UART4.
 const RX1: SteadyPin = (0, 10, PulledUp);
 const RX4: SteadyPin = (0, 1, PulledUp);
-/// The enable pin of Bluetooth.
+/// Enable pin of the Bluetooth module, held low.
 const QUIET_PB11: SteadyPin = (1, 11, Output(false));
 const QUIET_PC3: SteadyPin = (2, 3, Output(false));
 
@@ -106,7 +106,7 @@ const TIM4: Timer = Timer::General(2);
 const TIM5: Timer = Timer::General(3);
 const TIM8: Timer = Timer::Advanced(1);
 
-/// Registers and interrupts: RM0090, 30.6.3 and table 62.
+/// Divider registers and interrupts: RM0090, 30.6.3 and table 62.
 const USART1: Uart = uart(0, 0x4001_1008, 84_000_000, 37);
 const USART3: Uart = uart(2, 0x4000_4808, 42_000_000, 39);
 const USART6: Uart = uart(3, 0x4001_1408, 84_000_000, 71);
@@ -116,7 +116,8 @@ const fn uart(index: usize, register: u64, clock_hz: u64, interrupt: u16) -> Uar
     Uart { index, divider: Divider { register, clock_hz }, interrupt }
 }
 
-/// Of TIM3 with DMA1's stream 2, TIM4 and TIM5 with its stream 6, TIM8 with DMA2's stream 1 (RM0090, 10.5.5).
+/// Motor timers: TIM3 with stream 2 of DMA1, TIM4 and TIM5 with its stream 6, TIM8 with stream 1 of DMA2 (RM0090,
+/// 10.5.5).
 const fn tim3(motors: [usize; 2]) -> FrameTimer {
     FrameTimer { counter: 0x4000_0400, stream: 0x4002_6040, motors: motors[0]..motors[1], lines: None }
 }
@@ -188,7 +189,7 @@ const SPEEDYBEE_MINI: Wiring = Wiring {
     ..SPEEDYBEE_V4
 };
 
-/// ArduPilot's `MatekF405-SE`. Its MPU-6000 is an ICM-20608-G by another name.
+/// ArduPilot's `MatekF405-SE`. Its MPU-6000 is modelled by an ICM-20608-G with the MPU-6000's identity.
 const MATEK_SE: Wiring = Wiring {
     name: "matekf405se",
     link: USART1,
@@ -208,7 +209,7 @@ const MATEK_SE: Wiring = Wiring {
     motors: [("M1", TIM4, 2), ("M2", TIM4, 1), ("M3", TIM3, 3), ("M4", TIM3, 4)],
 };
 
-/// ArduPilot's `MatekF405-STD`, with the newest of the IMUs that it is sold with.
+/// ArduPilot's `MatekF405-STD`, with the newest of the IMUs that it has been sold with.
 const MATEK_STD: Wiring = Wiring {
     name: "matekf405std",
     link: USART1,
@@ -228,7 +229,7 @@ const MATEK_STD: Wiring = Wiring {
     motors: ALL_OF_TIM8,
 };
 
-/// Betaflight's `KAKUTEF4V2`. Its ICM-20689 is an ICM-20608-G by another name.
+/// Betaflight's `KAKUTEF4V2`. Its ICM-20689 is modelled by an ICM-20608-G with the ICM-20689's identity.
 const KAKUTE: Wiring = Wiring {
     name: "kakutef4v2",
     link: USART1,
@@ -248,7 +249,7 @@ const KAKUTE: Wiring = Wiring {
     motors: [("M1", TIM3, 3), ("M2", TIM3, 4), ("M3", TIM5, 4), ("M4", TIM5, 3)],
 };
 
-/// `firmware/boards/stm32f405`: no sensors.
+/// Board of `firmware/boards/stm32f405`, without sensors.
 const PLAIN: Wiring = Wiring {
     name: "stm32f405",
     link: USART1,
@@ -260,5 +261,5 @@ const PLAIN: Wiring = Wiring {
     motors: ALL_OF_TIM8,
 };
 
-/// All.
+/// All boards; the index is the row of `F405`.
 pub const WIRINGS: [Wiring; 7] = [SPEEDYBEE_V3, SPEEDYBEE_V4, SPEEDYBEE_MINI, MATEK_SE, MATEK_STD, KAKUTE, PLAIN];
