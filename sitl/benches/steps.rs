@@ -1,8 +1,8 @@
-//! Time of one step of each part, and closed-loop steps per second on one core.
+//! Measures the time per step of each part, and closed-loop steps per second on one core.
 //!
-//! `cargo bench -p sitl`. Each single step cycles through inputs of the paper's flight, so that branches and
-//! exponentials vary. The closed loop is a whole flight of 60 s at 1 kHz: reference, AFBC, rigid body by Runge-Kutta,
-//! gusts and parameter changes, without a log; items are steps.
+//! Run by `cargo bench -p sitl`. Single steps cycle through inputs of the paper's flight, so that branches and
+//! exponentials vary. The closed loop is a whole flight of 60 s at 1 kHz, with reference, AFBC, rigid body by
+//! Runge-Kutta, gusts and parameter changes, but without a log. Its items are steps.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a failed scenario must stop it
 
 use afbc::{Adaptive, Backstepping, Controller, Profile};
@@ -22,14 +22,14 @@ fn main() {
     divan::main();
 }
 
-/// Steps of one whole flight.
+/// Number of steps in a flight.
 const STEPS: usize = 60_000;
 
 fn paper(model: PlantModel) -> Scenario {
     scenario(model, Case::DEFAULT).unwrap()
 }
 
-/// Inputs and outputs of a controller at every 60th step of the paper's flight.
+/// Returns inputs and outputs of a controller at every 60th step of the paper's flight.
 fn recorded(model: PlantModel, kind: ControllerKind) -> Vec<(State, Setpoint, RotorSpeeds<8>)> {
     let (mut steps, mut index) = (Vec::new(), 0_usize);
     fly(&paper(model), &Contender::of(kind, Profile::Paper), |sample| {
@@ -124,8 +124,8 @@ fn closed_loop_afbc_simplified(bencher: Bencher) {
     closed_loop(bencher, &paper(PlantModel::Simplified), afbc(Profile::Paper));
 }
 
-/// The paper's flight with everything that a campaign adds: rotor lag, limits and delay, drag, wind, turbulence,
-/// measurement noise, bias and delay.
+/// Returns the paper's flight with all effects that a campaign adds: rotor lag, limits and delay, drag, wind,
+/// turbulence, and noise, bias and delay of the measurements.
 fn real() -> Scenario {
     let rotors = Rotors { time_constant_s: 0.02, max_rad_s: 317.0, delay_s: 0.001, ..Rotors::default() };
     let wind =
@@ -143,7 +143,7 @@ fn closed_loop_afbc_real(bencher: Bencher) {
     closed_loop(bencher, &real(), afbc(Profile::Flight));
 }
 
-/// One flight of a built-in campaign under every contender; items are flights of one contender.
+/// Measures flights of a built-in campaign under every contender. An item is the flight of one contender.
 #[divan::bench]
 fn campaign_flight(bencher: Bencher) {
     let campaign = afbc_campaign::built_in("robustness").unwrap().read().unwrap();

@@ -1,4 +1,4 @@
-//! The command line of the simulator, for programs that bring laws of their own.
+//! Command line of the simulator, for programs that add laws of their own.
 //!
 //! ```no_run
 //! use afbc_scenario::{OwnController, OwnLaw, OwnVehicle};
@@ -29,24 +29,27 @@ mod serial;
 use afbc_scenario::OwnLaw;
 use std::process::ExitCode;
 
-/// Runs the command line with these laws beside the built-in ones: in every command that flies, in scenario and vehicle
-/// files, in suites, campaigns and searches for gains.
+/// Runs the command line with these laws in addition to the built-in ones. They are available in every command that
+/// flies, in scenario and vehicle files, in suites, campaigns and searches for gains.
 ///
-/// Exit codes: 0 for success; 1 if a vehicle was lost unexpectedly, or an exact replay differs; 2 if a law cannot be
-/// registered, nothing was flown or the results could not be written, with one line on stderr; 130 if interrupted, with
-/// one line that says whether nothing was written or a campaign's finished flights are kept.
+/// Exit codes:
+/// - 0: success.
+/// - 1: a vehicle was lost unexpectedly, or an exact replay differs.
+/// - 2: a law cannot be registered, nothing was flown or the results could not be written; stderr has one line about
+///   it.
+/// - 130: interrupted; one line says whether nothing was written or a campaign's finished flights are kept.
 pub fn main_with(laws: impl IntoIterator<Item = OwnLaw>) -> ExitCode {
     if let Some(problem) = laws.into_iter().find_map(|law| law.register().err()) {
         eprintln!("{problem}");
         return ExitCode::from(2);
     }
-    // Ends the program if a shell asks what could stand next.
+    // Exits if a shell has asked for completions.
     #[cfg(feature = "all")]
     clap_complete::CompleteEnv::with_factory(cli::Cli::program).complete();
     match cli::Cli::read().run() {
         Ok(code) => code,
         Err(failure) => {
-            // A log without anything in it would only be in the way of the next try.
+            // An empty log would block the next attempt.
             afbc_files::remove_empty();
             eprintln!("{failure}");
             ExitCode::from(2)

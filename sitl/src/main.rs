@@ -1,4 +1,4 @@
-//! The simulator. Its documentation is its `--help`, and [`sitl::main_with`].
+//! Simulator. Documented by `--help` and [`sitl::main_with`].
 
 use std::process::ExitCode;
 

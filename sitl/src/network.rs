@@ -1,4 +1,4 @@
-//! A vehicle reached over a network, in real time.
+//! Vehicle reached over a network, in real time.
 
 use afbc_hil::{Autopilot, Error};
 use std::io::{self, Read, Write};
@@ -10,13 +10,13 @@ use std::time::{Duration, Instant};
 const PERIOD: Duration = Duration::from_millis(1);
 /// Longest wait between two reads.
 const NAP: Duration = Duration::from_micros(200);
-/// Longest time for a TCP connection to be made, and for it to accept what is written.
+/// Longest time to open a TCP connection, and for the connection to accept written data.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// A vehicle at a UDP or TCP port.
+/// Vehicle at a UDP or TCP port.
 pub(crate) struct Network {
     socket: Socket,
-    /// End of the present millisecond.
+    /// End of the current millisecond.
     deadline: Option<Instant>,
 }
 
@@ -26,10 +26,10 @@ enum Socket {
 }
 
 impl Network {
-    /// Sends to the UDP port of `address`, HOST:PORT, and hears what comes from there.
+    /// Opens a UDP socket that sends to `address` (HOST:PORT) and receives from there.
     ///
     /// # Errors
-    /// A message for the user.
+    /// If the address cannot be resolved or reached, with a message for the user.
     pub(crate) fn udp(address: &str) -> Result<Self, String> {
         let to = resolved(address)?;
         let from: SocketAddr = if to.is_ipv4() { ([0, 0, 0, 0], 0).into() } else { ([0_u16; 8], 0).into() };
@@ -43,10 +43,10 @@ impl Network {
         Ok(Network { socket: Socket::Udp(socket), deadline: None })
     }
 
-    /// Connects to the TCP port of `address`, HOST:PORT.
+    /// Connects to the TCP port of `address` (HOST:PORT).
     ///
     /// # Errors
-    /// A message for the user.
+    /// If the address cannot be resolved or reached, with a message for the user.
     pub(crate) fn tcp(address: &str) -> Result<Self, String> {
         let to = resolved(address)?;
         let connect = || {
@@ -71,14 +71,14 @@ impl Socket {
             _ if bytes.is_empty() => Ok(()),
             Socket::Udp(socket) => socket.send(bytes).map(drop),
             Socket::Tcp(stream) => {
-                // Half a frame must not be lost in a full buffer; the timeout bounds the wait.
+                // Blocking, so that a full buffer does not cut a frame; the timeout bounds the wait.
                 stream.set_nonblocking(false)?;
                 stream.write_all(bytes)
             }
         }
     }
 
-    /// Reads what has come; nothing if nothing has.
+    /// Reads received bytes; returns 0 if there are none.
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let read = match self {
             Socket::Udp(socket) => socket.recv(buffer),
@@ -113,7 +113,7 @@ impl Autopilot for Network {
             }
             thread::sleep(left.min(NAP));
         }
-        // From deadline to deadline, so that delays are caught up with.
+        // Counted from the former deadline, so that delays are made up for.
         self.deadline = Some(deadline + PERIOD);
         self.socket.write(uplink).map_err(failed)
     }

@@ -1,4 +1,4 @@
-//! A board connected to a serial port.
+//! Board connected to a serial port.
 
 use afbc_hil::{Autopilot, Error, Station};
 use afbc_link::Command;
@@ -13,13 +13,13 @@ const PERIOD: Duration = Duration::from_millis(1);
 const NAP: Duration = Duration::from_micros(200);
 /// Longest time for the port to accept what is written.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(200);
-/// Number of disarm commands at the end, since one frame may get lost.
+/// Number of kill commands sent at the end, since a frame may get lost.
 const FAREWELLS: usize = 3;
 
-/// A board, in real time. Dropping it disarms the vehicle in any case.
+/// Board on a serial port, in real time. Dropping it stops the motors.
 pub(crate) struct Serial {
     port: Box<dyn SerialPort>,
-    /// End of the present millisecond.
+    /// End of the current millisecond.
     deadline: Option<Instant>,
     late_max: Duration,
 }
@@ -28,7 +28,7 @@ impl Serial {
     /// Opens the port `device` at `baud`, 8N1.
     ///
     /// # Errors
-    /// A message for the user.
+    /// If the port cannot be opened, with a message for the user.
     pub(crate) fn open(device: &str, baud: u32) -> Result<Self, String> {
         Ok(Serial::new(serialport::new(device, baud).timeout(WRITE_TIMEOUT).open().map_err(no_port)?))
     }
@@ -38,7 +38,7 @@ impl Serial {
         Serial { port, deadline: None, late_max: Duration::ZERO }
     }
 
-    /// Returns the largest delay of this side behind real time, by which states are late.
+    /// Returns the largest delay of this program behind real time, by which states were late.
     pub(crate) fn late_max(&self) -> Duration {
         self.late_max
     }
@@ -47,7 +47,8 @@ impl Serial {
     fn listen(&mut self, deadline: Instant, hear: &mut dyn FnMut(&[u8])) -> io::Result<()> {
         let mut buffer = [0; 4096];
         loop {
-            // A read of nothing would wait for the port's timeout, far beyond a millisecond.
+            // Read only if bytes are waiting: otherwise the read would block for the port's timeout, far longer than a
+            // millisecond.
             if self.port.bytes_to_read()? > 0 {
                 let length = self.port.read(&mut buffer)?;
                 hear(buffer.get(..length).unwrap_or_default());
@@ -66,7 +67,7 @@ impl Autopilot for Serial {
         let deadline = *self.deadline.get_or_insert_with(Instant::now);
         self.listen(deadline, hear).map_err(failed)?;
         self.late_max = self.late_max.max(deadline.elapsed());
-        // From deadline to deadline, so that delays are caught up with.
+        // Counted from the former deadline, so that delays are made up for.
         self.deadline = Some(deadline + PERIOD);
         self.port.write_all(uplink).map_err(failed)
     }
@@ -75,9 +76,9 @@ impl Autopilot for Serial {
 impl Drop for Serial {
     fn drop(&mut self) {
         let mut station = Station::new();
-        // Not disarm, which a vehicle refuses in the air.
+        // Kill, since a vehicle refuses to disarm in the air.
         (0..FAREWELLS).for_each(|_| station.command(Command::Kill));
-        // A failure cannot be reported any more; without states the vehicle descends by itself.
+        // A failure can no longer be reported. A vehicle without states descends by itself.
         let _ = self.port.write_all(&station.take());
         let _ = self.port.flush();
     }
@@ -86,7 +87,7 @@ impl Drop for Serial {
 /// Returns the names of all serial ports.
 ///
 /// # Errors
-/// A message for the user.
+/// If the ports cannot be listed, with a message for the user.
 pub(crate) fn ports() -> Result<Vec<String>, String> {
     let ports = serialport::available_ports().map_err(no_port)?;
     Ok(ports.into_iter().map(|port| port.port_name).collect())
@@ -100,8 +101,8 @@ fn failed(error: io::Error) -> Error {
     Error::Autopilot(format!("the serial port failed ({error}); check the cable").into())
 }
 
-/// Tests over a pseudo-terminal. Its other end ticks once for each millisecond that [`Serial`] waits, so a busy machine
-/// slows both down without an effect.
+/// Tests over a pseudo-terminal. The board at its other end ticks once per exchange of [`Serial`], so a busy machine
+/// slows both ends alike and changes no result.
 #[cfg(all(test, unix))]
 #[allow(clippy::unwrap_used, reason = "tests")]
 mod tests {
@@ -116,24 +117,24 @@ mod tests {
         Scenario { duration_s, ..built_in(name).unwrap().read().unwrap() }
     }
 
-    /// The host's autopilot behind a serial port.
+    /// Firmware's code on the host, behind a serial port.
     struct Board {
         host: Host,
         port: TTYPort,
-        /// Keeps the pseudo-terminal open: otherwise it ends, with unread bytes, when the other side closes it; a wire
-        /// does not.
+        /// Keeps the pseudo-terminal open. When the last handle of a side closes, unread bytes would be lost, unlike
+        /// on a wire.
         _wire: TTYPort,
         armed: bool,
     }
 
-    /// The port, and the board that ticks after each exchange over it.
+    /// Port, and the board that ticks after each exchange.
     struct Wired<'a> {
         serial: Serial,
         board: &'a mut Board,
     }
 
     impl Board {
-        /// Creates the board and the port connected to it.
+        /// Creates the board, and the port connected to it.
         fn new() -> (Self, Serial) {
             let (here, there) = TTYPort::pair().unwrap();
             let wire = there.try_clone_native().unwrap();
@@ -199,8 +200,8 @@ mod tests {
         let Wired { serial, board } = wired;
         assert!(board.armed);
         drop(serial);
-        // A tick for each read of what remains on the wire: far fewer than the 2250 after which the board would disarm
-        // by itself.
+        // The board ticks once per read of the bytes left on the wire. That is far less than the 2250 ticks after
+        // which it would disarm by itself.
         let start = std::time::Instant::now();
         let mut ticks = 0;
         while board.armed && ticks < 200 {

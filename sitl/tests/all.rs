@@ -1,4 +1,4 @@
-//! All tests in one program: one each takes longer to build than to run.
+//! All tests in one program, since building a program per test file would take longer than running the tests.
 #![allow(
     clippy::expect_used,
     clippy::indexing_slicing,

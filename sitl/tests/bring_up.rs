@@ -1,4 +1,4 @@
-//! `sitl bring-up`: with a served vehicle, and with what is no board.
+//! Tests `sitl bring-up` with a served vehicle, and with connections that have no board.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -9,7 +9,7 @@ use std::net::UdpSocket;
 use std::process::Stdio;
 use std::thread;
 
-/// In real time, as a board is: verdicts that depend on this machine's load are not asked for.
+/// Runs in real time, like a board, so verdicts that depend on this machine's load are not checked.
 #[test]
 fn a_served_vehicle_is_asked_everything() {
     let folder = folder("served");
@@ -39,7 +39,7 @@ fn a_served_vehicle_is_asked_everything() {
     ] {
         assert!(log.contains(wanted), "{wanted}: {log}\n{error}");
     }
-    // A second one does not take its place.
+    // A second log does not replace the first.
     let error = refused(&sitl(&folder, &asked));
     assert!(error.contains("log.md: exists already"), "{error}");
 }
@@ -53,7 +53,7 @@ fn what_is_no_board_is_refused_in_one_line() {
     let closed = format!("udp:{closed}");
     let babbling = UdpSocket::bind("127.0.0.1:0").unwrap();
     let babbled = format!("udp:{}", babbling.local_addr().unwrap());
-    // Whoever asks hears what a Betaflight says of itself.
+    // Answers every sender as a Betaflight board would.
     thread::spawn(move || {
         while let Ok((_, from)) = babbling.recv_from(&mut [0; 512]) {
             drop(babbling.send_to(b"$M>\x03\x01\x00\x01\x2c\x2f\r\n# Betaflight", from));
@@ -71,7 +71,7 @@ fn what_is_no_board_is_refused_in_one_line() {
         assert!(error.contains(wanted) && error.lines().count() == 1, "{connection}: {error}");
     }
     assert!(!folder.join("none.md").exists());
-    // Nobody to say that the propellers are off.
+    // Without --yes, nobody confirms here that the propellers are off.
     let output = command(&folder, &["bring-up", "--out", "none.md"]).stdin(Stdio::null()).output().unwrap();
     assert!(refused(&output).contains("take the propellers off first"));
 }

@@ -1,4 +1,4 @@
-//! Runs `sitl campaign`, `merge` and `campaigns`.
+//! Tests `sitl campaign`, `merge` and `campaigns`.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -9,7 +9,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-/// Short flights of two contenders on two courses, some of them lost.
+/// Short flights of two contenders on two courses, some of which lose the vehicle.
 const SMALL: &str = include_str!("../../crates/campaign/tests/small.toml");
 
 fn parse(text: &str) -> Campaign {
@@ -20,13 +20,13 @@ fn results_of(path: &Path) -> Vec<u8> {
     fs::read(path.join("results.parquet")).unwrap()
 }
 
-/// A mistake: text, its replacement, and the error's line, key and message.
+/// Mistakes in a campaign file: text, its replacement, and line, key and message of the error.
 const BAD: [(&str, &str, &str); 22] = [
     ("flights = 150", "flights = 0", ":3: flights: 0 is out of range: it must lie within 1 to 1e7"),
     ("flights = 150", "flights = 1.5", ":3: flights: 1.5 is not a whole number"),
     ("flights = 150", "flight = 150", ":3: flight: unknown key; did you mean flights?"),
     ("seed = 7", "seed = -1", ":4: seed: -1 is out of range"),
-    // Not rounded to the nearest float, which is the largest seed or one more.
+    // Must not be rounded to the nearest float, which may be the largest seed or one above it.
     ("seed = 7", "seed = 9007199254740992", ":4: seed: 9007199254740992 is out of range: it must lie within 0 to 9.0"),
     ("seed = 7", "seed = 9007199254740993", ":4: seed: 9007199254740993 is out of range"),
     ("seed = 7", "seed = 0x20000000000000", ":4: seed: 0x20000000000000 is out of range"),
@@ -102,8 +102,8 @@ fn more_parts_than_open_files_are_merged() {
     assert_eq!(results_of(&folder.join("whole")), results_of(&folder.join("merged")));
 }
 
-/// A signal before the end of the first flight, and in the middle of the campaign: neither would end by itself within
-/// the test.
+/// Sends a signal before the end of the first flight, and in the middle of a campaign. Neither would end by itself
+/// within the test.
 #[test]
 fn a_signal_stops_it_at_any_time() {
     let folder = folder("signals");
@@ -115,7 +115,7 @@ fn a_signal_stops_it_at_any_time() {
         let out = folder.join(format!("out{signal}"));
         let mut child = command(&folder, &["campaign", "long.toml", "--out"]);
         let child = child.arg(&out).stderr(Stdio::piped()).spawn().unwrap();
-        // From here on it handles signals.
+        // Signals are handled from here on.
         while !out.join("campaign.json").exists() {
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -142,7 +142,7 @@ fn no_more_threads_than_useful() {
     assert_eq!(results_of(&folder.join("many")), results_of(&folder.join("one")));
 }
 
-/// Errors are evaluated from 5 s on; shorter flights have none, as null rather than NaN.
+/// Errors are evaluated from 5 s on. Shorter flights have null for them, not NaN.
 #[test]
 fn short_campaigns_hold_no_nan() {
     let folder = folder("short");
@@ -169,7 +169,7 @@ fn short_campaigns_hold_no_nan() {
     }
 }
 
-/// A program is killed, the same command resumes, and one flight is flown again.
+/// Kills a campaign, resumes it by the same command, and repeats one flight.
 #[test]
 fn a_killed_program_loses_nothing_that_was_finished() {
     let folder = folder("killed");
@@ -189,7 +189,7 @@ fn a_killed_program_loses_nothing_that_was_finished() {
         if !out.join("results.parquet").exists() {
             break;
         }
-        // On a busy machine it may finish before it is killed.
+        // On a busy machine, the campaign may end before it is killed.
         fs::remove_dir_all(&out).unwrap();
     }
     let kept = chunks();

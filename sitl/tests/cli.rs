@@ -1,4 +1,4 @@
-//! The command line: what it refuses, what it writes, how it ends.
+//! Tests the command line: errors, output files and exit codes.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -37,10 +37,10 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-/// Three lines; text after it begins at line 4.
+/// Three lines; appended text begins at line 4.
 const HOVER: &str = "[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
 
-/// Text after [`HOVER`], and the error.
+/// Text appended to [`HOVER`], and the error.
 const BAD_TABLES: [(&str, &str); 70] = [
     ("[[outage]]\nstart_s = -1", ":5: outage.start_s: -1 is out of range: it must lie within 0 to 36000 (seconds)"),
     ("[vehicle]\nmass_g = 486", ":5: vehicle.mass_g: unknown key; did you mean mass_kg (kilograms)?"),
@@ -315,7 +315,7 @@ const BAD_FILES: [(&str, &str); 28] = [
     ("profile = \"best\"", ":1: profile: \"best\" is unknown; it must be \"paper\" or \"flight\""),
 ];
 
-/// What several messages have in common, written out.
+/// Replaces placeholders by the text that several messages share.
 fn expand(message: &str) -> String {
     let [laws @ .., last] = ControllerKind::ALL.map(|kind| format!("\"{}\"", kind.name()));
     message
@@ -344,7 +344,7 @@ fn bad_files_get_a_line_for_each_mistake_and_nothing_is_written() {
             if !said.lines().any(|line| line == expected) {
                 wrong.push(format!("{text}is not told {expected} but {said}"));
             }
-            // Some files of one mistake have nothing to follow, which is another one.
+            // In some files, the mistake makes the trajectory missing too, which is a second error.
             let others = said.lines().filter(|line| *line != expected);
             let mut others = others.filter(|line| !line.contains("trajectory: missing"));
             let known = "my.toml:1: duration: unknown key; did you mean duration_s (seconds)?";
@@ -461,7 +461,7 @@ fn a_lost_vehicle_ends_its_run_and_keeps_its_log() {
     let log = fs::read_to_string(folder.join("out/storm/storm-afbc.csv")).unwrap();
     assert!((200..900).contains(&log.lines().count()));
 
-    // The loss in the paper's reading `forces` is known and no failure.
+    // The loss in the paper's reading `forces` is known and not an error.
     let output = sitl(&folder, &["--reading", "forces", "--log-hz", "10"]);
     assert_eq!((code(&output), stderr(&output)), (0, String::new()));
     assert!(stdout(&output).contains("lost at t = "));
@@ -512,7 +512,7 @@ fn two_runs_write_the_same_bytes() {
     assert!(a.len() > 2);
     assert!(a.values().eq(b.values()));
 
-    // The paper's flight is the same from its file and from the code.
+    // The paper's flight is the same from the scenario file and from the code.
     assert_eq!(code(&sitl(&folder, &["fly", "paper", "--out", "file"])), 0);
     assert_eq!(code(&sitl(&folder, &["paper", "--out", "code"])), 0);
     let log = |out: &str| fs::read(folder.join(out).join("paper-afbc.csv")).unwrap();
@@ -562,11 +562,11 @@ fn the_default_log_rate_is_reduced_for_a_long_flight() {
     assert_eq!(fly(&["--duration", "601", "--log-hz", "200"]), (120_201, String::new()));
 }
 
-/// Whoever reads the progress through a pipe hears of it every few seconds, long before a tenth is done.
+/// Progress through a pipe appears every few seconds, long before a tenth of the work is done.
 #[test]
 fn progress_through_a_pipe_is_not_silent() {
     let folder = folder("progress");
-    // Hours.
+    // This command takes hours.
     let mut flying = command(&folder, &["compare", "storm", "--seeds", "10000"]);
     let mut child = flying.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     let mut said = BufReader::new(child.stderr.take().unwrap());
@@ -578,7 +578,7 @@ fn progress_through_a_pipe_is_not_silent() {
     };
     let (first, _) = line();
     assert!(first.contains(": 0 of ") && first.ends_with(" flights\n"), "{first}");
-    // Five seconds later, and ten after that; slower machines are late.
+    // The lines come after 5 s and 10 s later; slower machines are late.
     for (from_s, to_s) in [(4, 12), (13, 30)] {
         let (line, after) = line();
         let done: u64 = line.split(' ').nth(1).unwrap().parse().unwrap();
@@ -589,7 +589,7 @@ fn progress_through_a_pipe_is_not_silent() {
     child.wait().unwrap();
 }
 
-/// Nothing is cut by a terminal of 80 columns: tables fit, text is wrapped between words.
+/// Output fits a terminal of 80 columns: tables fit, and text is wrapped between words.
 #[test]
 fn text_fits_a_terminal_of_80_columns() {
     let folder = folder("width");
@@ -606,7 +606,7 @@ fn text_fits_a_terminal_of_80_columns() {
                 command(&folder, &[arguments, &["--force"]].concat()).env("COLUMNS", columns).output().unwrap();
             assert_eq!(code(&output), 0, "{}", stderr(&output));
             let shown = stdout(&output);
-            // A command to copy stays whole.
+            // Commands to copy are not wrapped.
             shown.lines().filter(|line| !line.contains("sitl ")).map(|line| line.chars().count()).max().unwrap()
         };
         assert!(wide("80") <= 80, "{arguments:?}: {}", wide("80"));

@@ -1,4 +1,4 @@
-//! Campaigns on a cluster: what its shell, logs and disks see.
+//! Tests campaigns on a cluster: quoting in its shell, log lines and paths.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -6,7 +6,7 @@ use crate::common::{folder, sitl, succeeds};
 use std::fs;
 use std::process::Output;
 
-/// Short flights, some of them lost.
+/// Short flights, some of which lose the vehicle.
 const SHORT: &str = r#"
 name = "short"
 flights = 40
@@ -31,7 +31,7 @@ fn results_do_not_depend_on_where_the_file_is() {
     let all: Vec<&str> = paths.into_iter().chain([absolute.as_str()]).collect();
     for (i, path) in all.iter().enumerate() {
         let table = succeeds(&sitl(&folder, &["campaign", path, "--out", &format!("whole-{i}")]));
-        // The terminal's table has a command that works from here.
+        // The table in the terminal has a command that works from the current folder.
         let quoted = if path.contains(' ') { format!("\"{path}\"") } else { (*path).to_owned() };
         assert!(table.contains(&format!("sitl campaign {quoted} --flight ")), "{table}");
     }
@@ -50,12 +50,12 @@ fn results_do_not_depend_on_where_the_file_is() {
     assert!(page.contains("sitl campaign short.toml --flight "));
 }
 
-/// The lines of a log: one at the start, and one for each tenth.
+/// Returns the lines of a log: one at the start, and one for each tenth.
 fn lines(output: &Output) -> Vec<String> {
     String::from_utf8(output.stderr.clone()).unwrap().lines().map(str::to_owned).collect()
 }
 
-/// True for `RATE per TIME, N UNIT left` with whole numbers and a wait above zero.
+/// True for `RATE per TIME, N UNIT left` with whole numbers and a remaining time above zero.
 fn is_rate_and_wait(text: &str) -> bool {
     let parts: Vec<_> = text.split(", ").collect();
     let [rate, wait] = parts.as_slice() else { return false };
@@ -85,11 +85,11 @@ fn a_log_without_a_terminal_shows_life() {
     }
     assert!(before >= 36, "{said:?}");
 
-    // Finished flights are not flown again, and there is no progress.
+    // Finished flights are not repeated, and there is no progress.
     let again = sitl(&folder, &["campaign", "short.toml"]);
     assert!(lines(&again).iter().all(|line| line == "short: 40 of 40 flights"));
     assert_eq!(flown.stdout, again.stdout);
-    // The same for a shard, and for other commands.
+    // Shards and other commands report progress in the same way.
     let part = sitl(&folder, &["campaign", "short.toml", "--shard", "2/2"]);
     assert_eq!(lines(&part).first().unwrap(), "short: 0 of 20 flights");
     let compared = sitl(&folder, &["compare", "hover", "--seeds", "2", "--controllers", "pid"]);

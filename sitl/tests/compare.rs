@@ -1,4 +1,4 @@
-//! Runs `sitl compare` and `sitl tune`.
+//! Tests `sitl compare`, `sitl tune` and `sitl again`.
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
@@ -24,7 +24,7 @@ fn json(path: &Path) -> Value {
     serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
-/// A noisy circle of 8 s, and a PID with much too low gains.
+/// Noisy circle of 8 s, and a PID with far too low gains.
 const SOFT: &str = r#"
 name = "round"
 duration_s = 8.0
@@ -79,7 +79,7 @@ fn compares_by_the_figures_of_fly() {
     }
 }
 
-/// Ten seeds where a seed changes a flight, one where none does, unless a number is asked for.
+/// By default, flies ten seeds if the seed affects a flight, otherwise one.
 #[test]
 fn flies_several_seeds_where_they_matter() {
     let folder = soft("usual-seeds");
@@ -98,7 +98,7 @@ fn flies_several_seeds_where_they_matter() {
     assert!(table.contains("over 10 seeds") && table.contains("Wilcoxon"), "{table}");
 }
 
-/// What the figures of the files say is what the flights of the same files say.
+/// Recomputes the statistics in the files from the flights in the files.
 #[test]
 fn medians_and_differences_are_those_of_the_flights() {
     let folder = soft("statistics");
@@ -123,9 +123,9 @@ fn medians_and_differences_are_those_of_the_flights() {
         let figure = &contender["figures"][0];
         assert_eq!(figure["name"], "rms_m");
         let own = sorted(of(who));
-        // Of seven, the fourth, and between the ends 98 %.
+        // Of seven values, the median is the fourth; the interval between smallest and largest covers 98 %.
         for (key, expected) in [("median", own[3]), ("low_95", own[0]), ("high_95", own[6])] {
-            // Read from JSON to the last digit but one.
+            // JSON keeps all but the last digit.
             assert!((figure[key].as_f64().unwrap() / expected - 1.0).abs() < 1e-12, "{who} {key}");
         }
         if who == "pid" {
@@ -135,7 +135,7 @@ fn medians_and_differences_are_those_of_the_flights() {
         let differences = sorted(of(who).iter().zip(of("pid")).map(|(own, pid)| own - pid).collect());
         assert!((figure["difference"].as_f64().unwrap() / differences[3] - 1.0).abs() < 1e-9, "{who}");
     }
-    // Seven of seven further than PID, and of two laws: 2/2^7, twice.
+    // All seven flights of two laws are worse than PID's: p is 2/2^7, and twice that after Holm's correction.
     let soft = &compared["contenders"][1]["figures"][0];
     assert_eq!((&soft["p"], &soft["rank_biserial"]), (&(1.0 / 64.0).into(), &1.0.into()));
     assert_eq!(soft["p_holm"], 1.0 / 32.0);
@@ -165,7 +165,7 @@ fn prints_the_tables_of_its_folder_for_a_paper() {
     assert!(printed.contains("| law | best or level |"), "{printed}");
 }
 
-/// Whatever the terminal's width, tables fit and say the same: columns that have no room go below.
+/// Tables fit any terminal width with the same content: columns without room move below.
 #[test]
 fn tables_narrow_to_the_terminal() {
     let folder = soft("narrow");
@@ -186,7 +186,7 @@ fn tables_narrow_to_the_terminal() {
         let wide = shown("100");
         for columns in columns {
             let narrow = shown(columns);
-            // A path to copy stays whole.
+            // Paths to copy are not wrapped.
             let lines = narrow.lines().filter(|line| !line.contains("report.html"));
             let widest = lines.map(|line| line.chars().count()).max().unwrap();
             assert!(widest <= columns.parse().unwrap(), "{widest}:\n{narrow}");
@@ -196,7 +196,7 @@ fn tables_narrow_to_the_terminal() {
     }
 }
 
-/// Changes the command of a manifest, and seals it anew: whoever can write it can do so.
+/// Changes the command of a manifest and seals it again, as anyone who can write the file could.
 fn forged(manifest: &Path, command: &[&str]) {
     let mut text = fs::read_to_string(manifest).unwrap();
     let (from, to) = (text.find("\"command\": [").unwrap(), text.find("\"fingerprint\"").unwrap());
@@ -210,7 +210,8 @@ fn forged(manifest: &Path, command: &[&str]) {
     fs::write(manifest, bytes).unwrap();
 }
 
-/// Manifests come from others, and a seal is no key: they name what is made again, and nothing that writes elsewhere.
+/// A manifest may come from somebody else, and its seal is no signature. Its command must not write outside its
+/// results.
 #[test]
 fn a_manifest_of_others_writes_nothing_but_its_results() {
     let folder = soft("foreign");
@@ -243,7 +244,7 @@ fn a_manifest_of_others_writes_nothing_but_its_results() {
     ] {
         forged(&manifest, command);
         if command.is_empty() {
-            // The paper's flight, which is none of these results.
+            // An empty command flies the paper's experiment, which differs from these results.
             assert_eq!(sitl(&folder, &["again", "theirs"]).status.code(), Some(1));
             fs::remove_dir_all(folder.join("theirs-again")).unwrap();
             continue;
@@ -255,7 +256,7 @@ fn a_manifest_of_others_writes_nothing_but_its_results() {
         assert_eq!(names, ["mine", "page.md", "soft.toml", "theirs"], "{command:?}");
         assert_eq!(fs::read(folder.join("mine")).unwrap(), b"mine");
     }
-    // A folder that holds anything else is not written into, and no file is named by a path.
+    // A folder with other content is not written to, and a manifest cannot name a file by a path.
     forged(&manifest, &["fly", "soft.toml", "--controller", "soft"]);
     fs::create_dir(folder.join("other")).unwrap();
     fs::write(folder.join("other/report.html"), "mine").unwrap();
@@ -268,7 +269,7 @@ fn a_manifest_of_others_writes_nothing_but_its_results() {
     assert!(line.contains("damaged or no manifest (a path in it, ../mine)"), "{line}");
 }
 
-/// A campaign, one of its parts, and the whole of the parts are made again; a folder with results is not.
+/// Repeats a campaign, one of its parts, and the merged whole. A folder that has results already is refused.
 #[test]
 fn campaigns_are_made_again() {
     let folder = soft("campaigns");
@@ -297,7 +298,7 @@ fn campaigns_are_made_again() {
     assert!(said.contains("results.parquet: differs\n") && said.contains("what was flown is not the same"), "{said}");
 }
 
-/// A manifest makes the same bytes again, and says so if they are others.
+/// Repeating a manifest gives the same bytes; differences are reported.
 #[test]
 fn a_manifest_makes_the_same_results_again() {
     let folder = soft("again");
@@ -320,13 +321,13 @@ fn a_manifest_makes_the_same_results_again() {
         assert!(said.starts_with("the same bytes: "), "{said}");
         assert!(folder.join(format!("mine/{name}-again/report.html")).exists());
     }
-    // Other gains: another flight, and the reason.
+    // Other gains change the flight, and the reason is reported.
     fs::write(folder.join("soft.toml"), SOFT.replace("climb_p_1_s = 1.5", "climb_p_1_s = 1.6")).unwrap();
     let output = sitl(&folder, &["again", "mine/round", "--out", "other"]);
     let said = String::from_utf8(output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("round-soft.csv: differs\n") && said.contains("what was flown is not the same"), "{said}");
-    // A changed manifest, and one that is not there.
+    // A modified manifest, and a missing one.
     let path = folder.join("mine/round/manifest.json");
     fs::write(&path, fs::read_to_string(&path).unwrap().replace("\"soft.toml\"", "\"hover\"")).unwrap();
     let line = refused(&sitl(&folder, &["again", "mine/round"]));
@@ -397,7 +398,7 @@ fn compare_refuses_what_it_cannot_fly() {
     assert!(!folder.join("out").exists());
 }
 
-/// Two flights, on the racer and on the paper's vehicle, with a published figure.
+/// Two flights on the racer, with a published result.
 const SUITE: &str = r#"
 description = "two"
 
@@ -445,7 +446,7 @@ fn a_suite_is_one_report_alike_on_any_number_of_threads() {
     for word in ["0.0123", "someone", "a paper", "flown", "lost at t = ", "rotor fault", "<svg"] {
         assert!(page.contains(word), "no {word}");
     }
-    // The folder is its own: other results do not overwrite it.
+    // The folder belongs to this suite: other results do not overwrite it.
     let other = refused(&sitl(&folder, &["compare", "hover", "--out", "one"]));
     assert_eq!(other.lines().count(), 1, "{other}");
 }
@@ -518,13 +519,14 @@ fn random_flights_are_alike_on_any_number_of_threads() {
     for word in ["racer", "all vehicles", "best or level", "resamples"] {
         assert!(page.contains(word), "no {word}");
     }
-    // A vehicle of one's own flies what is drawn for it, on its estimate too; the page's table is of the same flights.
+    // A user's vehicle file flies the same draws, also on its own estimate; the table in the page shows the same
+    // flights.
     let mine = succeeds(&sitl(&folder, &["vehicles", "iris"]));
     fs::write(folder.join("mine.toml"), mine).unwrap();
     let own = ["compare", "--suite", "random", "--vehicle", "mine.toml", "--flights", "2", "--controllers", "pid"];
     let own = [&own[..], &["--on-estimate"]].concat();
     let table = succeeds(&sitl(&folder, &own));
-    // Its text is as wide as the terminal.
+    // The text is wrapped to the terminal, so words are joined again.
     let words = table.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(words.contains("the instruments of the scenario mocap") && words.contains("mine, 2 flights"), "{table}");
     fs::write(folder.join("page.md"), "<!-- suite random: begin -->\n<!-- suite random: end -->\n").unwrap();
@@ -555,8 +557,8 @@ fn random_flights_that_cannot_be_drawn_are_refused_in_one_line() {
     assert!(succeeds(&sitl(&folder, &["suites"])).contains("random           72 flights  drawn from --seed"));
 }
 
-/// The short form of the suite: the same bytes on any number of threads, a row for each class, and one line for what it
-/// does not take.
+/// Runs the suite with short flights: same bytes on any number of threads, a row for each class, and a one-line error
+/// for options that it does not take.
 #[test]
 fn rough_flights_are_alike_on_any_number_of_threads() {
     let folder = folder("rough");
@@ -595,7 +597,7 @@ fn rough_flights_are_alike_on_any_number_of_threads() {
     }
 }
 
-/// The two costs in the first line of the output of `sitl tune`.
+/// Returns the two costs in the first line of `sitl tune`'s output.
 fn costs(fragment: &str) -> [f64; 2] {
     let line = fragment.lines().next().unwrap();
     let after = |word: &str| line.split(word).nth(1).unwrap().split([',', ' ']).next().unwrap().parse().unwrap();
@@ -615,7 +617,7 @@ fn tune_improves_a_bad_start_alike_on_any_number_of_threads() {
     let [before, after] = costs(&fragment);
     assert!(after < 0.7 * before, "{before} to {after}");
 
-    // The output is valid in a scenario file, and flies at the stated cost.
+    // The output is valid in a scenario file, and flies with the stated cost.
     fs::write(folder.join("tuned.toml"), format!("{SOFT}\n{fragment}")).unwrap();
     let again =
         succeeds(&sitl(&folder, &["tune", "soft-tuned", "--scenario", "tuned.toml", "--budget", "1", "--seed", "3"]));
@@ -653,7 +655,7 @@ fn tune_refuses_what_it_cannot_do() {
     refused(&sitl(&folder, &["tune", "pid", "--budget", "0"]));
 }
 
-/// The number of tries in the first line of the output of `sitl tune`.
+/// Returns the number of tries in the first line of `sitl tune`'s output.
 fn tries(fragment: &str) -> &str {
     fragment.lines().next().unwrap().split("after ").nth(1).unwrap().split(' ').next().unwrap()
 }
@@ -661,14 +663,16 @@ fn tries(fragment: &str) -> &str {
 #[test]
 fn tune_tries_as_many_gains_as_asked() {
     let folder = soft("budget");
-    // A generation has some ten tries: budgets below one, between two, and of several with a remainder.
+    // A generation has about ten tries. The budgets are below one generation, between two, and several with a
+    // remainder.
     for budget in ["1", "2", "9", "12", "13", "14", "40"] {
         let fragment = succeeds(&sitl(&folder, &["tune", "soft", "--scenario", "soft.toml", "--budget", budget]));
         assert_eq!(tries(&fragment), budget);
     }
 }
 
-/// The example of docs/python.md by the command line: AFBC is the law that flies in every scenario, whichever is first.
+/// Repeats the example of docs/python.md on the command line: in every scenario, AFBC is the law of the profile
+/// `flight`, whichever scenario comes first.
 #[test]
 fn a_comparison_flies_the_flown_law_in_any_order() {
     let folder = folder("profiles");

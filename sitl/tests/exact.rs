@@ -1,4 +1,4 @@
-//! `sitl replay --exact`: logs of `fly` and `serve`, what it says of them, and how it ends.
+//! Tests `sitl replay --exact` on logs of `fly` and `serve`: messages and exit codes.
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
@@ -48,7 +48,7 @@ fn a_change_is_shown() {
     }
     let csv = fs::read_to_string(out.join("change.csv")).unwrap();
     let columns = csv.lines().next().unwrap().split(',').count();
-    // Time, four speeds and throttles, nineteen others, all twice.
+    // Time, and 27 values in both versions: four speeds, four throttles and nineteen others.
     assert!(columns == 1 + 2 * 27 && csv.lines().all(|line| line.split(',').count() == columns), "{columns}");
     for (change, wanted) in [("NO_SUCH=1", "no such parameter"), ("V_MASS=-1", "V_MASS: must be")] {
         let said = refused(&sitl(&folder, &["replay", "--exact", "flight.log", "--change", change]));
@@ -56,7 +56,7 @@ fn a_change_is_shown() {
     }
 }
 
-/// A damaged log is told on stderr in one line with its cure, and ends with 1.
+/// A damaged log is reported on stderr in one line with its cure, and the exit code is 1.
 #[test]
 fn a_difference_ends_with_1() {
     let folder = flown("damaged", "afbc");

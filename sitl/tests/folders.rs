@@ -1,4 +1,4 @@
-//! Ownership of output folders: no command removes or replaces files that it has not written.
+//! Tests ownership of output folders: no command removes or replaces files that it has not written.
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
@@ -8,7 +8,7 @@ use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 
-/// A folder for each test, with only a scenario, a campaign and a log.
+/// Returns a folder for a test, with a scenario, a campaign, its parts and a log.
 fn folder(test: &str) -> PathBuf {
     let folder = crate::common::folder(test);
     let hover = "[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
@@ -22,7 +22,7 @@ fn folder(test: &str) -> PathBuf {
     folder
 }
 
-/// Every command with an output folder, and the command recorded as its owner.
+/// Every command with an output folder, and the command recorded as the folder's owner.
 const COMMANDS: [(&str, &[&str]); 7] = [
     ("paper", &["paper", "--duration", "0.5"]),
     ("fly", &["fly", "short.toml"]),
@@ -33,7 +33,7 @@ const COMMANDS: [(&str, &[&str]); 7] = [
     ("campaign", &["merge", "part-1", "part-2"]),
 ];
 
-/// Returns the content of a folder: files with their bytes, links with their targets, folders.
+/// Returns the content of a folder: files with their bytes, links with their targets, and folders.
 fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap() {
@@ -51,7 +51,7 @@ fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-/// Checks for an error of one line that names the folder and the remedies, with nothing changed.
+/// Checks for a one-line error that names the folder and the remedies, and that nothing has changed.
 fn refused(folder: &Path, command: &[&str], out: &str, before: &BTreeMap<PathBuf, Vec<u8>>) {
     let output = sitl(folder, &[command, &["--out", out]].concat());
     let error = String::from_utf8(output.stderr).unwrap();
@@ -85,7 +85,7 @@ fn a_folder_of_one_command_is_refused_by_every_other() {
         for (_, other) in COMMANDS.iter().filter(|(other, _)| other != owner) {
             refused(&folder, other, &out, &before);
         }
-        // With --force it becomes another command's.
+        // With --force, the folder becomes another command's.
         let (_, other) = COMMANDS.iter().find(|(other, _)| other != owner).unwrap();
         succeeds(&folder, other, &["--out", &out, "--force"]);
         refused(&folder, command, &out, &contents(&path));
@@ -97,7 +97,7 @@ fn a_folder_of_one_command_is_refused_by_every_other() {
     }
 }
 
-/// Puts a foreign file into a folder.
+/// Function that puts a foreign file into a folder.
 type Make<'a> = &'a dyn Fn(&Path);
 
 #[test]
@@ -129,7 +129,7 @@ fn a_foreign_folder_is_refused_by_all_commands() {
         }
     }
     let scenario = fs::read(folder.join("short.toml")).unwrap();
-    // Through a link to the folder, too; --force replaces a link in it, not the link's target.
+    // A link to a foreign folder is refused too. --force replaces a link inside the folder, not the link's target.
     symlink("notes", folder.join("linked")).unwrap();
     for (_, command) in COMMANDS {
         refused(&folder, command, "linked", &contents(&folder.join("linked")));
@@ -163,7 +163,7 @@ fn files_of_an_earlier_report_are_removed() {
         csvs.sort();
         csvs
     };
-    // Other options are another command: its results take the place of the others' by force.
+    // Other options count as another command, whose results replace the former ones only with --force.
     let fly = ["fly", "short.toml", "--out", "fly"];
     succeeds(&folder, &fly, &[]);
     succeeds(&folder, &fly, &["--controller", "pid", "--force"]);

@@ -1,5 +1,5 @@
-//! Ctrl-C: commands without partial results end at once, with one line, and leave nothing that is in the way of the
-//! next try.
+//! Tests Ctrl-C: commands without partial results end at once, with one line, and leave nothing that blocks the next
+//! attempt.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -32,7 +32,7 @@ fn ends_with_one_line_and_writes_nothing() {
     let folder = folder("at-once");
     let page = "<!-- results: begin -->\nas before\n<!-- results: end -->\n";
     fs::write(folder.join("page.md"), page).unwrap();
-    // Each would take minutes.
+    // Each of these commands would take minutes.
     for arguments in [
         &["fly", "storm", "--duration", "36000"] as &[&str],
         &["paper", "--duration", "36000"],
@@ -55,14 +55,14 @@ fn ends_with_one_line_and_writes_nothing() {
     }
 }
 
-/// A mission to a place 400 m away.
+/// Mission to a place 400 m away.
 const FAR: &str = "QGC WPL 110\n\
     0\t1\t0\t16\t0\t0\t0\t0\t47.397742\t8.545594\t488\t1\n\
     1\t0\t3\t22\t0\t0\t0\t0\t47.397742\t8.545594\t10\t1\n\
     2\t0\t3\t16\t0\t0\t0\t0\t47.401342\t8.545594\t10\t1\n";
 
-/// Logs that an interrupted flight has begun are removed, whether it is still flown by the laws alone or already by the
-/// firmware's code: the same command can be given again.
+/// An interrupted flight's logs are removed, whether the laws alone or already the firmware's code is flying. The same
+/// command can then be repeated.
 #[test]
 fn leaves_no_log_behind() {
     let folder = folder("logs");
@@ -77,7 +77,7 @@ fn leaves_no_log_behind() {
             assert_eq!(files().collect::<Vec<_>>(), Vec::<OsString>::new(), "{options:?}");
         }
     }
-    // While the logs are being written.
+    // Interrupts while the logs are being written.
     fs::write(folder.join("out/far.waypoints"), FAR).unwrap();
     for flight in [&["fly", "hover", "--controller", "pid", "--duration", "300"][..], &["fly", "out/far.waypoints"]] {
         let arguments = [flight, &logs[..]].concat();
@@ -98,11 +98,11 @@ fn leaves_no_log_behind() {
     }
 }
 
-/// So are those of a command that fails after it has created them, as long as nothing is in them.
+/// Empty logs of a command that fails after creating them are removed too.
 #[test]
 fn an_empty_log_of_a_command_that_fails_is_removed() {
     let folder = folder("failed");
-    // A folder that nobody may write to, whoever runs this.
+    // Nobody, not even root, can write to this folder.
     let arguments = ["fly", "hover", "--duration", "1", "--exact-log", "flight.log", "--ulog", "/proc/flight.ulg"];
     let output = command(&folder, &arguments).output().unwrap();
     assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stderr));

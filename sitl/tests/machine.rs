@@ -1,5 +1,5 @@
-//! Output of `sitl` for programs: JSON on stdout with the keys of docs/json.md and nothing else; and recognition of
-//! scenario and campaign files.
+//! Tests output for programs: JSON on stdout with exactly the keys of docs/json.md. Also tests that scenario and
+//! campaign files are told apart.
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "tests")]
 
@@ -14,7 +14,7 @@ fn succeeds(folder: &Path, arguments: &[&str]) -> String {
     crate::common::succeeds(&sitl(folder, arguments))
 }
 
-/// Returns the one line of an error.
+/// Returns the one-line error of a refused command.
 fn refused(folder: &Path, arguments: &[&str]) -> String {
     let said = crate::common::refused(&sitl(folder, arguments));
     assert_eq!(said.lines().count(), 1, "{said}");
@@ -31,12 +31,12 @@ fn documented(section: &str) -> BTreeSet<String> {
     cells.flat_map(|cell| cell.split(", ")).map(|key| key.trim_matches('`').to_owned()).collect()
 }
 
-/// Adds the path of every value that is neither an object nor an array.
+/// Collects the path of every value that is neither an object nor an array.
 fn keys(path: &str, value: &Value, found: &mut BTreeSet<String>) {
     match value {
         Value::Object(object) => {
             for (key, value) in object {
-                // Keys of this object are names.
+                // Keys of this object are names, so they are replaced by `*`.
                 let key = if path.ends_with("by_trajectory") { "*" } else { key };
                 let dot = if path.is_empty() { "" } else { "." };
                 keys(&format!("{path}{dot}{key}"), value, found);
@@ -48,8 +48,8 @@ fn keys(path: &str, value: &Value, found: &mut BTreeSet<String>) {
     }
 }
 
-/// Checks that every command of a section prints the documented keys, or null or nothing in place of all those of one
-/// object or array; returns the output of the first.
+/// Checks that every command of a section prints exactly the documented keys. An object or array may be null or empty
+/// instead of having its keys. Returns the output of the first command.
 fn prints(folder: &Path, section: &str, commands: &[&[&str]]) -> Value {
     let mut first = None;
     for command in commands {
@@ -107,7 +107,7 @@ fn lists_and_checks() {
 #[test]
 fn flights() {
     let folder = small("flights");
-    // Long enough for all figures.
+    // Long enough for all figures to be evaluated.
     let flown = prints(
         &folder,
         "Flights",
@@ -121,7 +121,7 @@ fn flights() {
     );
     let file: Value = serde_json::from_slice(&fs::read(folder.join("out/flight/summary.json")).unwrap()).unwrap();
     assert_eq!(flown, file);
-    // The same without a command.
+    // The output without a command is the same.
     let paper = succeeds(&folder, &["--duration", "7", "--json"]);
     assert_eq!(serde_json::from_str::<Value>(&paper).unwrap()[0]["scenario"], "paper");
 }
@@ -235,7 +235,7 @@ fn errors_are_one_line_on_stderr_with_json_too() {
 #[test]
 fn a_campaign_is_distinguished_from_a_scenario() {
     let folder = small("kinds");
-    // The kind of a file is recognised without an extension, and with wrong values.
+    // The kind of a file is recognised without an extension, and despite wrong values.
     fs::write(folder.join("plain"), SMALL).unwrap();
     fs::write(folder.join("bad.toml"), SMALL.replace("[0.6, 1.2]", "[6.0, 120]")).unwrap();
     fs::write(folder.join("bad-flight.toml"), "plant = 1\n[trajectory]\nkind = \"paper\"\n").unwrap();

@@ -1,4 +1,4 @@
-//! Files that commands write: none replaces another unasked, and none is left by a command that is refused.
+//! Tests output files: no command replaces a file unasked, and a refused command leaves no file behind.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -8,7 +8,7 @@ use std::net::UdpSocket;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 
-/// A folder with what the commands below read.
+/// Returns a folder with the files that the commands below read.
 fn prepared(test: &str) -> PathBuf {
     let folder = folder(test);
     let hover = "[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
@@ -27,7 +27,7 @@ fn prepared(test: &str) -> PathBuf {
     folder
 }
 
-/// Commands that end with the option of a file which they write, and whether they have `--force`.
+/// Commands whose last option names a file to write, and whether they have `--force`.
 const COMMANDS: [(&[&str], bool); 17] = [
     (&["tune", "pid", "--scenario", "short.toml", "--budget", "1", "--out"], true),
     (&["params", "export", "--out"], true),
@@ -48,7 +48,7 @@ const COMMANDS: [(&[&str], bool); 17] = [
     (&["bring-up", "--yes", "--connect", "serial:./nothing", "--out"], false),
 ];
 
-/// The name by which a plot knows its format.
+/// Name of the file; its extension is one that `plot` accepts.
 const FILE: &str = "out.svg";
 
 #[test]
@@ -83,7 +83,7 @@ fn nothing_that_is_there_is_replaced_unasked() {
     }
 }
 
-/// Whatever is wrong with the rest of the command.
+/// A refused command leaves no file, whatever the mistake is.
 #[test]
 fn a_command_that_is_refused_leaves_no_file() {
     let folder = prepared("refused");
@@ -123,7 +123,7 @@ fn pages_of_the_manual_are_replaced_by_force_alone() {
     assert_ne!(fs::read(folder.join("sitl-fly.1")).unwrap(), b"mine");
 }
 
-/// The same command, other options, and two at once.
+/// Tests the same command again, with other options, and twice at once.
 #[test]
 fn results_of_another_command_line_are_kept() {
     let folder = prepared("lines");
@@ -157,7 +157,7 @@ fn results_of_another_command_line_are_kept() {
         let error = refused(&sitl(&folder, other));
         assert!(error.contains("--out") && error.contains("--force") && error.lines().count() == 1, "{error}");
         assert_eq!(all(&out), before, "{other:?}");
-        // What somebody has changed is theirs, even for the same command.
+        // A modified file is kept, even for the same command.
         fs::write(out.join("report.html"), "mine").unwrap();
         let error = refused(&sitl(&folder, same));
         assert!(error.contains("report.html: changed since"), "{error}");
@@ -178,7 +178,7 @@ fn results_of_another_command_line_are_kept() {
     succeeds(&sitl(&folder, &["again", "out/hover"]));
 }
 
-/// One mechanism: nothing but `afbc-files` creates files of results.
+/// Only `afbc-files` may create result files.
 #[test]
 fn no_other_code_creates_files() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
@@ -192,7 +192,7 @@ fn no_other_code_creates_files() {
                 folders.push(path);
             } else if path.extension().is_some_and(|it| it == "rs") && path.file_stem().is_some_and(|it| it != "tests")
             {
-                // A log is created by way of it.
+                // This call creates logs through `afbc-files`.
                 let text = fs::read_to_string(&path).unwrap().replace("LogFile::create(", "");
                 let creates =
                     ["fs::write(", "File::create", ".create(true)", ".create_new(true)", "from_path(", "generate_to("];

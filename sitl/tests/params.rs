@@ -1,11 +1,11 @@
-//! Runs `sitl params`.
+//! Tests `sitl params`.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use crate::common::{folder, refused, sitl, succeeds};
 use std::fs;
 
-/// All values of every vehicle go through both formats and a store, to the bit.
+/// All values of every vehicle survive both formats and a store, to the bit.
 #[test]
 fn what_is_exported_is_imported() {
     for vehicle in ["paper", "crazyflie", "f550"] {
@@ -17,7 +17,7 @@ fn what_is_exported_is_imported() {
         export(&["--out", "all.params"]);
         export(&["--out", "all.parm"]);
         assert_eq!(fs::read_to_string(folder.join("all.params")).unwrap(), all);
-        // With other values, as a user writes them.
+        // Changes the mass as a user would.
         let mass = |text: &str, mass: &str| -> String {
             let line = |line: &str| match line.contains("V_MASS") {
                 true if line.starts_with('1') => format!("1\t1\tV_MASS\t{mass}\t9\r\n"),
@@ -44,7 +44,7 @@ fn what_is_exported_is_imported() {
             assert_eq!(export(&["--store", store]), expected);
         }
         assert_eq!(fs::read(folder.join("a.store")).unwrap().len(), 32 * 1024);
-        // The defaults, imported, take back what was stored.
+        // Importing the defaults deletes the stored values.
         fs::write(folder.join("all.params"), &all).unwrap();
         succeeds(&sitl(&folder, &["params", "import", "all.params", "--vehicle", vehicle, "--store", "a.store"]));
         assert_eq!(succeeds(&sitl(&folder, &["params", "diff", "--vehicle", vehicle, "--store", "a.store"])), "");
@@ -84,7 +84,7 @@ fn a_bad_line_gets_one_line_and_changes_nothing() {
     }
 }
 
-/// A store of another vehicle is told, and its values are not used; garbage is no store.
+/// A store of another vehicle is reported, and its values are not used. Random data count as unreadable.
 #[test]
 fn a_store_that_does_not_fit_is_reported() {
     let folder = folder("other");

@@ -1,4 +1,4 @@
-//! `sitl plot` of what `sitl` itself writes: CSV, a campaign's Parquet, ULog, MCAP.
+//! Tests `sitl plot` on logs that `sitl` writes: CSV, a campaign's Parquet, ULog, MCAP.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -6,7 +6,7 @@ use crate::common::{folder, refused, sitl, succeeds};
 use std::fs;
 use std::path::Path;
 
-/// Returns the attributes `points` of the lines that are clipped to a panel.
+/// Returns the `points` attributes of the lines that are clipped to a panel.
 fn lines(svg: &str) -> Vec<String> {
     let document = roxmltree::Document::parse(svg).unwrap();
     let lines = document.descendants().filter(|node| node.tag_name().name() == "polyline");
@@ -41,17 +41,17 @@ fn flights_are_lines_and_seeds_of_one_law_a_band() {
         fs::read_to_string(folder.join("figure.svg")).unwrap()
     };
     let both = plot(&["1/hold-pid.csv", "1/hold-indi.csv"], &["--y", "x_m", "--y", "z_m,z_d_m"]);
-    // A panel of two lines and one of four, without bands; names without what they have in common.
+    // Two panels with two and four lines, without bands; the names lack their common prefix.
     assert_eq!((lines(&both).len(), bands(&both)), (6, 0));
     assert!(both.contains(">pid</text>") && both.contains(">x [m]</text>") && both.contains(">time [s]</text>"));
     let seeds: Vec<String> = (1..=5).map(|seed| format!("PID={seed}/hold-pid.csv")).collect();
     let seeds: Vec<&str> = seeds.iter().map(String::as_str).collect();
     let band = plot(&seeds, &["--y", "x_m"]);
     assert_eq!((lines(&band).len(), bands(&band)), (1, 1));
-    // A path is no function of x: every flight is drawn.
+    // A path is not a function of x, so every flight is drawn.
     let paths = plot(&seeds, &["--y", "y_m", "--x", "x_m"]);
     assert_eq!((lines(&paths).len(), bands(&paths)), (5, 0));
-    // All formats, which are not replaced.
+    // Writes the other formats; existing files are not replaced.
     for file in ["figure.pdf", "figure.png"] {
         let command = ["plot", "1/hold-pid.csv", "--y", "x_m", "--width", "60mm", "--out", file];
         let said = run(&folder, &command);
@@ -71,7 +71,7 @@ fn a_campaign_is_drawn_over_what_it_draws() {
     let plot = ["plot", "few/results.parquet", "--y", "rmse_position_m", "--out", "few.svg"];
     run(&folder, &[&plot[..], &["--x", "mass_ratio"]].concat());
     let svg = fs::read_to_string(folder.join("few.svg")).unwrap();
-    // Each contender its median and its band, and a sample of it in the legend.
+    // Each contender has a median and a band, and a sample of each in the legend.
     assert_eq!((lines(&svg).len(), bands(&svg)), (2, 4));
     assert!(svg.contains(">indi</text>") && svg.contains(">mass ratio</text>"), "{svg}");
     let line = refused(&sitl(&folder, &[&plot[..5], &["other.svg"]].concat()));
@@ -92,7 +92,7 @@ fn ulog_and_mcap_are_drawn_alike() {
     let (ulog, mcap) = (draw("a.ulg", "a.svg"), draw("a.mcap", "b.svg"));
     assert_eq!(lines(&ulog).len(), 3);
     assert_eq!(ulog, mcap);
-    // Of another topic there are other times.
+    // Topics have different times, so they cannot be drawn over each other.
     let crossed = ["plot", "a.ulg", "--y", "vehicle_local_position.x", "--x", "vehicle_attitude.q[0]"];
     let line = refused(&sitl(&folder, &crossed));
     assert!(line.contains("vehicle_attitude.q[0]: of another topic than vehicle_local_position.x"), "{line}");

@@ -1,4 +1,4 @@
-//! `sitl replay`: what it writes and what it refuses.
+//! Tests `sitl replay`: results and errors.
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
@@ -11,8 +11,8 @@ fn summary(folder: &Path, name: &str) -> Value {
     serde_json::from_slice(&fs::read(folder.join("out").join(name).join("summary.json")).unwrap()).unwrap()
 }
 
-/// The estimate beside the log is off by 2 degrees, 0.1 m/s and 0.3 m: that is what must be found. The heading is that
-/// of the field, which by the World Magnetic Model points 0.62 degrees east of north at this place.
+/// The logged estimate is off by 2 degrees, 0.1 m/s and 0.3 m, which the replay must find. Its own heading follows the
+/// field, which by the World Magnetic Model points 0.62 degrees east of north at this place.
 #[test]
 fn says_how_far_the_estimates_are_apart() {
     let folder = folder("apart");
@@ -25,7 +25,7 @@ fn says_how_far_the_estimates_are_apart() {
     assert!((number("heading_rms_deg") - 1.38).abs() < 0.2 && number("tilt_rms_deg") < 0.3, "{found:#}");
     assert!((number("velocity_rms_m_s") - 0.1).abs() < 0.02, "{found:#}");
     assert!((number("horizontal_rms_m") - 0.3).abs() < 0.05, "{found:#}");
-    // Half of what follows the start, which is less than 20 s.
+    // Compared over the second half of the time after the start, since that time is shorter than 20 s.
     assert!((number("measured_from_s") - 8.0).abs() < 0.2, "{found:#}");
     for name in ["attitude.svg", "velocity.svg", "position.svg", "difference.svg"] {
         let text = fs::read_to_string(out.join(name)).unwrap();
@@ -37,12 +37,12 @@ fn says_how_far_the_estimates_are_apart() {
     assert_eq!(csv.lines().count(), 1 + 15 * 10);
     let columns = csv.lines().next().unwrap().split(',').count();
     assert!(columns == 28 && csv.lines().all(|line| line.split(',').count() == columns));
-    // Another time to compare from.
+    // Compares from another time on.
     succeeds(&sitl(&folder, &["replay", "rest.csv", "--from", "14", "--force"]));
     assert_eq!(summary(&folder, "replay-rest")["measured_from_s"], 14.0);
 }
 
-/// What is told of the compass decides how sure the heading is.
+/// The stated error of the compass decides the standard deviation of the heading.
 #[test]
 fn the_error_of_the_compass_can_be_stated() {
     let folder = folder("compass");
@@ -64,7 +64,8 @@ fn the_error_of_the_compass_can_be_stated() {
     }
 }
 
-/// Without the estimate beside it there is nothing to compare with, and that is told; without other lines it flies too.
+/// Without a logged estimate, there is nothing to compare with, which is reported. The replay also runs without the
+/// other kinds of lines.
 #[test]
 fn says_what_is_missing() {
     let folder = folder("missing");
@@ -87,7 +88,7 @@ fn says_what_is_missing() {
     }
 }
 
-/// Lines that are none are skipped and counted.
+/// Invalid lines are skipped and counted.
 #[test]
 fn skips_and_counts_bad_lines() {
     let folder = folder("lines");
@@ -140,7 +141,7 @@ fn what_is_no_log_is_refused_in_one_line() {
     assert!(!folder.join("out").exists());
 }
 
-/// Recorded flights: skipped where the data are absent.
+/// Replays recorded flights; skipped if the data are absent.
 #[test]
 fn recorded_flights() {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");

@@ -1,4 +1,4 @@
-//! `sitl serve`: what it tells, what it refuses, how it ends.
+//! Tests `sitl serve`: messages, errors and exit codes.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -7,7 +7,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::UdpSocket;
 use std::process::{Child, Command, Output, Stdio};
 
-/// At free ports, without sending anything to anyone.
+/// Serves at free ports, and sends nothing to anyone.
 const ALONE: [&str; 7] = ["serve", "--port", "0", "--station", "none", "--companion", "none"];
 
 fn started(test: &str, arguments: &[&str]) -> Child {
@@ -15,7 +15,7 @@ fn started(test: &str, arguments: &[&str]) -> Child {
     command(&folder(test), &all).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-/// Runs it with these lines on stdin.
+/// Runs `sitl serve` with these lines on stdin.
 fn with_lines(test: &str, arguments: &[&str], lines: &str) -> Output {
     let mut child = started(test, arguments);
     child.stdin.take().unwrap().write_all(lines.as_bytes()).unwrap();
@@ -40,13 +40,13 @@ fn a_newcomer_learns_how_to_connect_each_client() {
     }
 }
 
-/// In lockstep the answers follow from the lines alone.
+/// In lockstep, the answers depend on the lines alone.
 #[test]
 fn the_same_lines_give_the_same_answers() {
     let lines = "step 1000\nwind 5 0 0\nstep 500\nnonsense\nfault gnss lost\nstatus\nstep 100\nstatus\n";
     let options = ["--lockstep", "--seed", "7", "--do", "at 1.2 battery 0.4"];
     let [first, second] = ["first", "second"].map(|test| succeeds(&with_lines(test, &options, lines)));
-    // Without the guide, which names the ports.
+    // Skips the connection guide, which names the ports.
     let answers =
         |reported: &str| reported.lines().skip_while(|line| !line.starts_with("ok")).map(str::to_owned).collect();
     let [first, second]: [Vec<String>; 2] = [&first, &second].map(|reported| answers(reported));
@@ -94,7 +94,7 @@ fn ctrl_c_ends_it_cleanly() {
     }
 }
 
-/// Nobody reads standard output, and much more is said than a pipe holds: the flight goes on, and ends as told.
+/// Output that nobody reads, more than a pipe holds, does not stop the flight.
 #[test]
 fn an_unread_output_stops_nothing() {
     for pace in ["--fast", "--lockstep"] {
@@ -111,7 +111,7 @@ fn an_unread_output_stops_nothing() {
     }
 }
 
-/// The end of stdin, as under a service manager, ends nothing but a lockstep.
+/// The end of stdin, as under a service manager, ends only a lockstep.
 #[test]
 fn without_stdin_it_goes_on() {
     let reported = succeeds(&with_lines("no-stdin", &["--fast", "--indoors", "--do", "at 5 quit"], ""));

@@ -1,4 +1,4 @@
-//! Completions and the manual.
+//! Tests completions and the manual.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use crate::common::{command, folder, sitl};
@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// Returns what a shell is told that may stand in the place of the last of `words`.
+/// Returns the completions that a shell gets for the last of `words`.
 fn completed(test: &str, words: &[&str]) -> Vec<String> {
     let folder = folder(test);
     fs::write(folder.join("mine.toml"), "").unwrap();
@@ -40,12 +40,12 @@ fn commands_options_and_names_are_completed() {
         for name in expected {
             assert!(offered.iter().any(|other| other == name), "{words:?}: {offered:?}");
         }
-        // A wordy shell that offers everything helps nobody.
+        // The list must be short to be of use.
         assert!(offered.len() <= expected.len() + 1, "{words:?}: {offered:?}");
     }
 }
 
-/// Bash, told by the script, asks the program.
+/// The script makes bash ask the program for completions.
 #[test]
 fn the_script_completes_in_bash() {
     let folder = folder("bash");

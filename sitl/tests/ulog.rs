@@ -1,4 +1,4 @@
-//! `--ulog` of `sitl fly` and `sitl serve`: the files, what is refused, and a disc that is full.
+//! Tests `--ulog` of `sitl fly` and `sitl serve`: files, errors and a full disc.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -6,10 +6,10 @@ use crate::common::{folder, refused, sitl, succeeds};
 use std::fs;
 use std::path::Path;
 
-/// Serves at free ports, without sending anything to anyone.
+/// Serves at free ports, and sends nothing to anyone.
 const SERVE: [&str; 8] = ["serve", "--port", "0", "--station", "none", "--companion", "none", "--fast"];
 
-/// Takes off, and holds.
+/// Plan that takes off and holds.
 #[cfg(unix)]
 const PLAN: &str = r#"{"fileType": "Plan", "version": 1, "groundStation": "QGroundControl",
     "geoFence": {"circles": [], "polygons": [], "version": 2}, "rallyPoints": {"points": [], "version": 2},
@@ -35,7 +35,7 @@ fn a_flight_is_logged_and_replayed() {
     assert!(is_log(&folder.join("flight.ulg")));
     let said = succeeds(&sitl(&folder, &["replay", "flight.ulg"]));
     assert!(said.contains("ULog of this firmware") && said.contains("tracker (afbc_aid)"), "{said}");
-    // A log is not overwritten, and nothing is flown for one that cannot be.
+    // An existing log is not overwritten, and nothing is flown if the log cannot be created.
     let out = folder.join("out");
     fs::remove_dir_all(&out).unwrap();
     for (path, cure) in [("flight.ulg", "remove that one"), ("no/such/folder.ulg", "choose another file for --ulog")] {
@@ -58,7 +58,7 @@ fn served_vehicles_have_a_log_each() {
     assert!(said.starts_with("one.ulg: exists already") && said.lines().count() == 1, "{said}");
 }
 
-/// In a folder, each start has the next file, and each of several vehicles a folder.
+/// In a folder, each start writes the next file; with several vehicles, each has a folder of its own.
 #[test]
 fn a_folder_gathers_the_logs() {
     let folder = folder("gathered");
@@ -73,7 +73,7 @@ fn a_folder_gathers_the_logs() {
     assert!(is_log(&logs.join("1/log001.ulg")) && is_log(&logs.join("2/log001.ulg")));
 }
 
-/// A file that cannot grow, as on a full disc, costs the log and not the vehicle, and is told once.
+/// If a file cannot grow, as on a full disc, the log ends but the vehicle flies on. The error is reported once.
 #[cfg(unix)]
 #[test]
 fn a_full_disc_costs_the_log_alone() {
@@ -89,7 +89,7 @@ fn a_full_disc_costs_the_log_alone() {
     assert!(is_log(&folder.join("full.ulg")));
 }
 
-/// A flight whose log is cut says so, exits with 2, and keeps its other results.
+/// A flight whose log is cut short reports it, exits with 2 and keeps its other results.
 #[cfg(unix)]
 #[test]
 fn a_flight_on_a_full_disc_fails() {

@@ -1,4 +1,4 @@
-//! Runs `sitl vehicles` and `--vehicle`.
+//! Tests `sitl vehicles` and `--vehicle`.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -19,7 +19,8 @@ fn every_built_in_vehicle_is_listed_and_a_template() {
     }
 }
 
-/// Columns for six rotors, and the same flight whether command line or scenario names the vehicle.
+/// The log has columns for six rotors. The flight is the same whether the command line or the scenario names the
+/// vehicle.
 #[test]
 fn a_scenario_may_name_its_vehicle() {
     let folder = folder("named");
@@ -61,7 +62,8 @@ fn a_vehicle_that_is_not_there_or_does_not_fly_gets_one_line() {
     assert!(!folder.join("out").exists(), "nothing is written");
 }
 
-/// What was flown stays, whatever the path and the comments of the vehicle's file; another vehicle is another campaign.
+/// A campaign resumes with the same vehicle, whatever the path and comments of its file. Another vehicle is another
+/// campaign.
 #[test]
 fn a_campaign_goes_on_with_the_same_vehicle_from_elsewhere() {
     let folder = folder("campaign");

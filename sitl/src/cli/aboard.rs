@@ -1,4 +1,4 @@
-//! `sitl fly --exact-log` and `--ulog`: the same flight by the firmware's own code.
+//! `sitl fly --exact-log` and `--ulog`: repeats the flight with the firmware's own code, which writes these logs.
 
 use super::serve::unwritten;
 use super::terminal::Failure;
@@ -13,20 +13,20 @@ use afbc_vehicles::Vehicle;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-/// The options that are about it.
+/// Options named in this module's error messages.
 const OPTIONS: &str = "--exact-log and --ulog";
-/// Vehicle of a scenario without a vehicle file.
+/// Vehicle of a scenario that names no vehicle file.
 const PAPER: &str = "paper";
 
-/// A flight to be flown by the firmware's code, under one law.
+/// Flight by the firmware's code, under one law.
 pub(super) struct AboardFlight {
     scenario: Scenario,
     kind: ControllerKind,
     host: Host,
 }
 
-/// Returns the flight of `scenario` under the first of its contenders' laws, for so many seconds, with the gains that
-/// the vehicle's firmware has.
+/// Prepares the flight of `scenario` under the law of its first contender, with the firmware's gains for the vehicle.
+/// `duration_s` replaces the scenario's duration.
 pub(super) fn aboard(scenario: &Scenario, duration_s: Option<f64>) -> Result<AboardFlight, Failure> {
     let kind = scenario.contenders.first().map_or(ControllerKind::Afbc, |contender| contender.kind());
     let contenders = vec![afbc_hil::firmware(scenario)?];
@@ -48,7 +48,7 @@ pub(super) fn aboard(scenario: &Scenario, duration_s: Option<f64>) -> Result<Abo
 }
 
 impl AboardFlight {
-    /// Flies, and writes the logs; returns a line on each.
+    /// Flies and writes the logs; returns a line about each log.
     pub(super) fn fly(mut self, logs: AboardLogs) -> Result<Vec<String>, Failure> {
         let AboardLogs { exact, ulog } = logs;
         if let Some((_, file)) = &exact {
@@ -66,7 +66,7 @@ impl AboardFlight {
         };
         let lost = |lost: &Lost| format!("; lost at {:.3} s: {}", lost.time_s, lost.reason);
         let lost = flown.as_ref().ok().and_then(|end| end.lost.as_ref()).map_or(String::new(), lost);
-        // Both are ended by now, or tried: one failure does not keep the other back.
+        // Both logs are finished before an error is returned, so that one failure does not lose the other log.
         let exact = exact.map(|(path, file)| (file.finish().map_err(|error| unwritten(&path, &error)), path));
         let ulog = ulog.map(|(path, files)| (files.finish(), path));
         for (what, ended) in [("exact log", exact), ("ULog", ulog)] {
@@ -80,20 +80,20 @@ impl AboardFlight {
     }
 }
 
-/// Where its logs go.
+/// Paths of the logs.
 pub(super) struct LogOutputs {
     exact: Option<Output>,
     ulog: Option<PathBuf>,
 }
 
-/// The files of its logs.
+/// Files of the logs.
 pub(super) struct AboardLogs {
     pub(super) exact: Option<(PathBuf, LogFile)>,
     pub(super) ulog: Option<(PathBuf, UlogFiles)>,
 }
 
 impl LogOutputs {
-    /// Checks that the files that are wanted are not there and can be.
+    /// Checks that the requested files do not exist and can be created.
     pub(super) fn new(exact: Option<&Path>, ulog: Option<&Path>) -> Result<Self, Failure> {
         if let Some(file) = ulog.filter(|path| !path.is_dir()) {
             Output::new(file, "--ulog")?;

@@ -1,4 +1,4 @@
-//! `sitl again`: the same results from their manifest.
+//! `sitl again`: repeats the command in a manifest, and compares the results.
 
 use super::manifest::{self, NAME, ResultsManifest, WITH_VALUE, WITHOUT_VALUE};
 use super::terminal::{Failure, print, say};
@@ -10,9 +10,9 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 
-/// Commands that leave a manifest.
+/// Commands that write a manifest.
 const WITH_MANIFEST: [&str; 4] = ["campaign", "compare", "fly", "paper"];
-/// The one that goes on with what it finds, and makes nothing again in a folder of its own.
+/// Command that resumes in an existing folder instead of starting afresh.
 const RESUMES: &str = "campaign";
 
 /// Make results again from their manifest, and compare them byte by byte
@@ -32,7 +32,7 @@ pub(crate) struct Again {
 }
 
 impl Again {
-    /// Runs the command, compares, prints.
+    /// Runs the command, compares the results and prints the differences.
     pub(super) fn run(self, program: CliCommand) -> Result<ExitCode, Failure> {
         let before = manifest::read(&self.manifest)?;
         let command =
@@ -52,7 +52,7 @@ impl Again {
                 say(&format!("{what}: {} then, {} now; results may differ", word(then), word(now)));
             }
         }
-        // This very program: another of the same name in the path may be of another version.
+        // Runs this program's own file, since another `sitl` in the path may have another version.
         let status = Command::new(env::current_exe()?)
             .arg(&command)
             .arg("--out")
@@ -61,7 +61,7 @@ impl Again {
             .stdout(Stdio::null())
             .status()
             .map_err(|error| format!("the command cannot be run again ({error})"))?;
-        // 1 says that a vehicle was lost, which is a result.
+        // Exit code 1 means that a vehicle was lost, which is a valid result.
         if !matches!(status.code(), Some(0 | 1)) {
             return Err(format!("sitl {}: failed, see above; nothing was compared", before.command.join(" ")).into());
         }
@@ -82,12 +82,13 @@ impl Again {
     }
 }
 
-/// True if the arguments begin with the name of a command: without one, or with options first, it is `paper`.
+/// True if the arguments begin with a command. Without a command, or with options first, the command is `paper`.
 fn is_named(arguments: &[String]) -> bool {
     arguments.first().is_some_and(|word| !word.starts_with('-'))
 }
 
-/// Returns the command of a manifest's arguments, if it and every option of it may be run for whoever has written them.
+/// Returns the command of a manifest's arguments. Fails if the command, or one of its options, is not safe to run for
+/// a manifest written by somebody else.
 fn checked(arguments: &[String], program: &CliCommand) -> Result<String, String> {
     let command = if is_named(arguments) { arguments.first().map_or("", String::as_str) } else { "paper" };
     let known = WITH_MANIFEST.join(", ");
@@ -110,7 +111,7 @@ fn checked(arguments: &[String], program: &CliCommand) -> Result<String, String>
     }
 }
 
-/// Returns the options of a command that do not decide results.
+/// Returns the options of a command that do not affect its results.
 fn places(options: &CliCommand) -> impl Iterator<Item = &Arg> {
     let of = |arg: &&Arg, names: &[&str]| {
         arg.get_long().is_some_and(|long| names.iter().any(|name| name.strip_prefix("--") == Some(long)))
@@ -118,7 +119,7 @@ fn places(options: &CliCommand) -> impl Iterator<Item = &Arg> {
     options.get_arguments().filter(move |arg| of(arg, &WITH_VALUE) || of(arg, &WITHOUT_VALUE))
 }
 
-/// Returns the folder of new results beside those of the manifest.
+/// Returns the default folder for the new results, next to the manifest's.
 fn beside(manifest: &Path) -> PathBuf {
     let is_file = manifest.file_name().is_some_and(|name| name == NAME);
     let folder = if is_file { manifest.parent().unwrap_or(Path::new("")) } else { manifest };

@@ -1,4 +1,4 @@
-//! `sitl bring-up`.
+//! `sitl bring-up`: checks a board step by step.
 
 use super::terminal::{Failure, print, say};
 use crate::network::Network;
@@ -41,7 +41,7 @@ pub(crate) struct BringUp {
     yes: bool,
 }
 
-/// Where the board is.
+/// Address of the board.
 #[derive(Clone, Debug)]
 enum Connection {
     Serial(String, u32),
@@ -69,7 +69,7 @@ impl FromStr for Connection {
 }
 
 impl BringUp {
-    /// Goes through the steps, writes the log.
+    /// Runs the steps and writes the log.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let out = self.out.display();
         let output = Output::new(&self.out, "--out")?;
@@ -102,7 +102,7 @@ impl BringUp {
 }
 
 impl Connection {
-    /// Connects; returns in words how, too.
+    /// Connects; also returns a description of the connection.
     fn open(&self) -> Result<(Box<dyn Autopilot>, String), Failure> {
         Ok(match self {
             Connection::Serial(device, baud) => {
@@ -114,7 +114,7 @@ impl Connection {
     }
 }
 
-/// Lets somebody say that the propellers are off.
+/// Asks the user to confirm that the propellers are off.
 fn confirm() -> Result<(), Failure> {
     say("Are the propellers off? Type yes:");
     let mut answer = String::new();
@@ -125,7 +125,7 @@ fn confirm() -> Result<(), Failure> {
     Err("take the propellers off first; --yes says that they are, and that nobody is there".into())
 }
 
-/// Returns a time as year, month, day, hour and minute of UTC.
+/// Returns a time as year, month, day, hour and minute in UTC.
 fn date(time: SystemTime) -> String {
     let minutes = time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs() / 60);
     let (mut day, minute) = (minutes / (24 * 60), minutes % (24 * 60));
@@ -136,7 +136,7 @@ fn date(time: SystemTime) -> String {
         year += 1;
     }
     let mut month = 1;
-    // Eleven of them: what is left then is December.
+    // Eleven months: what remains is December.
     for days in [31, 28 + u64::from(is_leap(year)), 31, 30, 31, 30, 31, 31, 30, 31, 30] {
         if day < days {
             break;
@@ -152,7 +152,7 @@ mod tests {
     use super::*;
     use std::time::Duration;
 
-    /// By `date -u -d @SECONDS`.
+    /// Expected dates are from `date -u -d @SECONDS`.
     #[test]
     fn dates_by_the_calendar() {
         for (seconds, expected) in [

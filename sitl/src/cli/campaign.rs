@@ -20,7 +20,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 use std::thread;
 
-/// Option of a part.
+/// Option that selects a part of a campaign.
 const SHARD: &str = "--shard";
 
 /// Fly a campaign: one scenario, many times, with drawn vehicles, weather and faults
@@ -68,7 +68,7 @@ pub(crate) struct Campaign {
 }
 
 impl Campaign {
-    /// Flies, writes, prints.
+    /// Flies the campaign, writes the results and prints a summary.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let plan = self.on.campaign(self.campaign.campaign()?)?;
         let flights = self.flights.unwrap_or(plan.flights);
@@ -93,7 +93,7 @@ impl Campaign {
         ))?;
         let folder = CampaignFolder::open(&out, Manifest::new(&plan, shard), self.place.force)?;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
-        // Flights of earlier runs are reported first.
+        // The first call reports flights of earlier runs.
         let progress: OnceLock<Progress> = OnceLock::new();
         let done = |done| {
             let mut first = false;
@@ -106,7 +106,7 @@ impl Campaign {
                 progress.add(done);
             }
         };
-        // Ctrl-C ends the program itself, since what is in the folder is whole at any time.
+        // Ctrl-C ends the program directly, since the folder is consistent at any time.
         let never = AtomicBool::new(false);
         let summary = pool.install(|| campaign::fly(&plan, &folder, &never, &done));
         drop(progress);
@@ -116,7 +116,7 @@ impl Campaign {
         conclude(&folder, &summary, origin, &self.on.arguments(&self.campaign), self.json)
     }
 
-    /// Flies one flight, and writes everything about it.
+    /// Flies one flight, and writes its full results.
     fn fly_again(self, plan: &Plan, flight: u64) -> Result<ExitCode, Failure> {
         if flight >= plan.flights {
             return Err(
@@ -144,7 +144,7 @@ fn threads(text: &str) -> Result<u64, &'static str> {
     text.parse().ok().filter(|threads| *threads > 0).ok_or("it must be a whole number from 1 on, such as 4")
 }
 
-/// Returns the smaller of the `wanted` number of threads, or of all cores, and of what is useful for `flights`.
+/// Returns the number of threads: `wanted`, or else all cores, but at most the number of cores and of `flights`.
 fn useful(wanted: Option<u64>, flights: u64) -> usize {
     let cores = thread::available_parallelism().map_or(1, |cores| cores.get() as u64);
     let most = cores.min(flights);
@@ -155,10 +155,10 @@ fn useful(wanted: Option<u64>, flights: u64) -> usize {
     wanted.unwrap_or(most).min(most) as usize
 }
 
-/// The command that makes a campaign's results, and what it flies.
+/// Command that makes a campaign's results, and the scenarios that it flies.
 type Origin = (Vec<String>, Vec<manifest::FlownWords>);
 
-/// Writes and prints the results of all flights; with their manifest, if it is known how they were made.
+/// Writes and prints the results of all flights. Writes a manifest too, if the origin of the results is known.
 fn conclude(
     folder: &CampaignFolder,
     summary: &Summary,
@@ -203,7 +203,7 @@ pub(crate) struct Merge {
 }
 
 impl Merge {
-    /// Joins, writes, prints.
+    /// Merges the parts, writes the results and prints a summary.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         interrupt::ends_with("stopped; the same command starts again".into())?;
         let (folder, summary) = campaign::merge(&self.shards, &self.out, self.force)?;
@@ -211,7 +211,7 @@ impl Merge {
     }
 }
 
-/// Returns what makes the whole of the parts in one: the command of a part, if that is known.
+/// Returns the command that flies all parts at once: the command of the first part without its shard option, if known.
 fn whole(parts: &[PathBuf]) -> Option<Origin> {
     let part = manifest::read(parts.first()?).ok()?;
     let mut command = part.command;

@@ -1,4 +1,4 @@
-//! Every command but `paper`.
+//! All commands except `paper`.
 
 use super::terminal::Failure;
 use super::{
@@ -35,7 +35,7 @@ pub(super) enum Other {
 }
 
 impl Other {
-    /// Runs the command of this `program`.
+    /// Runs the command; `program` is the whole command line's definition.
     pub(super) fn run(self, program: Command) -> Result<ExitCode, Failure> {
         match self {
             Other::Fly(fly) => fly.run(),

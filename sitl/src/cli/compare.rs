@@ -1,4 +1,4 @@
-//! `sitl compare`.
+//! `sitl compare`: flies several controllers in the same scenarios.
 
 use super::over_seeds::{fly, record};
 use super::target::Target;
@@ -58,7 +58,7 @@ pub(crate) struct Compare {
 }
 
 impl Compare {
-    /// Flies, writes, prints.
+    /// Flies, writes the results and prints a table.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         if let Some(path) = &self.suite {
             let own = self.random.own()?;
@@ -122,7 +122,7 @@ impl Compare {
     }
 }
 
-/// Checks that `against` is one of those who fly.
+/// Checks that `against` names one of the contenders.
 fn flies(against: Option<&str>, names: &[&str]) -> Result<(), Failure> {
     let Some(against) = against.filter(|against| !names.contains(against)) else { return Ok(()) };
     let cure = match nearest(against, names.iter().copied()) {

@@ -1,4 +1,4 @@
-//! What a shell completes: names of scenarios, campaigns, suites, vehicles and laws.
+//! Shell completion of names: scenarios, campaigns, suites, vehicles and laws.
 
 use afbc_campaign::suite::SUITES;
 use afbc_campaign::{random, rough};
@@ -8,13 +8,13 @@ use clap::{Arg, Command};
 use clap_complete::engine::{ArgValueCompleter, CompletionCandidate, PathCompleter, ValueCompleter};
 use std::ffi::OsStr;
 
-/// Returns `command` with arguments that a shell completes.
+/// Adds name completion to the arguments of `command`.
 pub(super) fn completed(command: Command) -> Command {
     let name = command.get_name().to_owned();
     command.mut_args(|arg| with_names(&name, arg))
 }
 
-/// Returns the argument of `command` with the names that may stand there, and files where those may, too.
+/// Adds completion of the names that an argument of `command` accepts, and of files if it accepts those too.
 fn with_names(command: &str, arg: Arg) -> Arg {
     let value = arg.get_value_names().and_then(|names| names.first()).map_or("", |name| name.as_str());
     let (names, is_file): (fn() -> Vec<String>, bool) = match (command, arg.get_id().as_str(), value) {

@@ -1,4 +1,4 @@
-//! Scenarios, campaigns, vehicles and searches as `--json` describes them.
+//! Descriptions of scenarios, campaigns, vehicles and searches for `--json`.
 
 use afbc::Profile;
 use afbc_campaign::Campaign;
@@ -8,7 +8,7 @@ use afbc_tune::{GainChange, SearchResult, fragment};
 use afbc_vehicles::Vehicle;
 use serde::Serialize;
 
-/// A contender.
+/// Summary of a contender.
 #[derive(Serialize)]
 struct Who<'a> {
     name: &'a str,
@@ -125,7 +125,7 @@ struct Gain {
     after: f32,
 }
 
-/// Returns the result of a search with this seed for the contender `name`.
+/// Returns the result of a search with this seed; `name` is the contender's name.
 pub(crate) fn tuned(found: &SearchResult, name: &str, seed: u64) -> impl Serialize {
     let SearchResult { contender, before, after, evaluations, changes } = found;
     let gain = |GainChange { name, from, to }: &GainChange| Gain { name: name.clone(), before: *from, after: *to };

@@ -1,4 +1,4 @@
-//! `sitl replay --exact`.
+//! `sitl replay --exact`: replays an exact log with the firmware's code.
 
 use super::interrupt;
 use super::json::{self, Json};
@@ -16,7 +16,7 @@ use std::process::ExitCode;
 
 /// Unit of progress \[bytes\].
 const KB: u64 = 1024;
-/// Logs of up to this many of them show none: three minutes.
+/// Logs up to this size, about three minutes of flight, show no progress.
 const QUIET_KB: u64 = 16 * 1024;
 
 /// Options of an exact replay.
@@ -37,7 +37,7 @@ pub(super) struct Exact {
 }
 
 impl Exact {
-    /// Replays, writes, prints.
+    /// Replays the log, writes the results and prints them.
     pub(super) fn run(&self, path: &Path, place: &Place, json: Json) -> Result<ExitCode, Failure> {
         let vehicle = self.vehicle.as_deref().map(vehicle_named).transpose()?;
         let name = path.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());

@@ -1,4 +1,4 @@
-//! `sitl tune --fleet`.
+//! `sitl tune --fleet`: searches gains of several laws on several vehicles.
 
 use super::progress::Progress;
 use super::terminal::{Failure, INTERRUPTED, print, say};
@@ -12,21 +12,21 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Lines of a vehicle's file between which its gains stand.
+/// Marker lines in a vehicle's file, between which the gains are written.
 const BEGIN: &str = "# Gains found by `sitl tune --fleet`, up to the line of the same form.";
 const END: &str = "# End of the gains found by `sitl tune --fleet`.";
 
-/// What to search, and where to.
+/// Parameters of the searches.
 pub(super) struct Fleet<'a> {
     pub(super) folder: &'a Path,
-    /// Names of laws; all if there are none.
+    /// Names of laws; all laws if empty.
     pub(super) laws: &'a [String],
-    /// Vehicles; all built-in ones if there are none.
+    /// Vehicles; all built-in ones if empty.
     pub(super) vehicles: Vec<Vehicle>,
     pub(super) course: SearchOptions,
-    /// Whether to start from the gains that fly.
+    /// True to start from the vehicles' present gains.
     pub(super) flying: bool,
-    /// Folder of vehicle files to write the gains into.
+    /// Folder with the vehicle files into which the gains are written.
     pub(super) write: Option<&'a Path>,
 }
 
@@ -46,7 +46,7 @@ impl Fleet<'_> {
                 return Err(format!("{}: no name for a file; change it", vehicle.name.escape_debug()).into());
             }
         }
-        // A file that cannot be written into must not be found after hours.
+        // Checked before the search, which takes hours.
         if let Some(folder) = self.write {
             written(&vehicles).try_for_each(|vehicle| with_gains(folder, &vehicle.name, "").map(drop))?;
         }
@@ -82,7 +82,7 @@ impl Fleet<'_> {
                     continue;
                 }
                 let (path, whole) = with_gains(folder, &vehicle.name, &results.gains_of(&vehicle.name, &outcomes))?;
-                // A file that could not be flown is never written.
+                // The new file is parsed first, so that no file that cannot fly is written.
                 let read = afbc_vehicles::parse(&path.display().to_string(), &whole, &vehicle.name)?;
                 Law::on(ControllerKind::Afbc, &read, afbc::Profile::Flight)?;
                 afbc_files::place(&path, |out| out.write_all(whole.as_bytes()))
@@ -95,12 +95,13 @@ impl Fleet<'_> {
     }
 }
 
-/// The vehicles whose gains their files hold.
+/// Returns the vehicles whose files hold their gains.
 fn written(vehicles: &[Vehicle]) -> impl Iterator<Item = &Vehicle> {
     vehicles.iter().filter(|vehicle| !is_paper(vehicle))
 }
 
-/// Returns the laws of these names; without names all but backstepping, which flies with AFBC's gains.
+/// Returns the laws with these names. Without names, returns all laws except backstepping, which flies with AFBC's
+/// gains.
 fn laws(names: &[String]) -> Result<Vec<ControllerKind>, Failure> {
     let all = ControllerKind::all().into_iter();
     if names.is_empty() {
@@ -113,8 +114,8 @@ fn laws(names: &[String]) -> Result<Vec<ControllerKind>, Failure> {
     Ok(all.filter(|kind| names.iter().any(|name| kind.name() == name)).collect())
 }
 
-/// Returns the path of the file of `vehicle` in `folder`, and its text with `gains` between the two lines, which are
-/// put at its end if there are none.
+/// Returns the path of the vehicle's file in `folder`, and its text with `gains` between the marker lines. If the file
+/// has no marker lines, they are appended.
 fn with_gains(folder: &Path, vehicle: &str, gains: &str) -> Result<(PathBuf, String), Failure> {
     let path = folder.join(format!("{vehicle}.toml"));
     let text = std::fs::read_to_string(&path).map_err(|error| {
@@ -124,7 +125,7 @@ fn with_gains(folder: &Path, vehicle: &str, gains: &str) -> Result<(PathBuf, Str
     Ok((path, whole))
 }
 
-/// Returns `text` with `gains` between the two lines.
+/// Returns `text` with `gains` between the marker lines.
 fn replaced(text: &str, gains: &str) -> Result<String, String> {
     let (before, after) = match (text.split_once(BEGIN), text.contains(END)) {
         (None, false) => (text, ""),
@@ -141,7 +142,7 @@ fn replaced(text: &str, gains: &str) -> Result<String, String> {
     Ok(format!("{}\n\n{BEGIN}\n{}\n{END}\n{after}", before.trim_end(), gains.trim_end()))
 }
 
-/// Returns a line for each search.
+/// Returns a table with a line for each search.
 fn table(outcomes: &[FleetOutcome]) -> String {
     let mut text = format!(
         "{:<14}{:<14}{:>10}{:>10}{:>12}{:>10}  {}\n",

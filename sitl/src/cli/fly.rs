@@ -1,4 +1,4 @@
-//! `sitl fly`.
+//! `sitl fly`: flies one scenario, or a plan of a ground station.
 
 use super::aboard::{AboardLogs, LogOutputs, aboard};
 use super::flying::{Flying, report};
@@ -62,7 +62,7 @@ pub(crate) struct Fly {
 }
 
 impl Fly {
-    /// Flies, writes, prints.
+    /// Flies, writes the results and prints a table.
     pub(super) fn run(mut self) -> Result<ExitCode, Failure> {
         if is_plan(self.scenario.path()) {
             return self.fly_plan();
@@ -76,7 +76,8 @@ impl Fly {
         let name = scenario.name.clone();
         let is_logged = self.mcap.is_some() || self.exact_log.is_some() || self.ulog.is_some();
         let firmware = is_logged.then(|| aboard(&scenario, self.flying.duration)).transpose()?;
-        // Before the flights, so that a file that cannot be costs none; and created when everything else is right.
+        // Checked before the flights, so that a file that cannot be written costs no flight; created once everything
+        // else is right.
         let mcap = FlightMcap::plan(self.mcap, &mut self.ulog)?;
         let outputs = LogOutputs::new(self.exact_log.as_deref(), self.ulog.as_deref())?;
         let mut logs = None;
@@ -87,7 +88,7 @@ impl Fly {
         };
         let (folder, flown) = self.flying.fly(vec![scenario], open)?;
         let logged = firmware.zip(logs).map(|(firmware, logs)| firmware.fly(logs));
-        // A log that has failed costs no other result; the failure is told in the end.
+        // If a log fails, all other results are still written; the error is reported at the end.
         report(&folder, &flown, &[], self.json)?;
         let converted = mcap.map(FlightMcap::finish);
         logged.transpose()?.iter().flatten().for_each(|line| say(line));

@@ -1,4 +1,4 @@
-//! Options, flights and output shared by `paper` and `fly`.
+//! Options, flights and output that `paper`, `fly` and `campaign --flight` share.
 
 use super::json::Json;
 use super::progress::Progress;
@@ -14,7 +14,7 @@ use afbc_sim::flown::Flown;
 use afbc_sim::run::Run;
 use clap::Args;
 
-/// Flights of more steps than this, about a second of computing time, show their progress.
+/// Flights with more steps than this, which take about a second, show their progress.
 const QUIET_STEPS: f64 = 1e6;
 
 /// Options of every flight.
@@ -38,7 +38,7 @@ fn duration(text: &str) -> Result<f64, String> {
 }
 
 impl Flying {
-    /// Flies every scenario under each of its contenders, after checking that `open` gives an output folder.
+    /// Flies every scenario under each of its contenders. `open` opens the output folder once all options are checked.
     pub(crate) fn fly(
         self,
         mut scenarios: Vec<Scenario>,
@@ -53,7 +53,7 @@ impl Flying {
                 log_every.push(log_hz.steps(scenario, contender)?);
             }
         }
-        // Not before: what is refused leaves no folder behind.
+        // Opened only now, so that a refused command leaves no folder behind.
         let folder = open()?;
         if self.log_hz.is_none() {
             let longest_s = scenarios.iter().map(|scenario| scenario.duration_s).fold(0.0, f64::max);
@@ -72,7 +72,7 @@ impl Flying {
     }
 }
 
-/// Returns the progress on stderr, run by run; hidden for short flights.
+/// Returns the progress on stderr, counted in flights; hidden for short flights.
 fn progress(scenarios: &[Scenario]) -> Progress {
     let steps = |s: &Scenario| s.contenders.iter().map(|contender| s.duration_s / contender.step_s()).sum::<f64>();
     if scenarios.iter().map(steps).sum::<f64>() < QUIET_STEPS {
@@ -83,13 +83,13 @@ fn progress(scenarios: &[Scenario]) -> Progress {
     Progress::new(name, "flights", runs as u64, 0)
 }
 
-/// Writes everything into `folder`, then prints the table and the paths.
+/// Writes all files into `folder`, then prints the table and the paths.
 pub(crate) fn report(folder: &Folder, flown: &[Flown], claims: &[Claim], json: Json) -> Result<(), Failure> {
     interrupt::is_too_late();
     let written = flights::write(folder, flown, claims)?;
     let whole: Vec<manifest::Flown<'_>> =
         flown.iter().map(|Flown { scenario, .. }| (scenario, vec![scenario.seed])).collect();
-    // Every flight decides, but a scenario is written out once for all of its contenders.
+    // All flights enter the fingerprint, but a scenario is written out only once for all of its contenders.
     let mut first = whole.clone();
     first.dedup_by(|a, b| a == b);
     manifest::write(folder, &written, &whole, &first)?;

@@ -1,4 +1,4 @@
-//! `sitl hitl`.
+//! `sitl hitl`: flies a real board over a serial port.
 
 use super::in_the_loop::{InTheLoop, Recorder, outcome};
 use super::target::Target;
@@ -40,7 +40,7 @@ pub(crate) struct Hitl {
 }
 
 impl Hitl {
-    /// Flies, prints.
+    /// Flies and prints the results.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let Some(port) = self.port.filter(|_| !self.list) else {
             let ports = serial::ports()?;
@@ -84,7 +84,7 @@ impl Hitl {
     }
 }
 
-/// Formats statistics of the link and the board.
+/// Formats the statistics of link and board.
 fn figures(station: &Station) -> String {
     let (here, heard, round_trip) = (station.counters(), station.heard(), station.round_trip_ms());
     let health = heard.health.unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Options, log and output shared by `pil` and `hitl`.
+//! Options, log and output that `pil` and `hitl` share.
 
 use super::target::Target;
 use super::terminal::Failure;
@@ -34,7 +34,7 @@ pub(crate) struct InTheLoop {
     out: Option<PathBuf>,
 }
 
-/// Formats the errors next to those of a flight without a link, if it was completed, and how it ended.
+/// Formats the end of the flight and, if it was completed, its errors next to those of a flight without a link.
 pub(crate) fn outcome(scenario: &Scenario, metrics: &Metrics, end: &LoopEnd) -> Result<String, Failure> {
     let LoopEnd { lost, interrupted, disarmed } = end;
     let mut text = match (lost, interrupted) {
@@ -52,7 +52,7 @@ pub(crate) fn outcome(scenario: &Scenario, metrics: &Metrics, end: &LoopEnd) -> 
 }
 
 impl InTheLoop {
-    /// Returns the scenario, if the firmware can fly it.
+    /// Returns the scenario; fails if the firmware cannot fly it.
     pub(crate) fn scenario(&self, target: &Target) -> Result<Scenario, Failure> {
         let mut scenario = self.on.put(target.scenario()?)?;
         scenario.duration_s = self.duration.unwrap_or(scenario.duration_s);
@@ -61,7 +61,7 @@ impl InTheLoop {
         Ok(scenario)
     }
 
-    /// Returns where the log goes, if it is wanted.
+    /// Returns the output file of the log, if a log is requested.
     pub(crate) fn output(&self) -> Result<Option<Output>, Failure> {
         Ok(self.out.as_deref().map(|out| Output::new(out, "--out")).transpose()?)
     }
@@ -75,7 +75,7 @@ pub(crate) struct Recorder {
     failure: Option<Error>,
 }
 
-/// Progress on stderr, drawn by a thread of its own: a terminal that stands still delays no step.
+/// Progress on stderr, drawn by a separate thread, so that a stalled terminal delays no step.
 struct LiveProgress {
     steps: Arc<AtomicU64>,
     end: Sender<()>,
@@ -86,7 +86,7 @@ struct LiveProgress {
 const PROGRESS_EVERY: Duration = Duration::from_millis(100);
 
 impl Recorder {
-    /// Creates the recorder of a flight of `scenario`, and its log.
+    /// Creates the recorder of a flight of `scenario`, and its log file.
     pub(crate) fn new(scenario: &Scenario, output: Option<&Output>) -> Result<Self, Failure> {
         let create = |output: &Output| Ok::<_, Failure>(Log::new(output.create()?, scenario.rotors.len())?);
         let log = output.map(create).transpose()?;
@@ -95,7 +95,7 @@ impl Recorder {
         Ok(Recorder { metrics: Accumulator::default(), log, progress, failure: None })
     }
 
-    /// Records one step; aborts the flight if it cannot be logged.
+    /// Records one step; aborts the flight if the step cannot be logged.
     pub(crate) fn observe(&mut self, sample: &Sample) -> ControlFlow<()> {
         self.metrics.add(sample);
         self.progress.steps.store((sample.time_s * 1000.0).round() as u64, Ordering::Relaxed);
@@ -120,7 +120,7 @@ impl Recorder {
 }
 
 impl LiveProgress {
-    /// Begins to draw the progress of so many steps.
+    /// Starts drawing the progress of a flight with this many steps.
     fn new(steps: u64) -> Self {
         let (done, (end, ended)) = (Arc::new(AtomicU64::new(0)), channel());
         let seen = Arc::clone(&done);
@@ -136,7 +136,7 @@ impl LiveProgress {
         LiveProgress { steps: done, end, thread }
     }
 
-    /// Clears it, after the flight.
+    /// Removes the progress bar after the flight.
     fn finish(self) {
         drop(self.end);
         // The thread has no result.

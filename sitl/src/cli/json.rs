@@ -13,7 +13,7 @@ pub(crate) struct Json {
     pub(crate) json: bool,
 }
 
-/// Prints what `write` writes.
+/// Prints the output of `write`.
 pub(crate) fn print_written(write: impl FnOnce(&mut Vec<u8>) -> io::Result<()>) -> Result<(), Failure> {
     let mut text = Vec::new();
     write(&mut text)?;

@@ -1,4 +1,4 @@
-//! `manifest.json` beside results: what they were made of, by which command, on which machine.
+//! `manifest.json` in a folder of results: inputs, command, and machine that made them.
 
 use super::terminal::Failure;
 use afbc_files::Folder;
@@ -13,41 +13,41 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::thread;
 
-/// Name of the file.
+/// Name of the manifest's file.
 pub(super) const NAME: &str = "manifest.json";
-/// Options that do not decide results, but where they go, how they are printed and on how many cores they are made:
-/// some have a value, others have none.
+/// Options that do not affect results, but where they are written, how they are printed or how many cores make them:
+/// options with a value, and options without one.
 pub(super) const WITH_VALUE: [&str; 7] =
     ["--out", "--ulog", "--exact-log", "--mcap", "--write", "--table", "--threads"];
 pub(super) const WITHOUT_VALUE: [&str; 2] = ["--force", "--json"];
 
-/// What results were made of.
+/// Content of a manifest.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct ResultsManifest {
     /// Version of the program.
     pub(super) version: String,
-    /// Commit of the sources that the program was built from, with `-dirty` if they had been changed; null if unknown.
+    /// Commit of the program's sources, with `-dirty` if they were modified; null if unknown.
     pub(super) commit: Option<String>,
-    /// The command line behind the program's name, without what says where results go.
+    /// Command line after the program's name, without options that do not affect results.
     pub(super) command: Vec<String>,
     /// Hash of version, scenarios, vehicles, contenders with their gains, and seeds.
     pub(super) fingerprint: String,
-    /// What was flown.
+    /// Scenarios that were flown.
     pub(super) flown: Vec<FlownWords>,
-    /// What it was flown on; results do not depend on it.
+    /// Machine that made the results; results do not depend on it.
     pub(super) machine: Machine,
-    /// Hash of every file of the results.
+    /// Hash of each file of the results.
     pub(super) results: BTreeMap<String, String>,
     checksum: String,
 }
 
-/// A scenario that was flown.
+/// Scenario that was flown.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct FlownWords {
     name: String,
-    /// Seed of every flight of each contender.
+    /// Seeds of each contender's flights.
     seeds: Vec<u64>,
-    /// Vehicle, contenders with their gains, weather, sensors: everything that decides a flight.
+    /// Everything that decides a flight: vehicle, contenders with their gains, weather, sensors.
     scenario: Value,
 }
 
@@ -63,20 +63,20 @@ pub(super) fn version() -> String {
     env!("CARGO_PKG_VERSION").into()
 }
 
-/// Returns the commit of the program's sources, if it is known.
+/// Returns the commit of the program's sources, if known.
 pub(super) fn commit() -> Option<String> {
     option_env!("SITL_COMMIT").map(String::from)
 }
 
-/// A scenario, and the seeds that each contender flew it with.
+/// Scenario, and the seeds of each contender's flights.
 pub(super) type Flown<'a> = (&'a Scenario, Vec<u64>);
 
-/// Returns what is written out of a scenario that was flown.
+/// Returns the manifest's entry for a scenario.
 pub(super) fn words((scenario, seeds): &Flown<'_>) -> Result<FlownWords, serde_json::Error> {
     Ok(FlownWords { name: scenario.name.clone(), seeds: seeds.clone(), scenario: serde_json::to_value(scenario)? })
 }
 
-/// Writes the manifest of the results `files` in `folder`, of which everything in `flown` decides, and `shown` is
+/// Writes the manifest of the results `files` in `folder`. All of `flown` enters the fingerprint; only `shown` is
 /// written out.
 pub(super) fn write(
     folder: &Folder,
@@ -88,7 +88,7 @@ pub(super) fn write(
     write_as(folder, files, own_command(), hash_of(&(version(), flown)), shown)
 }
 
-/// Writes the manifest of the results `files` of a command in `folder`.
+/// Writes the manifest of the results `files` in `folder`, made by `command`.
 pub(super) fn write_as(
     folder: &Folder,
     files: &[PathBuf],
@@ -119,15 +119,15 @@ pub(super) fn write_as(
     Ok(())
 }
 
-/// Returns the arguments of this program that decide the results, after the name of the command.
+/// Returns this program's command and those of its arguments that affect the results.
 pub(super) fn own_command() -> Vec<String> {
     let own = command(env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()));
-    // Without a command, or with options first, it is `paper`.
+    // Without a command, or with options first, the command is `paper`.
     let named = own.first().is_some_and(|word| !word.starts_with('-'));
     if named { own } else { [vec!["paper".into()], own].concat() }
 }
 
-/// Returns the arguments that decide the results.
+/// Returns the arguments that affect the results.
 fn command(arguments: impl Iterator<Item = String>) -> Vec<String> {
     let mut kept = Vec::new();
     let mut arguments = arguments.into_iter();
@@ -142,7 +142,7 @@ fn command(arguments: impl Iterator<Item = String>) -> Vec<String> {
     kept
 }
 
-/// Reads the manifest at `path`, or in the folder `path`.
+/// Reads the manifest at `path`, or the one in the folder `path`.
 pub(super) fn read(path: &Path) -> Result<ResultsManifest, Failure> {
     let path = if path.is_dir() { path.join(NAME) } else { path.to_path_buf() };
     let name = path.display();
@@ -151,7 +151,7 @@ pub(super) fn read(path: &Path) -> Result<ResultsManifest, Failure> {
     let damaged = |problem: &dyn std::fmt::Display| format!("{name}: damaged or no manifest ({problem}); {cure}");
     seal::verify(&mut io::Cursor::new(&bytes)).map_err(|error| damaged(&error))?;
     let manifest: ResultsManifest = serde_json::from_slice(&bytes).map_err(|error| damaged(&error))?;
-    // Whoever made it: the files are those of its own folder.
+    // A manifest from somebody else must not name files outside its folder.
     let is_plain = |name: &String| Path::new(name).file_name().is_some_and(|plain| plain == name.as_str());
     match manifest.results.keys().find(|name| !is_plain(name)) {
         Some(name) => Err(damaged(&format!("a path in it, {}", name.escape_debug())).into()),
@@ -166,7 +166,7 @@ mod tests {
     use crate::cli::Cli;
     use clap::CommandFactory;
 
-    /// An option that is new is sorted in here, too: `sitl again` runs whatever is none of the places.
+    /// Every new option must be listed here too, because `sitl again` runs all options that are not declared harmless.
     #[test]
     fn each_option_decides_results_or_is_a_place() {
         let decide: [(&str, &[&str]); 4] = [

@@ -1,4 +1,4 @@
-//! `sitl mcap`, and `sitl fly --mcap`.
+//! `sitl mcap` and `sitl fly --mcap`: writes logs as MCAP.
 
 use super::terminal::{Failure, print, say};
 use afbc_files::Output;
@@ -21,7 +21,7 @@ pub(crate) struct Mcap {
 }
 
 impl Mcap {
-    /// Converts.
+    /// Converts the log.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let beside = || PathBuf::from(self.log.file_name().unwrap_or_default()).with_extension("mcap");
         let path = self.out.clone().unwrap_or_else(beside);
@@ -31,7 +31,7 @@ impl Mcap {
     }
 }
 
-/// Converts a log, and returns a line on it. Without success there is no file.
+/// Converts a log, and returns a line about the result. Leaves no file behind if it fails.
 fn converted(log: &Path, output: &Output) -> Result<String, Failure> {
     let mut bytes = Vec::new();
     let summary = convert(log, Cursor::new(&mut bytes))?;
@@ -44,30 +44,30 @@ fn converted(log: &Path, output: &Output) -> Result<String, Failure> {
     Ok(format!("{path}: MCAP, {} messages of {} topics{damaged}", summary.messages, summary.topics))
 }
 
-/// The MCAP of a flight, made of its ULog when it has ended.
+/// MCAP file of a flight, converted from its ULog after the flight.
 pub(super) struct FlightMcap {
     output: Output,
-    /// The log that it is made of.
+    /// ULog to convert.
     ulog: PathBuf,
-    /// The same, if nobody has asked for it.
+    /// The same ULog, if it is only temporary.
     _temporary: Option<TemporaryFile>,
 }
 
-/// A file that is removed in the end.
+/// File that is removed when dropped.
 struct TemporaryFile(PathBuf);
 
 impl Drop for TemporaryFile {
     fn drop(&mut self) {
-        // It may never have been there.
+        // The file may not exist.
         let _ = fs::remove_file(&self.0);
     }
 }
 
 impl FlightMcap {
-    /// Plans the file at `path`, if there is to be one; `ulog` is then where the flight's log must go.
+    /// Plans the MCAP file at `path`, if any. Sets `ulog` to a temporary file if the flight's ULog was not requested.
     pub(super) fn plan(path: Option<PathBuf>, ulog: &mut Option<PathBuf>) -> Result<Option<Self>, Failure> {
         let Some(path) = path else { return Ok(None) };
-        // With the process's number, so that two flights at once do not share it.
+        // The process id keeps two simultaneous flights from sharing the file.
         let temporary = ulog.is_none().then(|| path.with_extension(format!("{}.ulg", std::process::id())));
         let output = Output::new(&path, "--mcap")?;
         let ulog = ulog.get_or_insert_with(|| temporary.clone().unwrap_or_default()).clone();

@@ -1,4 +1,4 @@
-//! The command line: one module for each command.
+//! Command line, with one module per command.
 #![cfg_attr(
     not(feature = "all"),
     allow(dead_code, reason = "some of what commands share is used by those left out only")
@@ -15,7 +15,7 @@ mod progress;
 mod terminal;
 mod written;
 
-// Beside `sitl paper`.
+// Commands other than `sitl paper`.
 #[cfg(feature = "all")]
 mod aboard;
 #[cfg(feature = "all")]
@@ -113,12 +113,12 @@ enum Command {
 }
 
 impl Cli {
-    /// Returns the whole command line.
+    /// Returns the definition of the whole command line.
     pub(crate) fn program() -> Program {
         program::prepared(Self::command())
     }
 
-    /// Reads the command line; ends the program if it is wrong or asks for help.
+    /// Parses the command line; exits if it is wrong or asks for help.
     pub(crate) fn read() -> Self {
         let read = Self::program().try_get_matches().and_then(|matches| Self::from_arg_matches(&matches));
         read.unwrap_or_else(|error| program::advised(error).exit())

@@ -1,4 +1,4 @@
-//! Flights of comparisons and suites over seeds, and their manifest.
+//! Flights over several seeds, for comparisons and suites, and their manifest.
 
 use super::manifest;
 use super::progress::Progress;
@@ -8,7 +8,7 @@ use afbc_files::Folder;
 use afbc_scenario::Scenario;
 use std::path::PathBuf;
 
-/// Flies the scenarios, with as many seeds as are asked for or usual, and shows the progress.
+/// Flies the scenarios and shows progress. Without `seeds`, each scenario has its usual number of seeds.
 pub(super) fn fly(
     scenarios: Vec<Scenario>,
     seeds: Option<u64>,

@@ -1,4 +1,4 @@
-//! `--write PAGE`: a table in a document, between two marker lines.
+//! `--write PAGE`: writes a table between two marker lines of a document.
 
 use super::terminal::Failure;
 use afbc_files::place;
@@ -6,8 +6,8 @@ use afbc_report::markers;
 use std::fs;
 use std::path::Path;
 
-/// Writes what `table` returns between the lines `markers` of the page at `path`, which must be there; everything else
-/// of it stays, also what is changed before the table is ready.
+/// Writes the result of `table` between the lines `markers` of the page at `path`, which must exist. The rest of the
+/// page stays, including edits made while the table is computed.
 pub(crate) fn write(
     path: &Path,
     markers: [&str; 2],
@@ -22,10 +22,10 @@ pub(crate) fn write(
         };
         Ok(format!("{before}{table}{after}"))
     };
-    // Before the flights, too.
+    // Checked before the flights too.
     with("")?;
     let page = with(&table()?)?;
-    // Through a link, the page and not the link.
+    // If the path is a symbolic link, its target is written, and the link stays.
     let written = fs::canonicalize(path).and_then(|path| place(&path, |out| out.write_all(page.as_bytes())));
     Ok(written.map_err(|error| format!("{name}: cannot be written ({error})"))?)
 }

@@ -112,14 +112,14 @@ impl Plants {
 }
 
 impl Paper {
-    /// Flies, writes, prints.
+    /// Flies, writes the results and prints a table.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let (folder, flown) = self.flying.fly(self.scenarios()?, || self.place.open("paper"))?;
         report(&folder, &flown, &claims(&flown), self.json)?;
         Ok(ExitCode::from(u8::from(flown.iter().any(unexpectedly_lost))))
     }
 
-    /// Returns every combination requested.
+    /// Returns the scenarios of all requested combinations.
     fn scenarios(&self) -> Result<Vec<Scenario>, Failure> {
         let wanted = |u: &Uncertainty| self.inertia.include(u.inertia) && self.thrust.include(u.thrust);
         let uncertainties = if self.no_uncertainty {
@@ -139,7 +139,7 @@ impl Paper {
     }
 }
 
-/// True for a loss in any other than the `forces` reading.
+/// True if the vehicle was lost in a reading other than `forces`.
 fn unexpectedly_lost(flown: &Flown) -> bool {
     let reading = flown.scenario.case.and_then(|case| case.reading);
     flown.run.lost.is_some() && reading != Some(Reading::Forces)

@@ -1,4 +1,4 @@
-//! `sitl params`: the parameters of a vehicle, as ground stations' files.
+//! `sitl params`: converts the parameters of a vehicle from and to files of ground stations.
 
 use super::terminal::{Failure, print, say};
 use afbc_files::read::params::{Format, ParameterEntry, read, written};
@@ -74,7 +74,7 @@ enum Style {
 }
 
 impl Params {
-    /// Does what was asked.
+    /// Runs the requested action.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let (Action::Export { of, .. } | Action::Import { of, .. } | Action::Diff { of, .. }) = &self.action;
         let vehicle = vehicle_named(&of.vehicle)?;
@@ -106,12 +106,12 @@ fn act<const N: usize>(action: &Action, vehicle: &Vehicle) -> Result<(), Failure
         }
         Action::Import { file, of } => {
             let Some(path) = &of.store else { return Err("--store: missing; name the file to import into".into()) };
-            // On a copy, before the store is touched: a file that is refused makes and changes nothing.
+            // First on a copy of the table, so that a rejected file neither creates nor changes a store.
             let changes = take(&mut table.clone(), file)?;
             let mut store = open(path, vehicle, Flash::open)?;
             store.make_room().map_err(|error| failed(path, &error))?;
             load(&mut table, &mut store, path)?;
-            // Once more, on what is stored already.
+            // Applied again, on top of the stored values.
             take(&mut table, file)?;
             for name in &changes {
                 keep(&table, &mut store, *name).map_err(|error| failed(path, &error))?;
@@ -132,7 +132,7 @@ fn act<const N: usize>(action: &Action, vehicle: &Vehicle) -> Result<(), Failure
     Ok(())
 }
 
-/// Writes the present value of a parameter.
+/// Stores the current value of a parameter.
 fn keep<const N: usize>(table: &ParameterTable<N>, store: &mut Store<Flash>, name: RecordName) -> Result<(), Unkept> {
     let (Some(now), Some(image)) = (table.get(name), table.default_of(name)) else { return Ok(()) };
     let change = RecordChange::Set(name, (now.value.to_bits() != image.value.to_bits()).then_some(now.value));
@@ -145,7 +145,7 @@ fn keep<const N: usize>(table: &ParameterTable<N>, store: &mut Store<Flash>, nam
     }
 }
 
-/// Why a value was not written to a file.
+/// Error of storing a value in a file.
 type Unkept = Error<afbc_files::FlashError>;
 
 fn failed(path: &Path, error: &Unkept) -> String {
@@ -157,13 +157,13 @@ fn open(path: &Path, vehicle: &Vehicle, flash: fn(&Path) -> std::io::Result<Flas
     Ok(Store::open(flash, 0, hash(vehicle.name.as_bytes())).map_err(|error| failed(path, &error))?)
 }
 
-/// Sets `table` to what is stored; says what is not used.
+/// Sets `table` to the stored values; prints a notice about values that are not used.
 fn load<const N: usize>(table: &mut ParameterTable<N>, store: &mut Store<Flash>, path: &Path) -> Result<(), Failure> {
     let notice = |notice| say(&format!("{}: {notice}", path.display()));
     Ok(Kept::NOW.load(table, store, notice).map_err(|error| failed(path, &error))?)
 }
 
-/// Sets `table` to the values of a file; returns their names.
+/// Sets `table` to the values in a file; returns their names.
 fn take<const N: usize>(table: &mut ParameterTable<N>, file: &Path) -> Result<Vec<RecordName>, Failure> {
     let shown = file.display().to_string();
     let text = fs::read_to_string(file).map_err(|error| format!("{shown}: cannot be read ({error})"))?;
@@ -173,7 +173,7 @@ fn take<const N: usize>(table: &mut ParameterTable<N>, file: &Path) -> Result<Ve
         let unknown = || FileError::at(source, at, &name, "no such parameter; `sitl params export` lists them");
         let known = RecordName::new(&name).ok_or_else(unknown)?;
         table.get(known).ok_or_else(unknown)?;
-        // The reason begins with the name.
+        // The reason already begins with the name.
         table.put(known, value).map_err(|reason| FileError::at(source, at, "", reason.as_str()))?;
         names.push(known);
     }
@@ -181,7 +181,7 @@ fn take<const N: usize>(table: &mut ParameterTable<N>, file: &Path) -> Result<Ve
     Ok(names)
 }
 
-/// Parameters that are not as in the image, and what they are there.
+/// Returns the parameters that differ from their defaults, with the defaults.
 fn differing<const N: usize>(table: &ParameterTable<N>) -> Vec<(Parameter, f32)> {
     let image = |parameter: &Parameter| table.default_of(parameter.name).map_or(f32::NAN, |image| image.value);
     let both = table.iter().map(|parameter| (parameter, image(&parameter)));

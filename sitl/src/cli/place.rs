@@ -1,4 +1,4 @@
-//! Output folder: `--out` and `--force`.
+//! Output folder of a command: `--out` and `--force`.
 
 use super::manifest;
 use super::terminal::Failure;
@@ -20,13 +20,13 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// Returns its path, by default `out/<name>`.
+    /// Returns the folder's path, by default `out/<name>`.
     pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.out.clone().unwrap_or_else(|| Path::new("out").join(name))
     }
 
-    /// Opens the folder for the results of this program's command line for `name`, after checking that it can be used
-    /// for them: it holds nothing, or what the same command line made.
+    /// Opens the folder for the results of this command line. The folder must be empty, or hold results of the same
+    /// command line. `name` selects the default folder.
     pub(crate) fn open(&self, name: &str) -> Result<Folder, Failure> {
         Ok(Folder::open(&self.path(name), &manifest::own_command().join(" "), name, self.force)?)
     }

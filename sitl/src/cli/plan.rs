@@ -1,4 +1,4 @@
-//! `sitl fly PLAN.plan`: a plan of QGroundControl.
+//! `sitl fly PLAN.plan`: flies a plan of QGroundControl.
 
 use super::aboard::{AboardLogs, LogOutputs};
 use super::interrupt;
@@ -10,12 +10,12 @@ use afbc_serve::{QgcPlan, ServedVehicle, fleet, fly_plan};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// What it is flown in: place, weather and instruments.
+/// Scenario with the place, weather and instruments of the flight.
 const SCENARIO: &str = "outdoor";
 /// Longest flight \[s\].
 const LONGEST_S: f64 = 3600.0;
 
-/// A plan to be flown.
+/// Flight of a plan.
 pub(super) struct PlanFlight {
     pub(super) path: PathBuf,
     pub(super) on: OnVehicle,
@@ -26,14 +26,14 @@ pub(super) struct PlanFlight {
 }
 
 impl PlanFlight {
-    /// Flies it, with mission, geofence and rally points; exits with 1 if the mission has not been completed.
+    /// Flies mission, geofence and rally points of the plan; exits with 1 if the mission is not completed.
     pub(super) fn run(mut self) -> Result<ExitCode, Failure> {
         let file = self.path.display().to_string();
         let text = std::fs::read_to_string(&self.path).map_err(|error| format!("{file}: {error}"))?;
         let plan = QgcPlan::read(&file, &text)?;
         let scenario = afbc_scenario::built_in(SCENARIO).ok_or("the scenario is missing")?.read()?;
         let scenario = self.on.put(scenario)?;
-        // On the ground.
+        // The vehicle starts on the ground.
         let stands = fleet(&scenario, 1)?.pop().ok_or("there is no vehicle")?;
         let mut vehicle = ServedVehicle::new(&stands, 1, None)?;
         if let Some((place, altitude_m)) = plan.home
@@ -49,7 +49,7 @@ impl PlanFlight {
         ulog.into_iter().for_each(|(_, files)| vehicle.log(files));
         let end = fly_plan(&mut vehicle, &plan, self.duration.unwrap_or(LONGEST_S), &mut |line| say(line));
         interrupt::is_too_late();
-        // A log that has failed costs no other result; the failure is told in the end.
+        // If a log fails, all other results are still written; the error is reported at the end.
         let logged = vehicle.end_log();
         let recorded = exact.map(|(path, file)| file.finish().map_err(|error| unwritten(&path, &error)));
         let converted = mcap.map(FlightMcap::finish);
@@ -78,7 +78,7 @@ impl PlanFlight {
     }
 }
 
-/// Returns the number of the last item.
+/// Returns the number of the last mission item.
 fn last(plan: &QgcPlan) -> u16 {
     plan.mission.len().saturating_sub(1) as u16
 }

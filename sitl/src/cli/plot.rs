@@ -1,4 +1,4 @@
-//! `sitl plot`.
+//! `sitl plot`: draws figures for papers from logs.
 
 use super::terminal::{Failure, print};
 use afbc_files::Output;
@@ -10,7 +10,7 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Millimetres in an inch and in a point.
+/// Millimetres per inch and per point.
 const INCH_MM: f64 = 25.4;
 const POINT_MM: f64 = INCH_MM / 72.0;
 
@@ -86,7 +86,7 @@ pub(crate) struct Plot {
     y_title: Vec<String>,
 }
 
-/// Reads a length \[mm\].
+/// Parses a length \[mm\].
 fn length(text: &str) -> Result<f64, String> {
     let units = [("mm", 1.0), ("cm", 10.0), ("in", INCH_MM), ("pt", POINT_MM)];
     let number = units.iter().find_map(|(unit, mm)| Some(text.strip_suffix(unit)?.trim().parse::<f64>().ok()? * mm));
@@ -99,23 +99,23 @@ fn percent(text: &str) -> Result<f64, &'static str> {
     text.parse().ok().filter(|percent| (0.0..=100.0).contains(percent)).ok_or("it must be from 0 to 100, such as 80")
 }
 
-/// A log with its name in the legend.
+/// Log and its name in the legend.
 struct Named {
     name: String,
     columns: LogColumns,
 }
 
-/// The lines of one name in a panel.
+/// Lines of one name in a panel.
 struct Collected {
     name: String,
     column: usize,
-    /// Whether they are rows of flights rather than flights.
+    /// True for rows of a campaign, each of which is a flight; false for flights over time.
     is_rows: bool,
     all: Vec<Points>,
 }
 
 impl Plot {
-    /// Reads, draws, prints.
+    /// Reads the logs, draws and writes the figure.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let out = self.out.display();
         let Some(format) = FigureFormat::of(&self.out, self.dpi.into()) else {
@@ -127,7 +127,7 @@ impl Plot {
             (None, Some(first), Some(y)) => first.columns.usual_x(y)?,
             (x, ..) => x.clone().unwrap_or_default(),
         };
-        // The time of one topic stands for that of all.
+        // Topics have times of their own; the title names the time without its topic.
         let bare = x.rsplit('.').next().unwrap_or_default().to_owned();
         let panels = self.y.iter().enumerate().map(|(index, columns)| {
             let columns: Vec<&str> = columns.split(',').map(str::trim).collect();
@@ -153,7 +153,7 @@ impl Plot {
         Ok(ExitCode::SUCCESS)
     }
 
-    /// Every column of every panel.
+    /// Returns the columns of all panels.
     fn columns(&self) -> impl Iterator<Item = &str> {
         self.y.iter().flat_map(|columns| columns.split(',')).map(str::trim)
     }
@@ -161,7 +161,7 @@ impl Plot {
     /// Reads the logs.
     fn logs(&self) -> Result<Vec<Named>, Failure> {
         let split = |log: &String| match log.split_once('=') {
-            // A file may have an equals sign in its own name.
+            // A file name may itself contain an equals sign.
             Some((name, path)) if !Path::new(log).exists() => (Some(name.to_owned()), PathBuf::from(path)),
             _ => (None, PathBuf::from(log)),
         };
@@ -208,7 +208,7 @@ impl Plot {
             let Collected { name, column, is_rows, all } = collected;
             let place = names.iter().position(|other| *other == name).unwrap_or_default();
             let title = columns.get(column).map(|column| axis_title(column)).unwrap_or_default();
-            // Of one log, its columns have a colour each; of several, a dash each.
+            // Columns of a single log get a colour each; columns of several logs get a dash pattern each.
             let (label, color, dash) = match (columns.len(), names.len()) {
                 (1, _) if self.y.iter().any(|columns| columns.contains(',')) => {
                     (name.clone(), contender_color(&name), 0)
@@ -224,8 +224,8 @@ impl Plot {
     }
 }
 
-/// Returns what is drawn of flights of one name: the only one; or the median and a band, of rows and of flights over
-/// time; or all of them.
+/// Returns the curves of one name: median and band for a campaign's rows and for several flights over time; otherwise
+/// all flights.
 fn summarised(all: Vec<Points>, is_rows: bool, percent: f64) -> (Vec<Points>, Vec<(f64, [f64; 2])>) {
     let rises = |points: &Points| points.windows(2).all(|two| matches!(two, [a, b] if a.0 < b.0));
     let band = match all.len() {
@@ -236,7 +236,7 @@ fn summarised(all: Vec<Points>, is_rows: bool, percent: f64) -> (Vec<Points>, Ve
     (vec![band.median], band.edges)
 }
 
-/// Returns the length of what names of files have in common up to a hyphen, if they are not all the same.
+/// Returns the length of the common prefix of file names, up to a hyphen; 0 if all names are equal.
 fn common(stems: &[String]) -> usize {
     let Some(first) = stems.first().filter(|first| stems.iter().any(|stem| stem != *first)) else { return 0 };
     let ends = first.match_indices('-').map(|(at, _)| at + 1);

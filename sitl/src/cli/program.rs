@@ -1,12 +1,12 @@
-//! The command line as it is parsed: what is the same for all of its commands.
+//! Parsing that is common to all commands.
 
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Arg, Command, Error};
 
-/// Returns `command` and its own commands with arguments that may be negative numbers, and that a shell completes,
-/// where there is more than `paper`.
+/// Prepares `command` and its subcommands: arguments may be negative numbers and, in the full program, are completed
+/// by shells.
 ///
-/// `--duration -5` is a wrong duration then, not an unknown option.
+/// `--duration -5` is then reported as a wrong duration, not as an unknown option.
 pub(super) fn prepared(command: Command) -> Command {
     #[cfg(feature = "all")]
     let command = super::completion::completed(command);
@@ -17,7 +17,7 @@ fn negative(arg: Arg) -> Arg {
     if arg.get_action().takes_values() { arg.allow_negative_numbers(true) } else { arg }
 }
 
-/// Returns the error without the advice to take an unknown option for a file's name.
+/// Removes clap's advice to pass an unknown option as a file name.
 pub(super) fn advised(mut error: Error) -> Error {
     if error.kind() == ErrorKind::UnknownArgument {
         error.remove(ContextKind::Suggested);

@@ -1,4 +1,4 @@
-//! Progress of a command on stderr: a bar on a terminal, lines otherwise.
+//! Progress of a command on stderr: a bar on a terminal, otherwise lines.
 
 use super::terminal::say;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -8,17 +8,17 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Without a terminal there is a line at the start, after each further tenth, ...
+/// Number of parts of the work. Without a terminal, a line is written after each part.
 const PARTS: u64 = 10;
-/// ... and after this long without one, which doubles ...
+/// Time without a line after which a further line is written. Doubles with each such line.
 const SILENCE: Duration = Duration::from_secs(5);
-/// ... up to this, so that the log of a long command stays short.
+/// Upper limit of the doubled time, so that the log of a long command stays short.
 const SILENCE_MAX: Duration = Duration::from_secs(30);
 
 /// Progress of a command.
 pub(crate) struct Progress {
     shared: Arc<Shared>,
-    /// Ends the [thread](remind) that writes lines after a silence, when dropped.
+    /// Stops the [thread](remind) that writes lines after a silence, when dropped.
     silence: Option<(Sender<()>, JoinHandle<()>)>,
 }
 
@@ -28,12 +28,12 @@ struct Shared {
     unit: &'static str,
     total: u64,
     start: Instant,
-    /// The bar; none without a terminal.
+    /// Progress bar; `None` without a terminal.
     bar: Option<ProgressBar>,
     state: Mutex<State>,
 }
 
-/// State that changes.
+/// Mutable state.
 struct State {
     count: Count,
     /// Text between count and rate.
@@ -46,13 +46,13 @@ struct State {
 #[derive(Clone, Copy, Default)]
 struct Count {
     done: u64,
-    /// Number done by an earlier run, which does not count for the rate.
+    /// Number done by an earlier run, which is left out of the rate.
     before: u64,
 }
 
 impl Progress {
-    /// Creates the progress of `total` `unit`, such as flights, `before` of which an earlier run has done; `name`
-    /// identifies it in a log.
+    /// Creates the progress of `total` units, such as flights. An earlier run has done `before` of them. `name`
+    /// identifies the progress in a log.
     pub(crate) fn new(name: &str, unit: &'static str, total: u64, before: u64) -> Self {
         let start = Instant::now();
         let bar = stderr().is_terminal().then(|| bar(total));
@@ -88,10 +88,10 @@ impl Progress {
         Progress { shared: Arc::new(shared), silence: None }
     }
 
-    /// Adds to the number done.
+    /// Adds to the number of units done.
     pub(crate) fn add(&self, more: u64) {
         let mut state = self.shared.state();
-        // In 128 bits, in which no product of two counts overflows.
+        // 128 bits, so that the product of two counts cannot overflow.
         let part = |done: u64| u128::from(done) * u128::from(PARTS) / u128::from(self.shared.total.max(1));
         let old = part(state.count.done);
         state.count.done += more;
@@ -125,7 +125,7 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Updates the bar or, without one, writes a line if one is `due`.
+    /// Updates the bar. Without a bar, writes a line if one is `due`.
     fn show(&self, state: &mut State, due: bool) {
         let text = || words(state.count, self.total, self.unit, &state.note, self.start.elapsed());
         match &self.bar {
@@ -150,7 +150,8 @@ fn bar(total: u64) -> ProgressBar {
     bar
 }
 
-/// Formats `120 of 10000 flights, 60 per second, 165 s left`; without rate and wait before the first.
+/// Formats `120 of 10000 flights, 60 per second, 165 s left`. Leaves rate and remaining time out before the first unit
+/// is done.
 fn words(Count { done, before }: Count, total: u64, unit: &str, note: &str, elapsed: Duration) -> String {
     let mut text = format!("{done} of {total} {unit}{note}");
     let (flown, seconds) = ((done - before) as f64, elapsed.as_secs_f64());
@@ -160,7 +161,7 @@ fn words(Count { done, before }: Count, total: u64, unit: &str, note: &str, elap
     text
 }
 
-/// Formats a rate as a whole number, per the shortest time that contains several.
+/// Formats a rate as a whole number, per second, minute or hour, whichever is the first to give several units.
 fn rate(per_s: f64) -> String {
     const SEVERAL: f64 = 9.5;
     let (rate, time) = match per_s {
@@ -171,7 +172,7 @@ fn rate(per_s: f64) -> String {
     format!("{rate:.0} {time}")
 }
 
-/// Formats a waiting time of at least a second.
+/// Formats the remaining time, at least a second.
 fn wait(seconds: f64) -> String {
     match seconds {
         _ if seconds < 100.0 => format!("{:.0} s", seconds.ceil().max(1.0)),

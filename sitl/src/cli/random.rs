@@ -1,4 +1,4 @@
-//! `sitl compare --suite random`: flights drawn over vehicles.
+//! `sitl compare --suite random`: random flights on several vehicles.
 
 use super::progress::Progress;
 use super::target::Target;
@@ -20,7 +20,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// One line on the suite.
+/// Description of the suite, in one line.
 pub(super) const DESCRIPTION: &str = "drawn from --seed: paths, speeds, wind, payloads, faults, on every vehicle";
 
 /// Options of the suite.
@@ -57,25 +57,25 @@ enum Instruments {
     Outdoor,
 }
 
-/// Reads a length of flights.
+/// Parses the duration of flights.
 fn duration(text: &str) -> Result<f64, String> {
     let range = afbc_scenario::DURATION;
     let seconds = text.parse().ok().filter(|seconds: &f64| range.check(*seconds).is_ok());
     seconds.ok_or_else(|| format!("it must lie within {} to {} seconds", range.min, range.max))
 }
 
-/// True if `path` names this suite.
+/// True if `path` is the name of this suite.
 pub(super) fn is_named(path: &Path) -> bool {
     path == Path::new(NAME)
 }
 
-/// Number of flights of a seed.
+/// Returns the number of flights per seed.
 pub(super) const fn flights() -> usize {
     BUILT_IN.len() * FLIGHTS as usize
 }
 
 impl Options {
-    /// The first option that was given, by name.
+    /// Returns the name of the first option that was given.
     pub(super) fn given(&self) -> Option<&'static str> {
         let Options { seed, flights, duration, on_estimate, from } = self;
         let all = [
@@ -88,7 +88,7 @@ impl Options {
         all.into_iter().find_map(|(given, name)| given.then_some(name))
     }
 
-    /// Checks that what was given is for the suite `name`, of these two.
+    /// Checks that the options given apply to the suite `name`, which is one of two.
     pub(super) fn are_for(&self, name: &str) -> Result<(), Failure> {
         let all = [
             (self.duration.is_some(), "--duration", ROUGH),
@@ -101,12 +101,12 @@ impl Options {
         }
     }
 
-    /// The contenders of `--from`.
+    /// Returns the contenders of `--from`.
     pub(super) fn own(&self) -> Result<Vec<Contender>, Failure> {
         Ok(self.from.as_ref().map(Target::scenario).transpose()?.map_or_else(Vec::new, |scenario| scenario.contenders))
     }
 
-    /// Draws and flies; then writes the folder and prints, or writes the tables into a page.
+    /// Draws and flies. Then writes the results' folder and prints a table, or writes the tables into a page.
     pub(super) fn run(
         &self,
         vehicle: Option<Vehicle>,
@@ -156,7 +156,8 @@ impl Options {
     }
 }
 
-/// Writes the manifest of the files: every flight decides, and the first of each vehicle is written out.
+/// Writes the manifest of the files. All flights enter the fingerprint; the first flight of each vehicle is written
+/// out.
 fn record(folder: &Folder, files: &[PathBuf], flown: &[FlownDraw]) -> Result<(), Failure> {
     let all = flown.iter().map(|flown| (&flown.flight.scenario, vec![flown.flight.scenario.seed]));
     let all: Vec<manifest::Flown<'_>> = all.collect();
@@ -166,7 +167,7 @@ fn record(folder: &Folder, files: &[PathBuf], flown: &[FlownDraw]) -> Result<(),
     manifest::write(folder, files, &all, &firsts)
 }
 
-/// Flies after `ready`, when all flights are known to be right.
+/// Draws all flights, calls `ready` once they are known to be valid, and flies them.
 fn fly(
     random: &Random,
     [contenders, own]: [&[Contender]; 2],

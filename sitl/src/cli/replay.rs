@@ -1,4 +1,4 @@
-//! `sitl replay`.
+//! `sitl replay`: runs a recorded flight through the estimator.
 
 use super::exact::Exact;
 use super::interrupt;
@@ -56,7 +56,7 @@ fn compass_error(text: &str) -> Result<f32, String> {
 }
 
 impl Replay {
-    /// Reads, runs, writes, prints.
+    /// Reads and replays the log, writes the results and prints them.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         interrupt::ends_it()?;
         if self.exact.exact {

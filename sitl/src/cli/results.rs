@@ -1,4 +1,4 @@
-//! `sitl results`: the table of `docs/results.md`.
+//! `sitl results`: makes the table of `docs/results.md`.
 
 use super::json::Json;
 use super::progress::Progress;
@@ -23,7 +23,7 @@ pub(crate) struct Results {
 }
 
 impl Results {
-    /// Flies, then prints or writes.
+    /// Flies, then prints or writes the table.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let Some(path) = self.write else {
             let flown = fly()?;

@@ -1,4 +1,4 @@
-//! `sitl compare --suite rough-estimate`: what vehicles are not told of their sensors.
+//! `sitl compare --suite rough-estimate`: flights with sensor errors unknown to the vehicle.
 
 use super::progress::Progress;
 use super::random;
@@ -15,20 +15,20 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// One line on the suite.
+/// Description of the suite, in one line.
 pub(super) const DESCRIPTION: &str = "drawn from --seed: sensors that do what no vehicle is told, on every vehicle";
 
-/// True if `path` names this suite.
+/// True if `path` is the name of this suite.
 pub(super) fn is_named(path: &Path) -> bool {
     path == Path::new(NAME)
 }
 
-/// Number of flights of a seed.
+/// Returns the number of flights per seed.
 pub(super) fn flights() -> usize {
     BUILT_IN.len() * rough::names().count()
 }
 
-/// Draws and flies; then writes the folder and prints, or writes the table into a page.
+/// Draws and flies. Then writes the results' folder and prints a table, or writes the table into a page.
 pub(super) fn run(
     options: &random::Options,
     vehicle: Option<Vehicle>,
@@ -67,7 +67,7 @@ pub(super) fn run(
     let written = report::write(&folder, &results)?;
     let all: Vec<manifest::Flown<'_>> =
         flown.iter().map(|flown| (&flown.flight.scenario, vec![flown.flight.scenario.seed])).collect();
-    // Every flight decides; the first of each class is written out.
+    // All flights enter the fingerprint; the first flight of each class is written out.
     let mut classes = BTreeSet::new();
     let firsts = flown.iter().zip(&all).filter(|(flown, _)| classes.insert(flown.flight.class));
     let firsts: Vec<manifest::Flown<'_>> = firsts.map(|(_, one)| one.clone()).collect();
@@ -78,7 +78,7 @@ pub(super) fn run(
     Ok(ExitCode::SUCCESS)
 }
 
-/// Flies after `ready`, when all flights are known to be right.
+/// Draws all flights, calls `ready` once they are known to be valid, and flies them.
 fn fly(
     rough: &Rough,
     contender: &Contender,

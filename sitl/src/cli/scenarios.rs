@@ -71,7 +71,7 @@ pub(crate) struct Check {
 }
 
 impl Check {
-    /// Prints a summary of the file.
+    /// Checks the file and prints a summary, or writes the polynomials of its path.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         if let Some(path) = self.polynomials {
             let scenario = self.scenario.scenario()?;

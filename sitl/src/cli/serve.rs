@@ -1,4 +1,4 @@
-//! `sitl serve`.
+//! `sitl serve`: serves simulated vehicles over MAVLink.
 
 use super::target::Target;
 use super::terminal::{Failure, INTERRUPTED, print, say};
@@ -20,7 +20,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Most vehicles.
+/// Largest number of vehicles.
 const MOST: i64 = VEHICLES_MAX as i64;
 
 /// Serve a simulated vehicle to ground stations and companion computers, by MAVLink
@@ -119,7 +119,7 @@ pub(crate) struct Serve {
 }
 
 impl Serve {
-    /// Serves until it is asked to end.
+    /// Serves until a signal or a command ends it.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let target = if self.indoors { Target::from("mocap") } else { self.scenario.clone() };
         let mut scenario = self.on.put(target.scenario()?)?;
@@ -154,14 +154,14 @@ impl Serve {
             }
         }
         let addresses = self.addresses()?;
-        // On loopback every peer is on this machine, which is as good as holding the wire.
+        // Peers on loopback are on this machine, so they are trusted like a wired link.
         server.set_wired(addresses.bind.is_loopback());
         let mut ports = Ports::open(&addresses, server.vehicles().len())?;
         let mut door = self.web.map(|address| self.door(address)).transpose()?;
         let stop = Arc::new(AtomicBool::new(false));
         let stopper = Arc::clone(&stop);
         ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
-        // Only now: what is refused leaves no file behind.
+        // Created only now, so that a refused command leaves no file behind.
         let logs = exact_logs.iter().map(|output| Ok::<_, Failure>((output.path(), LogFile::create(output)?)));
         let logs = logs.collect::<Result<Vec<_>, _>>()?;
         server.record(logs.iter().map(|(_, log)| log.clone()).collect());
@@ -183,7 +183,7 @@ impl Serve {
         let mut output = LineOutput::to(stdout())?;
         let answers = output.clone();
         let mut lines = match rate {
-            // Time stands still until the answers are read: none is lost.
+            // Time waits until the answers are read, so that none is lost.
             TimeRate::Lockstep => Lines::paced(BufReader::new(stdin()), move || answers.wait_for_room()),
             TimeRate::Times(_) => Lines::of(BufReader::new(stdin())),
         };
@@ -196,7 +196,7 @@ impl Serve {
         Ok(ExitCode::from(if end == RunEnd::Stopped { INTERRUPTED } else { 0 }))
     }
 
-    /// Opens the page's port.
+    /// Opens the port of the page.
     fn door(&self, address: SocketAddr) -> Result<WebDoor, Failure> {
         let token = match &self.web_token {
             Some(path) => {
@@ -210,14 +210,14 @@ impl Serve {
         Ok(WebDoor::open(address, Admission::at(address.ip(), token)?)?)
     }
 
-    /// Returns the files of the exact logs, if they are wanted.
+    /// Returns the output files of the exact logs, if requested.
     fn exact_logs(&self) -> Result<Vec<Output>, Failure> {
         let Some(path) = &self.exact_log else { return Ok(Vec::new()) };
         let paths = (self.system..).take(self.vehicles.into()).map(|system| file(path, system, self.vehicles));
         Ok(paths.map(|path| Output::new(&path, "--exact-log")).collect::<Result<_, _>>()?)
     }
 
-    /// Returns the files of the black boxes, or the folders for them, if they are wanted.
+    /// Returns the files of the black boxes, or folders for them, if requested.
     fn black_boxes(&self) -> Result<Vec<PathBuf>, Failure> {
         let Some(path) = &self.ulog else { return Ok(Vec::new()) };
         let of = |system: u8| match self.vehicles {
@@ -256,12 +256,12 @@ impl Serve {
     }
 }
 
-/// Returns the line on an exact log that cannot be written.
+/// Returns the message for an exact log that cannot be written.
 pub(super) fn unwritten(path: &Path, error: &io::Error) -> String {
     format!("{}: cannot be written ({error}); choose another file for --exact-log", path.display())
 }
 
-/// Returns the file of one of so many vehicles.
+/// Returns the file of one vehicle. With several vehicles, its name ends in the system id.
 fn file(path: &Path, system: u8, vehicles: u8) -> PathBuf {
     if vehicles == 1 {
         return path.into();
@@ -271,7 +271,7 @@ fn file(path: &Path, system: u8, vehicles: u8) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// Returns a file's extension after a system id.
+/// Returns the system id followed by the path's extension.
 fn extension(path: &Path, system: u8) -> OsString {
     let mut extension = OsString::from(system.to_string());
     if let Some(own) = path.extension() {
@@ -281,7 +281,7 @@ fn extension(path: &Path, system: u8) -> OsString {
     extension
 }
 
-/// Finds the address of a peer, of the same family as the one to serve at.
+/// Resolves the address of a peer, in the address family of `bind`.
 fn address(text: &str, option: &str, bind: IpAddr) -> Result<SocketAddr, Failure> {
     let found = text.to_socket_addrs().map_err(|error| {
         format!("{option} {text}: no such address ({error}); write HOST:PORT, as in 127.0.0.1:14550, or none")
@@ -290,7 +290,7 @@ fn address(text: &str, option: &str, bind: IpAddr) -> Result<SocketAddr, Failure
     Ok(same.ok_or_else(|| format!("{option} {text}: it cannot be reached from {bind}; choose another --bind"))?)
 }
 
-/// Reads where the page is served: an address with or without a port, or a port.
+/// Parses the address of the page: an IP address with or without a port, or a port.
 fn web_address(text: &str) -> Result<SocketAddr, String> {
     const PORT: u16 = 8590;
     let whole = text.parse().ok();

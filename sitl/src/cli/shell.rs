@@ -1,4 +1,4 @@
-//! `sitl completions` and `sitl man`: what a shell and a reader of manuals want.
+//! `sitl completions` and `sitl man`: shell completions and manual pages.
 
 use super::terminal::{Failure, print};
 use afbc_files::Output;
@@ -11,7 +11,7 @@ use std::process::ExitCode;
 
 /// Name of the program.
 const NAME: &str = "sitl";
-/// Variable by which a shell asks for completions, clap's default.
+/// Environment variable by which a shell requests completions, clap's default.
 const VARIABLE: &str = "COMPLETE";
 
 /// Print completions for a shell
@@ -26,7 +26,7 @@ pub(crate) struct Completions {
 }
 
 impl Completions {
-    /// Prints the script for the whole command line.
+    /// Prints the completion script.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let (shell, mut script) = (self.shell.to_string(), Vec::new());
         let shells = Shells::builtins();
@@ -52,7 +52,7 @@ pub(crate) struct Man {
 }
 
 impl Man {
-    /// Writes the pages of the whole command line.
+    /// Writes the pages of all commands.
     pub(super) fn run(self, program: Command) -> Result<ExitCode, Failure> {
         let Man { folder, force } = self;
         if !folder.is_dir() {
@@ -72,7 +72,7 @@ impl Man {
     }
 }
 
-/// Returns the pages of a command and of those in it: names of files, and texts.
+/// Returns the manual pages of a command and its subcommands: file names and texts.
 fn pages(command: &Command) -> io::Result<Vec<(String, Vec<u8>)>> {
     let page = clap_mangen::Man::new(command.clone());
     let mut text = Vec::new();

@@ -1,4 +1,4 @@
-//! `sitl compare --suite` and `sitl suites`: named lists of flights.
+//! `sitl compare --suite` and `sitl suites`: flies or lists suites, which are named lists of flights.
 
 use super::terminal::{Failure, print};
 use super::written::Output;
@@ -50,7 +50,8 @@ fn line(name: &str, flights: usize, description: &str) -> String {
     format!("{name:<15}{flights:>4} flights  {description}\n")
 }
 
-/// Flies `suite` under `contenders`; then writes the folder and prints, or writes the table into a page.
+/// Flies `suite` under `contenders`. Then writes the results' folder and prints a table, or writes the table into a
+/// page.
 pub(super) fn run(
     suite: &Suite,
     contenders: &[Contender],
@@ -81,7 +82,7 @@ pub(super) fn run(
     Ok(ExitCode::SUCCESS)
 }
 
-/// Flies the suite, after `ready`, when all its scenarios are known to be right.
+/// Flies the suite; calls `ready` before the first flight, once all scenarios are known to be valid.
 fn fly(
     suite: &Suite,
     contenders: &[Contender],

@@ -1,4 +1,4 @@
-//! A scenario or campaign named on the command line.
+//! Scenario, campaign or vehicle named on the command line.
 
 use super::terminal::Failure;
 use afbc_campaign::Campaign;
@@ -10,7 +10,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// The name of a built-in one, or the path of a file.
+/// Name of a built-in scenario, campaign or vehicle, or path of a file.
 #[derive(Clone, Debug)]
 pub(crate) struct Target(PathBuf);
 
@@ -27,7 +27,7 @@ impl fmt::Display for Target {
 }
 
 impl Target {
-    /// Returns what was given, as a path.
+    /// Returns the argument as a path.
     pub(crate) fn path(&self) -> &Path {
         &self.0
     }
@@ -47,7 +47,7 @@ impl Target {
         Ok(subject::any(self.no_plan()?)?)
     }
 
-    /// Returns what was given, unless it is a ground station's file.
+    /// Returns the argument as a path; fails if it is a ground station's plan.
     fn no_plan(&self) -> Result<&Path, Failure> {
         match is_plan(&self.0) && self.0.exists() {
             true => {
@@ -58,13 +58,13 @@ impl Target {
     }
 }
 
-/// True if a path names a plan of QGroundControl, or a file of any name holds a mission as text.
+/// True if the path names a plan of QGroundControl, or a file that holds a mission as text.
 pub(super) fn is_plan(path: &Path) -> bool {
     let is_mission = || {
         let mut head = [0; 12];
         let read = File::open(path).and_then(|mut file| file.read(&mut head));
         read.is_ok_and(|length| head.get(..length).is_some_and(afbc_serve::is_waypoint_file))
     };
-    // Of a pipe, what is read here would be gone.
+    // A pipe is not read here, since its content would be lost.
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("plan")) || path.is_file() && is_mission()
 }

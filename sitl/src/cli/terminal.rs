@@ -15,19 +15,19 @@ pub(crate) fn say(line: &str) {
     let _ = writeln!(io::stderr().lock(), "{line}");
 }
 
-/// Columns of text for a reader that has no terminal.
+/// Width of text if stdout is no terminal.
 const COLUMNS: usize = 100;
-/// Fewest columns that text is wrapped at.
+/// Smallest width at which text is wrapped.
 const COLUMNS_MIN: usize = 40;
 
-/// Returns the columns of the terminal that stdout is, or that $COLUMNS says.
+/// Returns the width of the terminal on stdout or, without one, the value of $COLUMNS.
 pub(crate) fn columns() -> usize {
     let shown = terminal_size::terminal_size_of(io::stdout()).map(|(Width(columns), _)| usize::from(columns));
     let said = || std::env::var("COLUMNS").ok()?.parse().ok();
     shown.or_else(said).unwrap_or(COLUMNS).max(COLUMNS_MIN)
 }
 
-/// Prints to stdout. A closed pipe, as in `sitl | head`, is no failure.
+/// Prints to stdout. A closed pipe, as in `sitl | head`, is not an error.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     match io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {

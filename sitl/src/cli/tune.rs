@@ -1,4 +1,4 @@
-//! `sitl tune`.
+//! `sitl tune`: searches for gains.
 
 use super::fleet::Fleet;
 use super::json::Json;
@@ -82,7 +82,7 @@ pub(crate) struct Tune {
 }
 
 impl Tune {
-    /// Searches, then prints or writes.
+    /// Searches, then prints or writes the gains.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let scenarios = self.scenarios.iter().map(Target::scenario).collect::<Result<Vec<_>, _>>()?;
         let from = self.from.as_ref().map(Target::scenario).transpose()?;
@@ -103,7 +103,7 @@ impl Tune {
         if self.flying {
             start = flying(start.kind(), vehicle.as_ref())?;
         }
-        // The conditions are of the same task as the training flights.
+        // The conditions belong to the training flights, so they apply only to these.
         let alike = scenarios.is_empty();
         if alike {
             start = start.monitored();
@@ -118,7 +118,7 @@ impl Tune {
             Some(vehicle) => (tune::training_on(vehicle)?, tune::held_out_on(vehicle)?, tune::conditions_on(vehicle)?),
             None => (tune::training()?, tune::held_out()?, tune::conditions()?),
         };
-        // Before a long search.
+        // Checked before the search, which may take long.
         let output = self.out.as_deref().map(|out| Output::forcible(out, "--out", self.force)).transpose()?;
 
         let stop = Arc::new(AtomicBool::new(false));
@@ -138,7 +138,7 @@ impl Tune {
         if let Some(output) = &output {
             let text = report()?;
             if let Err(error) = output.place(|to| to.write_all(text.as_bytes())) {
-                // What was found in hours is not lost.
+                // Printed instead, so that the result of a long search is not lost.
                 print(&text)?;
                 return Err(error.into());
             }
@@ -156,8 +156,8 @@ impl Tune {
     }
 }
 
-/// Returns the contender `name`: of `scenario`, with the gains that fly on `vehicle` if there is one; or a law with
-/// hand-tuned gains.
+/// Returns the contender `name` of `scenario` or, if it has none, the law of that name with hand-tuned gains. With a
+/// `vehicle`, a scenario's contender gets the vehicle's gains.
 fn start(name: &str, scenario: Option<&Scenario>, vehicle: Option<&Vehicle>) -> Result<Contender, Failure> {
     let own = scenario.map_or(&[][..], |scenario| &scenario.contenders);
     if let Some(contender) = own.iter().find(|contender| contender.name == name).cloned() {
@@ -177,7 +177,7 @@ fn start(name: &str, scenario: Option<&Scenario>, vehicle: Option<&Vehicle>) -> 
     })
 }
 
-/// Returns the law with the gains that fly.
+/// Returns the law with the gains of the profile `flight`.
 fn flying(kind: ControllerKind, vehicle: Option<&Vehicle>) -> Result<Contender, Failure> {
     let contender = Contender::of(kind, Profile::Flight);
     Ok(match vehicle {
@@ -186,7 +186,7 @@ fn flying(kind: ControllerKind, vehicle: Option<&Vehicle>) -> Result<Contender, 
     })
 }
 
-/// Reads a step size.
+/// Parses a step size.
 fn step(text: &str) -> Result<f64, String> {
     let step = text.parse().ok().filter(|step| (0.001..=1.0).contains(step));
     step.ok_or_else(|| "a number from 0.001 to 1".into())

@@ -1,4 +1,4 @@
-//! `--vehicle` and `sitl vehicles`: what flies.
+//! `--vehicle` and `sitl vehicles`: selects and lists vehicles.
 
 use super::target::Target;
 use super::terminal::{Failure, print};
@@ -22,12 +22,12 @@ pub(crate) struct OnVehicle {
 }
 
 impl OnVehicle {
-    /// The vehicle that was asked for, checked.
+    /// Returns the requested vehicle, checked.
     pub(crate) fn vehicle(&self) -> Result<Option<Vehicle>, Failure> {
         Ok(self.vehicle.as_deref().map(vehicle_named).transpose()?)
     }
 
-    /// The scenario on the vehicle that was asked for, or as it is.
+    /// Returns the scenario on the requested vehicle, or unchanged.
     pub(crate) fn put(&self, scenario: Scenario) -> Result<Scenario, Failure> {
         match self.vehicle()? {
             Some(vehicle) => Ok(scenario.on(&vehicle, Profile::Flight)?),
@@ -35,7 +35,7 @@ impl OnVehicle {
         }
     }
 
-    /// The campaign on the vehicle that was asked for, or as it is.
+    /// Returns the campaign on the requested vehicle, or unchanged.
     pub(crate) fn campaign(&self, campaign: Campaign) -> Result<Campaign, Failure> {
         if self.vehicle.is_none() {
             return Ok(campaign);
@@ -45,15 +45,16 @@ impl OnVehicle {
         Ok(campaign)
     }
 
-    /// The vehicle as the firmware's build script takes it: the name of a built-in one, or an absolute path.
+    /// Returns the vehicle as the firmware's build script expects it: the name of a built-in vehicle, or an absolute
+    /// path.
     pub(crate) fn for_firmware(&self) -> Result<Option<PathBuf>, Failure> {
         let Some(path) = &self.vehicle else { return Ok(None) };
         let known = path.to_str().is_some_and(|name| built_in(name).is_some());
-        // The build script runs in the folder of its package.
+        // Absolute, since the build script runs in its package's folder.
         Ok(Some(if known { path.clone() } else { std::path::absolute(path)? }))
     }
 
-    /// The arguments of the same command on `target`.
+    /// Returns the arguments that select `target` and this vehicle.
     pub(crate) fn arguments(&self, target: &Target) -> String {
         self.vehicle.as_ref().map_or(target.to_string(), |path| format!("{target} --vehicle {}", path.display()))
     }

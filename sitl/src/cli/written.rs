@@ -1,4 +1,4 @@
-//! Where results go, and what every command prints that has written a folder with a report.
+//! Output of commands that write a folder with a report.
 
 use super::json::{self, Json};
 use super::place::Place;
@@ -46,7 +46,7 @@ impl Format {
 }
 
 impl Output {
-    /// Prints the tables for a paper, if they are asked for; or else as [`show`] does.
+    /// Prints the tables for a paper if they are requested; otherwise prints as [`show`] does.
     pub(super) fn show(
         &self,
         folder: &Folder,
@@ -62,8 +62,8 @@ impl Output {
     }
 }
 
-/// Prints the results of `files` files in `folder`: what `object` writes, if JSON is asked for, or the table and where
-/// the report is.
+/// Prints the results of a command that wrote `files` files into `folder`: the output of `object` if JSON is
+/// requested, otherwise the table and the path of the report.
 pub(crate) fn show(
     folder: &Folder,
     files: usize,

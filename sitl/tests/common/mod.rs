@@ -1,4 +1,4 @@
-//! The program, run in a folder for each test.
+//! Helpers that run `sitl` in a folder for each test.
 
 #![allow(dead_code, reason = "each test file uses a part")]
 
@@ -19,7 +19,7 @@ pub(crate) fn folder(test: &str) -> PathBuf {
     folder
 }
 
-/// Returns a command of `sitl` that is run in `folder`.
+/// Returns a command that runs `sitl` in `folder`.
 pub(crate) fn command(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_sitl"));
     command.current_dir(folder).args(arguments);
@@ -31,13 +31,13 @@ pub(crate) fn sitl(folder: &Path, arguments: &[&str]) -> Output {
     command(folder, arguments).output().unwrap()
 }
 
-/// Returns the output of a successful command.
+/// Checks that a command succeeded; returns its output.
 pub(crate) fn succeeds(output: &Output) -> String {
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout.clone()).unwrap()
 }
 
-/// Returns what a refused command says.
+/// Checks that a command was refused; returns its error message.
 pub(crate) fn refused(output: &Output) -> String {
     let error = String::from_utf8(output.stderr.clone()).unwrap();
     assert_eq!(output.status.code(), Some(2), "{error}");
@@ -45,8 +45,8 @@ pub(crate) fn refused(output: &Output) -> String {
     error
 }
 
-/// Writes `rest.csv`, a log of so many seconds at rest as PX4-ECL's are, and the estimate beside it: 2 degrees of
-/// heading, 0.1 m/s to the north and 0.3 m to the east off.
+/// Writes `rest.csv`, a log of `duration_s` at rest in the format of PX4-ECL, and an estimate next to it. The estimate
+/// is off by 2 degrees in heading, 0.1 m/s to the north and 0.3 m to the east.
 pub(crate) fn log_at_rest(folder: &Path, duration_s: u64) {
     let (mut log, mut seed) = (String::new(), 1_u64);
     let mut noise = |size: f64| {

@@ -1,4 +1,4 @@
-//! The flight in the emulator.
+//! `sitl pil`: flight of the firmware in the emulator.
 
 use crate::cli::in_the_loop::{InTheLoop, Recorder, outcome};
 use crate::cli::interrupt;
@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// Flies `scenario` with `image`, or with the one built from this source, and prints the results.
+/// Flies `scenario` with `image`, or with an image built from this source, and prints the results.
 pub(super) fn fly(scenario: &Scenario, flying: &InTheLoop, image: Option<PathBuf>) -> Result<ExitCode, Failure> {
     let output = flying.output()?;
     let image = match image {

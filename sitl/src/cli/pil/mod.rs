@@ -1,4 +1,4 @@
-//! `sitl pil`.
+//! `sitl pil`: flies the firmware on an emulated processor.
 
 #[cfg(unix)]
 mod emulated;
@@ -29,7 +29,7 @@ pub(crate) struct Pil {
 }
 
 impl Pil {
-    /// Builds, flies, prints.
+    /// Builds the image, flies it and prints the results.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let scenario = self.flying.scenario(&self.scenario)?;
         emulated::fly(&scenario, &self.flying, self.image)
