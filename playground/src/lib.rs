@@ -1,5 +1,5 @@
-//! The simulator as WebAssembly: the vehicle that `sitl serve` serves, for the page of `crates/web/page`, and the
-//! flights of `sitl fly`, to the same bits.
+//! Simulator as WebAssembly: the vehicle of `sitl serve`, for the page in `crates/web/page`, and the flights of
+//! `sitl fly`, with bit-identical results.
 
 use afbc::Profile;
 use afbc_serve::page::Cockpit;
@@ -12,10 +12,10 @@ use afbc_sim::run::Run;
 use serde_json::json;
 use wasm_bindgen::prelude::*;
 
-/// The vehicle that keeps what a scenario says of it.
+/// Name that selects the scenario's own vehicle.
 const OWN: &str = "paper";
 
-/// A served vehicle and its page.
+/// Served vehicle and its page.
 #[wasm_bindgen]
 pub struct Playground {
     server: Server,
@@ -24,7 +24,7 @@ pub struct Playground {
 
 #[wasm_bindgen]
 impl Playground {
-    /// Puts a vehicle on the ground of a built-in scenario; none for the scenario's own.
+    /// Puts a vehicle on the ground of a built-in scenario. An empty `vehicle`, or `paper`, selects the scenario's own.
     #[wasm_bindgen(constructor)]
     pub fn new(scenario: &str, vehicle: &str, seed: f64) -> Result<Playground, JsError> {
         let mut scenario = read(scenario)?;
@@ -34,14 +34,14 @@ impl Playground {
             let file = known.read().map_err(|error| JsError::new(&error.to_string()))?;
             scenario = on(scenario, &file)?;
         }
-        // A plain number of JavaScript, in which whole ones are exact up to 53 bits.
+        // JavaScript's numbers are doubles, which hold integers exactly up to 53 bits.
         scenario.seed = seed as u64;
         let scenarios = fleet(&scenario, 1).map_err(|error| JsError::new(&error.to_string()))?;
         let server = Server::new(&scenarios, 1).map_err(|error| JsError::new(&format!("{error:?}")))?;
         Ok(Playground { server, cockpit: Cockpit::new() })
     }
 
-    /// Returns what does not change.
+    /// Returns the data that the page needs once, since they do not change.
     pub fn hello(&self) -> String {
         self.cockpit.hello(&self.server).unwrap_or_default()
     }
@@ -51,7 +51,7 @@ impl Playground {
         self.cockpit.values(&self.server).unwrap_or_default()
     }
 
-    /// Runs so many milliseconds; returns what a line that has become due leaves to do.
+    /// Advances by this many milliseconds. Returns the action left to the caller by a scheduled command, if any.
     pub fn advance(&mut self, steps: u32) -> String {
         let mut left = Then::Nothing;
         for _ in 0..steps {
@@ -66,20 +66,20 @@ impl Playground {
         to_do(left)
     }
 
-    /// Returns what is seen now.
+    /// Returns the current state for the page.
     pub fn frame(&mut self, speed: f64, paused: bool) -> String {
         let flow = TimeFlow { rate: TimeRate::Times(speed), paused };
         self.cockpit.frame(&self.server, flow).unwrap_or_default()
     }
 
-    /// Carries out a command of the page; returns the messages and what is left to do.
+    /// Runs a command of the page; returns its messages and the action left to the caller.
     pub fn command(&mut self, command: &str) -> String {
         let reply = self.cockpit.command(&mut self.server, command);
         json!({ "messages": reply.messages, "then": to_do(reply.then) }).to_string()
     }
 }
 
-/// Returns the names of the scenarios that a vehicle can be served in.
+/// Returns the names of the scenarios in which a vehicle can be served.
 #[wasm_bindgen]
 pub fn scenarios() -> Vec<String> {
     let served = |name: &str| read(name).ok().is_some_and(|scenario| fleet(&scenario, 1).is_ok());
@@ -92,7 +92,7 @@ pub fn vehicles() -> Vec<String> {
     afbc_vehicles::BUILT_IN.iter().map(|it| it.name.to_owned()).collect()
 }
 
-/// A flight's log.
+/// Log of a flight.
 #[wasm_bindgen]
 pub struct FlightLog {
     names: Vec<String>,
@@ -101,12 +101,12 @@ pub struct FlightLog {
 
 #[wasm_bindgen]
 impl FlightLog {
-    /// Returns the names of the columns, those of the CSV that `sitl fly` writes.
+    /// Returns the names of the columns, as in the CSV that `sitl fly` writes.
     pub fn names(&self) -> Vec<String> {
         self.names.clone()
     }
 
-    /// Returns the numbers, row after row.
+    /// Returns the values, row after row.
     pub fn rows(&self) -> Vec<f64> {
         self.rows.clone()
     }
@@ -132,7 +132,7 @@ pub fn fly(scenario: &str, law: &str) -> Result<FlightLog, JsError> {
     Ok(FlightLog { names, rows })
 }
 
-/// Adds a row.
+/// Appends a row.
 fn row(sample: &Sample, rotors: usize, estimates: bool, rows: &mut Vec<f64>) {
     rows.extend(MOTION.iter().map(|(_, value)| value(sample)));
     rows.extend(sample.action.speeds.0.iter().take(rotors).map(|&speed| f64::from(speed)));
@@ -151,7 +151,7 @@ fn on(scenario: Scenario, vehicle: &afbc_vehicles::Vehicle) -> Result<Scenario, 
     scenario.on(vehicle, Profile::Flight).map_err(|error| JsError::new(&error.to_string()))
 }
 
-/// Returns what is left to do in words.
+/// Returns the caller's action as text, such as `speed 2`; empty if there is none.
 fn to_do(then: Then) -> String {
     match then {
         Then::Nothing | Then::Step(_) | Then::Quit => String::new(),

@@ -1,5 +1,5 @@
-//! Writes what JavaScript calls a WebAssembly by, as `wasm-bindgen --target web` does: `bindings IN.wasm FOLDER`. From
-//! the lock file's own version, which must be that of the crate.
+//! Writes the JavaScript bindings of a WebAssembly module, like `wasm-bindgen --target web`. Usage:
+//! `bindings IN.wasm FOLDER`. The lock file must select the same version of wasm-bindgen as that of the module.
 
 use std::env;
 use std::process::ExitCode;
