@@ -1,5 +1,5 @@
-//! Logs on a card, listed, downloaded and erased while the vehicle goes on: beside a log that is written, on a card
-//! that stalls, is pulled, fills. What is read is compared with another FAT's.
+//! Tests that logs on a card are listed, downloaded and erased in operation: while another log is written, and on a
+//! card that stalls, is pulled out or is full. The bytes are compared with those read by another FAT library.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
 mod room;
@@ -26,7 +26,7 @@ fn logs_are_listed_and_downloaded() {
         mount(&mut card.0.lock().unwrap().bytes).root_dir().remove("LOG0007.ULG").unwrap();
         mount(&mut card.0.lock().unwrap().bytes).root_dir().remove("LOGBOOK.ULG").unwrap();
         station.is_served_as_it_is_kept();
-        // Any part of any, and what is not there.
+        // Downloads some parts of the logs, then bytes and logs that do not exist.
         let held = station.room.logs();
         for (log, offset, bytes) in [(0, 1, 90), (1, 449, 1), (2, 511, 1_000), (0, 100_000, 449), (1, 450, 451)] {
             let (from, to) = (offset as usize, (offset + bytes) as usize);
@@ -40,7 +40,7 @@ fn logs_are_listed_and_downloaded() {
     }
 }
 
-/// What is written meanwhile is not served, and loses nothing by a download.
+/// The log being written is not served, and a download costs it no records.
 #[test]
 fn a_download_beside_a_log() {
     let card = fat32();
@@ -49,7 +49,7 @@ fn a_download_beside_a_log() {
     let held = station.room.logs();
     station.room.armed = true;
     station.room.run(300);
-    // The next one begins after they are counted, and has no place.
+    // The log of the present flight is not counted.
     assert_eq!(station.list().len(), 2);
     for (log, (_, bytes)) in held.iter().enumerate() {
         assert!(station.download(log as u16, 0, u32::MAX) == *bytes);
@@ -66,7 +66,7 @@ fn a_download_beside_a_log() {
     station.is_served_as_it_is_kept();
 }
 
-/// All but the one that is written are erased; what they took is free again, but for a cluster each.
+/// All logs except the one being written are erased. Their space is free again, up to one cluster per log.
 #[test]
 fn erased_logs_leave_room() {
     for card in [fat16(), fat32()] {
@@ -98,7 +98,7 @@ fn erased_logs_leave_room() {
         let log = read(bytes);
         assert_eq!(log.whole, bytes.len());
         adds_up(&log).unwrap();
-        // The table's own account.
+        // Counts the used clusters in the allocation table.
         let (used, cluster) = free(&card);
         let mut disk = card.0.lock().unwrap();
         let volume = mount(&mut disk.bytes);
@@ -116,7 +116,7 @@ fn erased_logs_leave_room() {
     }
 }
 
-/// A full card has its logs downloaded and erased, and then takes logs again.
+/// The logs on a full card can be downloaded and erased. Then the card takes logs again.
 #[test]
 fn a_full_card_is_emptied() {
     let card = fat16();
@@ -130,7 +130,7 @@ fn a_full_card_is_emptied() {
     let mut station = Station::new(&card);
     (0..3).for_each(|_| station.fly(1_000));
     assert_eq!(station.room.told, [StorageState::Full.text().unwrap()]);
-    // It looks at the card again.
+    // Gives the keeper time to look at the card again.
     station.room.run(1_500);
     station.is_served_as_it_is_kept();
     assert!(station.erase());
@@ -143,7 +143,7 @@ fn a_full_card_is_emptied() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// Stalls, failures and pulls in the middle of it: each request has an answer, and each byte is the log's.
+    /// With random stalls, failures and pulls, each request is answered, and each byte served is the log's.
     #[test]
     fn whatever_the_card_does_there_is_an_answer(
         seed: u64, is_fat32: bool, steps in prop::collection::vec((0_u8..6, any::<u32>()), 1..25),
@@ -172,7 +172,7 @@ proptest! {
                     let (log, offset) = ((number % 2) as u16, number / 2 % 80_000);
                     let wanted = 1 + number % 5_000;
                     let found = station.ask_for(LogRequest::Data { log, offset, bytes: wanted }, 300);
-                    // A card that does not answer is not the end of a log; whoever has waited long enough says so.
+                    // A silent card does not mean the end of the log: the request is cancelled instead.
                     let is_whole = !station.transfer.is_busy();
                     station.transfer.hear(LogRequest::End);
                     let found = Station::<Card>::joined(log, offset, found);

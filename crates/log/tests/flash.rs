@@ -1,5 +1,5 @@
-//! Logs in flash that fills, fails, has something else in it, or loses its supply in the middle of a page or an
-//! erasure, read by the layout that docs/ulog.md describes and by the specification of ULog.
+//! Tests logs in flash that fills, fails, holds other data, or loses power while programming or erasing. The logs are
+//! read by the layout in docs/ulog.md and by the specification of ULog.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
 mod room;
@@ -19,7 +19,8 @@ use std::task::Poll;
 /// Time between two samples of a small log \[us\].
 const PERIOD_US: u64 = 10_000;
 
-/// Checks that no sample is missing without a dropout that is as long; returns both ends of its samples \[us\].
+/// Checks that each gap between samples is covered by dropouts of that length. Returns the times of the first and last
+/// sample \[us\].
 fn adds_up(log: &ReadLog) -> [u64; 2] {
     let times = &log.samples_us;
     let mut dropouts = log.dropouts.iter().filter(|(_, before)| *before > 0).peekable();
@@ -37,7 +38,7 @@ fn adds_up(log: &ReadLog) -> [u64; 2] {
     [times[0], *times.last().unwrap()]
 }
 
-/// What a chip that is never late keeps: a log over several sectors, small and whole, that is served as it is kept.
+/// A chip that is never slow keeps a complete small log over several sectors, and serves it unchanged.
 #[test]
 fn all_is_kept() {
     let chip = Chip::new(16);
@@ -50,7 +51,7 @@ fn all_is_kept() {
     let [first, last] = adds_up(&log);
     assert!(last - first > 8_300_000 && log.dropouts.is_empty(), "{first} {last} {:?}", log.dropouts);
     assert!(bytes.len() > 3 * SECTOR && bytes.len() < 500_000, "{} bytes", bytes.len());
-    // The others begin in sectors of their own.
+    // Each further log begins in a sector of its own.
     (0..3).for_each(|_| station.fly(400));
     station.is_served_as_it_is_kept();
     let held = station.room.logs();
@@ -63,7 +64,7 @@ fn all_is_kept() {
         assert!(station.download(log, offset, 900).is_empty());
     }
     assert!(station.room.told.is_empty());
-    // After a restart they are there, and the next has the next number.
+    // After a restart the logs are still there, and the next log gets the next number.
     let mut station = Station::new(&Chip::holding(chip.0.lock().unwrap().bytes.clone()));
     station.fly(400);
     station.is_served_as_it_is_kept();
@@ -72,7 +73,7 @@ fn all_is_kept() {
     assert_eq!((now.len(), now[4].0.as_str()), (5, "5"));
 }
 
-/// What is written is not served; it goes on while others are downloaded, and is not erased.
+/// The log being written is not served. It continues while other logs are downloaded, and is not erased.
 #[test]
 fn downloads_beside_a_log() {
     let chip = Chip::new(8);
@@ -95,7 +96,7 @@ fn downloads_beside_a_log() {
     station.is_served_as_it_is_kept();
 }
 
-/// A full one ends its log, says so once, and takes logs again once they are erased.
+/// A full flash ends its log, is reported once, and takes logs again after an erasure.
 #[test]
 fn a_full_flash_is_emptied() {
     let chip = Chip::new(4);
@@ -117,8 +118,8 @@ fn a_full_flash_is_emptied() {
     assert_eq!(station.room.logs().len(), 1);
 }
 
-/// Returns what is in the cells when the supply is cut in the middle of a change: each bit that was to change has
-/// changed, or not.
+/// Returns the cells after a power cut in the middle of a change: each bit that was to change has randomly changed or
+/// not.
 fn cut(cells: &[u8], change: &Change, random: &mut impl FnMut() -> u8) -> Vec<u8> {
     let mut cells = cells.to_vec();
     match change {
@@ -133,8 +134,8 @@ fn cut(cells: &[u8], change: &Change, random: &mut impl FnMut() -> u8) -> Vec<u8
     cells
 }
 
-/// The supply is cut in the middle of any page: whatever was there is there, the log is read up to then, and the next
-/// one is written.
+/// After a power cut in any page, earlier logs are intact, the present log can be read up to the cut, and the next log
+/// is written.
 #[test]
 fn cuts_of_the_power_leave_logs() {
     let chip = Chip::new(6);
@@ -155,7 +156,7 @@ fn cuts_of_the_power_leave_logs() {
                 assert_eq!(kept[0], first[0]);
                 if let Some((_, bytes)) = kept.get(1) {
                     let log = read(bytes);
-                    // After its beginning, which has no samples.
+                    // A cut during the log's beginning leaves no samples.
                     if let Some(last_us) = log.samples_us.last() {
                         assert!(*last_us >= read_to_us && last_us + 200_000 > *at_us, "cut at {at_us} us, {last_us}");
                         read_to_us = *last_us;
@@ -185,12 +186,13 @@ fn change_sector(change: &Change) -> usize {
     }
 }
 
-/// True of the length of a log.
+/// Returns true if a change writes a log's length, at its end.
 fn is_end(change: &Change) -> bool {
     matches!(change, Change::Program(at, _) if at % SECTOR == 24)
 }
 
-/// Cut while they are erased, logs are whole or gone, but for the beginning of one; then all can be erased.
+/// After a power cut during an erasure, each log is whole or gone, except that one may be shortened. Then all can be
+/// erased.
 #[test]
 fn cuts_of_erasing_leave_logs() {
     let chip = Chip::new(6);
@@ -222,7 +224,7 @@ fn cuts_of_erasing_leave_logs() {
     }
 }
 
-/// A chip that is not there, that takes nothing, that is busy for ever: stations are told, and the vehicle goes on.
+/// If a chip is missing, write-protected or busy forever, stations are told, and the vehicle continues.
 #[test]
 fn a_chip_that_does_not_work() {
     let chip = Chip::new(4);
@@ -247,7 +249,7 @@ fn a_chip_that_does_not_work() {
     }
 }
 
-/// A chip that is lost in the middle of a download is not the end of the log, which goes on once the chip is back.
+/// A chip that fails in the middle of a download does not end the log. The download continues once the chip is back.
 #[test]
 fn a_lost_chip_ends_no_log() {
     let chip = Chip::new(8);
@@ -264,21 +266,21 @@ fn a_lost_chip_ends_no_log() {
     assert!(station.download(0, 9_000, u32::MAX) == bytes[9_000..]);
 }
 
-/// Pages that take as long as a chip may let them lose nothing.
+/// Pages that take the longest time of the data sheet cost no records.
 #[test]
 fn slow_pages_lose_nothing() {
     let chip = Chip::new(8);
     let mut station = Station::new(&chip);
     chip.0.lock().unwrap().takes_us[0] = 5_000;
     station.fly(4_000);
-    // What waits is kept after the end.
+    // Gives the queued blocks time to be stored after the log's end.
     station.room.run(2_000);
     let log = read(&station.room.logs()[0].1);
     adds_up(&log);
     assert!(log.dropouts.is_empty(), "{:?}", log.dropouts);
 }
 
-/// A chip that stalls costs log, which says so.
+/// A stalling chip costs records, and the log contains a dropout of that length.
 #[test]
 fn a_stall_is_a_dropout() {
     let chip = Chip::new(8);
@@ -299,7 +301,7 @@ fn a_stall_is_a_dropout() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// Whatever is in the flash stays until it is erased, and costs room only.
+    /// Other data in the flash stays until it is erased, and only takes up room.
     #[test]
     fn something_else_is_in_it(seed: u64, spans in prop::collection::vec((0..8 * SECTOR, 1..100_000_usize), 0..6)) {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -311,7 +313,7 @@ proptest! {
         let chip = Chip::holding(cells.clone());
         let mut station = Station::new(&chip);
         station.fly(2_000);
-        // It looks at what lies ahead.
+        // Gives the keeper time to check the sector ahead.
         station.room.run(4_000);
         station.is_served_as_it_is_kept();
         let free = cells.chunks(SECTOR).rev().take_while(|sector| sector.starts_with(&[0xFF; 24])).collect::<Vec<_>>();
@@ -321,7 +323,7 @@ proptest! {
         prop_assert!(chip.0.lock().unwrap().bytes.iter().all(|byte| *byte == 0xFF));
     }
 
-    /// Failures, arming and questions in the middle of it: each request has an answer, and each byte is the log's.
+    /// With random failures, arming and queries, each request is answered, and each byte served is the log's.
     #[test]
     fn whatever_the_chip_does_there_is_an_answer(steps in prop::collection::vec((0_u8..7, any::<u32>()), 1..25)) {
         let chip = Chip::new(16);
@@ -369,7 +371,7 @@ proptest! {
     }
 }
 
-/// When there is a log is the writer's affair, as on a card.
+/// The writer decides when to log, for flash as for cards.
 #[test]
 fn a_log_from_power_up() {
     let chip = Chip::new(8);

@@ -1,4 +1,4 @@
-//! Topics, fields and types against PX4's own.
+//! Compares topics, fields and types with PX4's own.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
 #[allow(dead_code, reason = "other tests need the rest")]
@@ -8,7 +8,7 @@ use afbc_log::ulog::TOPICS;
 use std::collections::{BTreeMap, BTreeSet};
 use strict::{FieldFormat, fields};
 
-/// The formats of these topics in a log of PX4 (its simulator of September 2024, v1.15), without padding.
+/// Formats of these topics in a log of PX4's simulator (September 2024, v1.15), without padding.
 const PX4: &str = include_str!("px4_formats.txt");
 
 #[test]
@@ -26,8 +26,8 @@ fn every_field_is_px4s() {
     }
 }
 
-/// Each begins with its time; a name stands once; every value lies as a C compiler would put it, so that no reader of
-/// structs needs padding.
+/// Each topic begins with its time and each name is unique. Each value is aligned as in a C struct, so readers need no
+/// padding.
 #[test]
 fn layouts_are_sound() {
     let names: BTreeSet<_> = TOPICS.iter().map(|topic| topic.name).collect();
@@ -39,7 +39,7 @@ fn layouts_are_sound() {
         for field in topic.fields {
             let size = match field.kind {
                 "uint64_t" | "double" => 8,
-                // Of these, and padded to whole words of eight.
+                // The size of `esc_report`, padded to a multiple of 8 bytes.
                 "esc_report" => 40,
                 "uint32_t" | "int32_t" | "float" => 4,
                 "uint16_t" => 2,

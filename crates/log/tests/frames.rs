@@ -1,4 +1,4 @@
-//! Frames and records: what is written is read, and anything else is told from it.
+//! Tests that frames and records are read as they were written, and that damaged or foreign frames are rejected.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_guidance::BatteryReading;
@@ -35,15 +35,15 @@ fn framed(record: &Record) -> Vec<u8> {
     write(record, &mut [0; FRAME_MAX]).unwrap().to_vec()
 }
 
-/// What happens to a frame on its way.
+/// What happens to a frame in transit.
 #[derive(Clone, Debug)]
 enum Fate {
     Arrives,
-    /// A byte becomes another one, but no zero.
+    /// A byte is changed to another one, but never to zero.
     Changes(prop::sample::Index, u8),
-    /// So many of its bytes are lost, but not all.
+    /// This many of its first bytes are lost, but not all.
     Loses(prop::sample::Index),
-    /// More bytes than any frame has come before its end.
+    /// The frame becomes this many bytes longer than the longest allowed frame.
     IsLong(usize),
 }
 
@@ -56,21 +56,21 @@ fn fate() -> impl Strategy<Value = Fate> {
     ]
 }
 
-/// CRC-32 (ISO-HDLC), bit by bit.
+/// Returns the CRC-32 (ISO-HDLC), computed bit by bit.
 fn crc32(bytes: impl IntoIterator<Item = u8>) -> u32 {
     !bytes.into_iter().fold(!0_u32, |crc, byte| {
         (0..8).fold(crc ^ u32::from(byte), |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0xEDB8_8320 } else { crc >> 1 })
     })
 }
 
-/// A frame of these bytes, which may be of any version.
+/// Returns the frame of these bytes, without its terminating zero. The bytes may be of any version.
 fn frame_of(body: &[u8]) -> Vec<u8> {
     let mut frame = [0; 2 * FRAME_MAX];
     let length = cobs::encode(&[body, &crc32(body.iter().copied()).to_le_bytes()].concat(), &mut frame);
     frame[..length].to_vec()
 }
 
-/// The bytes in a record's frame.
+/// Returns the bytes of a record's frame, without checksum and encoding.
 fn body(record: &Record) -> Vec<u8> {
     let mut frame = framed(record);
     frame.pop();
@@ -82,7 +82,7 @@ fn body(record: &Record) -> Vec<u8> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Frames that arrive are read, in their order; each other one is counted, once, and nothing else is.
+    /// All intact frames are read, in order. Each other frame is counted once as damaged, and nothing else is counted.
     #[test]
     fn a_stream_has_the_records_that_arrive(
         frames in prop::collection::vec((record(), fate(), 0..3_usize), 0..20)
@@ -99,14 +99,14 @@ proptest! {
                 }
                 Fate::Changes(at, by) => {
                     let byte = &mut frame[at.index(inner)];
-                    // From 1 to 255, to another of them.
+                    // Changes the byte to another one between 1 and 255.
                     *byte = ((u32::from(*byte) - 1 + u32::from(by)) % 255) as u8 + 1;
                 }
                 Fate::Loses(count) => drop(frame.drain(..1 + count.index(inner - 1))),
                 Fate::IsLong(more) => frame.splice(..0, vec![7; FRAME_MAX - inner + more]).for_each(drop),
             }
             bytes.extend(frame);
-            // No bytes between two zeros are no frame.
+            // Zeros in a row do not make a frame.
             bytes.extend(vec![0; zeros]);
         }
         let mut reader = Frames::default();
@@ -115,7 +115,7 @@ proptest! {
         prop_assert_eq!(reader.damaged(), damaged);
     }
 
-    /// A start of another version says which; anything else that is whole, but unknown, only that it is foreign.
+    /// A start of another version yields that version. Any other intact but unknown frame is only reported as foreign.
     #[test]
     fn another_version_is_told(version in any::<u16>(), record in record(), more in 1..5_usize, kind in 5..128_u8) {
         let decoded = |mut frame: Vec<u8>| {
@@ -129,18 +129,18 @@ proptest! {
             prop_assert_eq!(decoded(framed(&start(version, "x"))), foreign.clone());
         }
         prop_assert_eq!(decoded(frame_of(&body(&record))), Ok(record.clone()));
-        // Longer than this version's.
+        // Longer than a record of this version.
         let longer = |record: &Record| [body(record), vec![1; more]].concat();
         prop_assert_eq!(decoded(frame_of(&longer(&start(version, "x")))), foreign);
         if !matches!(record, Record::Start(_)) {
             prop_assert_eq!(decoded(frame_of(&longer(&record))), Err(FrameError::Foreign(None)));
         }
-        // A kind that this version does not have.
+        // A kind of record that this version does not have.
         prop_assert_eq!(decoded(frame_of(&[&[kind], &body(&record)[1..]].concat())), Err(FrameError::Foreign(None)));
         prop_assert_eq!(decoded(frame_of(&[])), Err(FrameError::Foreign(None)));
     }
 
-    /// A name is written as far as whole letters of it fit.
+    /// A name is written up to the last whole letter that fits.
     #[test]
     fn a_name_or_its_beginning_is_written(vehicle in "\\PC{0,30}", law in "[a-z]{0,40}") {
         let table = ParameterTable::new(Configuration::<4>::default());
@@ -154,7 +154,7 @@ proptest! {
         prop_assert_eq!(written.parameters, table.count());
     }
 
-    /// A start has the parameters that are not as in the image, to the bit, and its digest differs by any of them.
+    /// A start records the parameters whose bits differ from the image's, and each of them changes its digest.
     #[test]
     fn a_start_has_what_differs_from_the_image(
         places in prop::collection::vec(any::<prop::sample::Index>(), 0..8),
@@ -164,7 +164,7 @@ proptest! {
         let mut table = image.clone();
         for place in &places {
             let parameter = image.at(place.index(usize::from(image.count())) as u16).unwrap();
-            // Another value, or the other zero; one that cannot be flown is not taken.
+            // Sets another value, or the other zero. The table may refuse it.
             let is_zero = parameter.value == 0.0 && share < 0.5;
             let value = if is_zero { -0.0 } else { parameter.value * (0.9 + 0.2 * share) };
             let _ = table.set(parameter.name, value);
@@ -187,7 +187,8 @@ proptest! {
         prop_assert_eq!(mine == theirs, changed.is_empty());
     }
 
-    /// Half a checksum of the state and of the speeds, by an arithmetic of its own, and the throttles and the mode.
+    /// A tick's outputs contain half checksums of the state and the speeds, verified by independent code, and the
+    /// throttles and the mode.
     #[test]
     fn what_a_tick_gave_is_told_by_checksums(
         values in prop::array::uniform12(-1e3..1e3_f32),
@@ -212,14 +213,14 @@ proptest! {
         let bytes = |values: &[f32]| values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<_>>();
         let given = Given::of(&report);
         prop_assert_eq!(given.estimate, if estimates { crc32(bytes(&values)) as u16 } else { 0 });
-        // Of the largest number of rotors; those that there are not stand still.
+        // The checksum covers the largest number of rotors; missing rotors have speed 0.
         prop_assert_eq!(given.speeds, crc32(bytes(&[speeds, [0.0; 4]].concat())) as u16);
         prop_assert_eq!(&given.throttles, &[throttles, [0; 4]].concat()[..]);
         prop_assert_eq!(given.mode, report.mode as u8);
     }
 }
 
-/// Changes are numbered, and messages that bring nothing, or a battery alone, are no record.
+/// Changes are numbered. Messages that bring nothing, or only a battery reading, are not recorded.
 #[test]
 fn changes_are_numbered_and_nothing_is_not_recorded() {
     let (mut recorder, mut records) = (Recorder::default(), Vec::new());
@@ -245,7 +246,7 @@ fn changes_are_numbered_and_nothing_is_not_recorded() {
     assert_eq!(records, wanted);
 }
 
-/// The digest differs by any place and any direction of a rotor.
+/// Each rotor's position and direction of rotation changes the digest.
 #[test]
 fn the_digest_is_of_the_rotors_too() {
     let digest = |change: fn(&mut Configuration<4>)| {

@@ -1,5 +1,5 @@
-//! Logs on a card that stalls, fails, fills, is pulled, or loses its supply, read by another FAT and by the
-//! specification of ULog.
+//! Tests logs on a card that stalls, fails, fills, is pulled out, or loses power. The logs are read by another FAT
+//! library and by the specification of ULog.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
 mod room;
@@ -13,10 +13,10 @@ use room::ulog::read;
 use room::{Card, Room, TICK_US, VOLUME, adds_up, fat16, fat32, logs, mount};
 use std::io::Write;
 
-/// Longest time after which what is written can be read \[us\].
+/// Longest time until written data can be read back \[us\].
 const SYNCED_US: u64 = 1_000_000;
 
-/// A log of a card that is never late has every tick after its own beginning.
+/// A card that is never slow keeps every tick after the log's beginning.
 #[test]
 fn all_is_kept() {
     for card in [fat16(), fat32()] {
@@ -32,7 +32,7 @@ fn all_is_kept() {
         let log = read(bytes);
         assert_eq!(log.whole, bytes.len(), "the end is whole");
         let [first, last] = adds_up(&log).unwrap();
-        // Its beginning takes few records of a tick.
+        // The log's beginning is written slowly, over some hundreds of ticks.
         assert!((250_000..500_000).contains(&first) && last == 2_000_000, "{first} {last}");
         assert!(log.dropouts.is_empty(), "{:?}", log.dropouts);
         assert_eq!(log.changes, [("EST_GATE".to_owned(), 7.0)]);
@@ -40,11 +40,11 @@ fn all_is_kept() {
     }
 }
 
-/// When there is a log: an own account of PX4's modes.
+/// Each mode logs at the times that PX4 defines for it.
 #[test]
 fn modes_are_those_of_px4() {
     let armed_at = |ms: u64| (2_000..4_000).contains(&ms) || (7_000..8_000).contains(&ms);
-    // From arming or power-up to a second after disarming.
+    // Spans from arming or power-up to one second after disarming \[ms\].
     let spans = [
         (LogMode::Armed, vec![[2_000, 4_999], [7_000, 8_999]]),
         (LogMode::BootUntilDisarm, vec![[1, 4_999], [7_000, 8_999]]),
@@ -68,7 +68,7 @@ fn modes_are_those_of_px4() {
     }
 }
 
-/// The power is cut after any block that is written: the volume can be read, and its log up to the last second.
+/// After a power cut following any written block, the volume can be read, and the log up to one second before the cut.
 #[test]
 fn a_cut_leaves_a_log_up_to_the_last_second() {
     for card in [fat16(), fat32()] {
@@ -88,7 +88,7 @@ fn a_cut_leaves_a_log_up_to_the_last_second() {
                 assert!(bytes.len() - log.whole < 512, "its end is a part of a record");
                 let last_us = log.samples_us.last().copied().unwrap_or(0);
                 assert!(last_us >= read_to_us, "what could be read before");
-                // After its beginning, which has no samples.
+                // The log's beginning contains no samples.
                 if *at_us > begun_us.unwrap() + SYNCED_US + 300_000 {
                     assert!(last_us + SYNCED_US > *at_us, "cut at {at_us} us, read up to {last_us}");
                 }
@@ -99,7 +99,7 @@ fn a_cut_leaves_a_log_up_to_the_last_second() {
     }
 }
 
-/// A card that stalls for half a second costs log, which says so.
+/// A card that stalls for half a second costs records, and the log contains a dropout of that length.
 #[test]
 fn a_stall_is_a_dropout() {
     let card = fat16();
@@ -119,7 +119,7 @@ fn a_stall_is_a_dropout() {
     assert!(last > 2_000_000 && logs.len() == 1);
 }
 
-/// A full card ends its log, which can be read, and says so once.
+/// A full card ends its log, which can be read, and is reported once.
 #[test]
 fn a_full_card_ends_the_log() {
     let card = fat16();
@@ -144,7 +144,8 @@ fn a_full_card_ends_the_log() {
     assert_eq!(others, 1, "the other file is there");
 }
 
-/// A card that is pulled and comes back has a log of both times; without a card it is said once.
+/// A card that is pulled and inserted again holds a log from before and one from after. The missing card is reported
+/// once.
 #[test]
 fn a_card_that_comes_back_gets_another_log() {
     let card = fat32();
@@ -162,7 +163,7 @@ fn a_card_that_comes_back_gets_another_log() {
     assert_eq!(room.told, ["Log: no card", "Log: ready"]);
 }
 
-/// Other files are left alone, and numbers go on behind the last log's.
+/// Other files are left alone, and new logs are numbered after the last log.
 #[test]
 fn numbers_go_on() {
     let card = fat16();
@@ -179,7 +180,7 @@ fn numbers_go_on() {
     assert!(log_name(100_000).is_none());
 }
 
-/// Cards without a volume, with one of another kind, and a card that is none.
+/// Cards without a volume, cards with a foreign partition and missing cards are reported.
 #[test]
 fn cards_without_a_volume_are_told() {
     let blank = fat16();
@@ -200,7 +201,7 @@ fn cards_without_a_volume_are_told() {
     }
 }
 
-/// A draw of stalls and failures.
+/// Makes a card stall at random.
 fn hostile(card: &Card, seed: u64) {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     card.0.lock().unwrap().takes_us = Box::new(move || match random.next_u32() % 1_000 {
@@ -213,7 +214,8 @@ fn hostile(card: &Card, seed: u64) {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Random stalls, failures, pulls and missing ticks: each log is one, and its dropouts tell what is missing.
+    /// With random stalls, failures, pulls and missing ticks, each file is a valid log whose dropouts cover what is
+    /// missing.
     #[test]
     fn whatever_the_card_does_logs_add_up(
         seed: u64, is_fat32: bool, steps in prop::collection::vec((0_u8..8, 50_u64..900, 0_u32..400), 1..12),
@@ -231,7 +233,7 @@ proptest! {
             }
             room.run(ticks);
         }
-        // What is on its way arrives.
+        // Gives the queued blocks time to be written.
         card.0.lock().unwrap().is_there = true;
         room.mode = LogMode::Armed;
         room.run(3_000);
@@ -242,7 +244,8 @@ proptest! {
         }
     }
 
-    /// A volume with any damage to its tables and directory: no panic, and an end; partitions stay as they are.
+    /// Random damage to a volume's tables and directory causes no panic and no endless work, and block 0 stays
+    /// unchanged.
     #[test]
     fn a_damaged_volume_ends_nothing_else(
         is_fat32: bool,
@@ -262,7 +265,7 @@ proptest! {
         let head = card.0.lock().unwrap().bytes[..512].to_vec();
         let mut room = Room::new(&card);
         room.run(600);
-        // Its logs are listed, read and erased.
+        // Lists, reads and erases the logs of the damaged volume.
         for step in 0..300_u32 {
             room.run(2);
             let _ = match step / 50 {
@@ -277,7 +280,7 @@ proptest! {
     }
 }
 
-/// A directory that leads back to itself ends.
+/// A directory whose cluster chain loops does not cause endless work.
 #[test]
 fn a_circle_ends() {
     let card = fat32();
@@ -285,7 +288,7 @@ fn a_circle_ends() {
         let bytes = &mut card.0.lock().unwrap().bytes;
         let reserved = usize::from(u16::from_le_bytes([bytes[VOLUME * 512 + 14], bytes[VOLUME * 512 + 15]]));
         let table = (VOLUME + reserved) * 512;
-        // The root's cluster, 2, leads to 2, and is full.
+        // The root directory's cluster 2 points back to itself and is full of entries.
         bytes[table + 8..table + 12].copy_from_slice(&2_u32.to_le_bytes());
         let volume = VOLUME * 512;
         let size = u32::from_le_bytes(bytes[volume + 36..volume + 40].try_into().unwrap()) as usize;

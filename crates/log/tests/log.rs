@@ -1,4 +1,4 @@
-//! Logs of any ticks through rings of any size, read by the specification.
+//! Tests logs of arbitrary ticks through rings of any size, read by the specification of ULog.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
 mod strict;
@@ -25,7 +25,7 @@ use strict::{StrictLog, read};
 /// Time between two ticks \[us\].
 const TICK_US: u64 = 1_000;
 
-/// A vehicle that ticks, its log, and what was kept of it.
+/// A vehicle with its log, and the bytes taken from the ring so far.
 #[derive(Clone)]
 struct Logged<const R: usize> {
     flight: Flight,
@@ -46,7 +46,7 @@ impl<const R: usize> Logged<R> {
         Logged { flight, table, log, ring: Box::default(), kept: Vec::new(), now_us: 0 }
     }
 
-    /// Ticks with a sample of the inertial sensor, and perhaps a height.
+    /// Runs a tick with an inertial sample, and with a height if `height` is true.
     fn tick(&mut self, height: bool) -> (Report, TickDetails) {
         self.now_us += TICK_US;
         let noise = 1e-3 * (self.now_us / TICK_US % 7) as f32;
@@ -69,7 +69,7 @@ impl<const R: usize> Logged<R> {
         self.log.change(&self.table, RecordChange::Set(name, Some(value)), &mut self.ring);
     }
 
-    /// Keeps up to so many of the bytes that wait.
+    /// Takes at most this many bytes from the ring.
     fn keep(&mut self, mut bytes: usize) {
         while bytes > 0 && !self.ring.is_empty() {
             let front = &self.ring.front()[..bytes.min(self.ring.front().len())];
@@ -86,7 +86,7 @@ impl<const R: usize> Logged<R> {
     }
 }
 
-/// What a test does.
+/// One action of a random test.
 #[derive(Clone, Copy, Debug)]
 enum Step {
     Ticks(u16),
@@ -130,7 +130,7 @@ fn run<const R: usize>(steps: &[Step]) -> (Vec<u8>, Logged<R>) {
         }
     }
     logged.keep(usize::MAX);
-    // What waited for room.
+    // Writes the records that had to wait for room.
     (0..3).for_each(|_| {
         logged.tick(false);
         logged.keep(usize::MAX);
@@ -138,11 +138,11 @@ fn run<const R: usize>(steps: &[Step]) -> (Vec<u8>, Logged<R>) {
     (std::mem::take(&mut logged.kept), logged)
 }
 
-/// Dropouts add up to the time for which samples are missing.
+/// Checks that dropouts add up to the time for which samples are missing.
 fn adds_up(log: &StrictLog) {
     let times = log.times("sensor_combined");
     let (mut missing_us, mut told_ms) = (0, 0);
-    // One before the first sample is of the time that the log's beginning took.
+    // Dropouts before the first sample fall into the log's beginning.
     let before = |before: &BTreeMap<String, usize>| before.get("sensor_combined").copied().unwrap_or(0);
     let mut dropouts = log.dropouts.iter().filter(|(_, counts)| before(counts) > 0).peekable();
     for (index, pair) in times.windows(2).enumerate() {
@@ -161,7 +161,7 @@ fn adds_up(log: &StrictLog) {
     assert!(rest <= spread_ms, "{rest} ms at the end");
 }
 
-/// The parameters at the end of a log are those of the vehicle.
+/// Checks that the last parameter values in the log are the vehicle's.
 fn parameters_agree<const N: usize>(log: &StrictLog, table: &ParameterTable<N>) {
     for parameter in table.iter() {
         let last = log.parameters.iter().rev().find(|(name, _)| name == parameter.name.as_str());
@@ -175,7 +175,7 @@ fn any_ring<const R: usize>(steps: &[Step]) -> Result<(), TestCaseError> {
     prop_assert_eq!(log.whole, if bytes.is_empty() { 0 } else { bytes.len() }, "a broken record");
     adds_up(&log);
     if R >= 4096 {
-        // One topic is made of another format.
+        // One format is not a topic: `esc_report`, a part of `esc_status`.
         prop_assert_eq!(log.formats.len(), TOPICS.len() + 1);
         prop_assert!(log.information.contains_key("sys_name"));
         parameters_agree(&log, &logged.table);
@@ -202,7 +202,7 @@ proptest! {
     }
 }
 
-/// A log of half a second.
+/// Returns a log of 600 ms.
 fn short() -> Vec<u8> {
     let mut logged = Logged::<65_536>::new();
     for tick in 0..600 {
@@ -215,7 +215,7 @@ fn short() -> Vec<u8> {
     logged.end()
 }
 
-/// Cut at any byte it is read up to the last whole record, and says what the whole log says.
+/// A log cut at any byte is read up to the last whole record, with the same content as the whole log.
 #[test]
 fn a_log_cut_anywhere_is_read_up_to_there() {
     let bytes = short();
@@ -236,7 +236,7 @@ fn a_log_cut_anywhere_is_read_up_to_there() {
     }
 }
 
-/// Every topic comes at its rate, and every sample of a sensor.
+/// Every topic has its rate, and every sensor sample is logged.
 #[test]
 fn topics_have_their_rates() {
     let mut logged = Logged::<65_536>::new();
@@ -258,14 +258,14 @@ fn topics_have_their_rates() {
     for topic in ["vehicle_attitude", "vehicle_local_position", "estimator_states", "vehicle_status", "afbc_law"] {
         assert!(count(topic) > 0, "{topic}");
     }
-    // Nobody has told any of these.
+    // Topics without any data have no messages.
     for topic in ["vehicle_gps_position", "battery_status", "manual_control_setpoint", "vehicle_rates_setpoint"] {
         assert_eq!(count(topic), 0, "{topic}");
     }
 }
 
-/// In a small log every topic comes at its longer period, and the inertial sensor's messages follow each other without
-/// a gap: each is the mean of its samples.
+/// In a small log, every topic has its longer period. The inertial sensor's messages follow each other without a gap,
+/// each as the mean of its samples.
 #[test]
 fn small_logs_have_their_rates() {
     let mut logged = Logged::<65_536>::new();
@@ -285,12 +285,12 @@ fn small_logs_have_their_rates() {
     let counts = ["sensor_combined", "vehicle_attitude", "vehicle_air_data"].map(count);
     assert!(counts.iter().zip([350, 290, 30]).all(|(count, least)| *count > least), "{counts:?}");
     let dts_us = log.field("sensor_combined", "gyro_integral_dt");
-    // From the third on: the first has one sample, the second as many as are left of a period.
+    // Skips two messages: the first covers one sample, and the second the rest of a period.
     assert!(dts_us.iter().skip(2).all(|dt_us| *dt_us == 10_000.0), "{dts_us:?}");
     let times = log.times("sensor_combined");
     let rates = log.field("sensor_combined", "gyro_rad[1]");
     for (at_us, rate) in times.iter().zip(rates).skip(2) {
-        // Ten samples, of ticks up to the message's.
+        // Ten samples, from the ticks up to the message's time.
         let middle_us = at_us - 5_000;
         let ticks = (middle_us - 4_500) / TICK_US..=(middle_us + 4_500) / TICK_US;
         let mean = ticks.map(|tick| 1e-3 * (tick % 7) as f64).sum::<f64>() / 10.0;
@@ -298,14 +298,13 @@ fn small_logs_have_their_rates() {
     }
 }
 
-/// Returns when each sample of the inertial sensor was true: in the middle of its integration.
+/// Returns the time of each inertial sample, at the middle of its integration \[us\].
 fn sampled_us(log: &StrictLog) -> Vec<u64> {
     let dts_us = log.field("sensor_combined", "gyro_integral_dt");
     log.times("sensor_combined").iter().zip(dts_us).map(|(at_us, dt_us)| at_us - dt_us as u64 / 2).collect()
 }
 
-/// However irregular the samples of the inertial sensor are, no message is before the last one, and each says when its
-/// sample was true.
+/// With irregular inertial samples, messages stay in order, and each still states when its sample was valid.
 #[test]
 fn samples_have_their_times() {
     let mut logged = Logged::<65_536>::new();
@@ -319,18 +318,18 @@ fn samples_have_their_times() {
     assert_eq!(sampled_us(&read(&logged.end())), wanted);
 }
 
-/// With room for a part of a tick only, what is missing is told, and comes with the next tick if its topic has a rate.
+/// If only a part of a tick fits, the log contains a dropout. Topics with a rate are written in the next tick instead.
 #[test]
 fn what_is_missing_is_told_and_made_up_for() {
     const RING: usize = 4_096;
-    /// Bytes of a text's record without the text, and the longest text.
+    /// Bytes of a text record without its text, and the longest text.
     const TEXT: (usize, usize) = (12, 128);
     let mut logged = Logged::<RING>::new();
     while !read(&logged.kept).messages.contains_key("actuator_armed") {
         logged.tick(false);
         logged.keep(usize::MAX);
     }
-    // Most topics are due two seconds later; what they were before does not matter.
+    // Most topics are due again after two seconds. The records in between are dropped from the test.
     let (beginning, before) = (logged.kept.len(), read(&logged.kept).dropouts.len());
     (0..1_999).for_each(|_| {
         logged.tick(false);
@@ -373,7 +372,7 @@ fn what_is_missing_is_told_and_made_up_for() {
     assert!(partly > 500, "{partly}");
 }
 
-/// Changes that find no room wait until there is some, however many there are.
+/// Parameter changes that do not fit wait for room, however many they are.
 #[test]
 fn no_change_of_a_parameter_is_lost() {
     let mut logged = Logged::<4_096>::new();
@@ -395,7 +394,7 @@ fn no_change_of_a_parameter_is_lost() {
     parameters_agree(&read(&logged.end()), &table);
 }
 
-/// A dropout that is longer than a record can say, and one that is not of whole milliseconds.
+/// Dropouts that are too long for one record, or not of whole milliseconds, still add up.
 #[test]
 fn long_and_odd_dropouts_add_up() {
     let mut logged = Logged::<2_000>::new();
@@ -405,7 +404,7 @@ fn long_and_odd_dropouts_add_up() {
     }
     let (mut told_us, mut wanted_us) = (0, 0);
     for pause_us in [70_000_000, 400, 1_700, 900, 140_000_600] {
-        // Full.
+        // Fills the ring.
         (0..100).for_each(|_| {
             logged.tick(false);
         });
@@ -421,13 +420,13 @@ fn long_and_odd_dropouts_add_up() {
             wanted_us += (pair[1] - pair[0]).saturating_sub(TICK_US);
         }
         told_us = 1_000 * log.dropouts.iter().map(|(ms, _)| ms).sum::<u64>();
-        // Each begins in the tick of the first missing record, of which some are there.
+        // A dropout begins in the tick of the first missing record, though other records of that tick may exist.
         assert!(told_us <= wanted_us + 5 * TICK_US && told_us + 2 * TICK_US > wanted_us, "{told_us}, {wanted_us} us");
     }
     assert!(told_us > 210_000_000 && wanted_us > 210_000_000);
 }
 
-/// The values of a tick, in PX4's frames and units.
+/// The logged values of a tick are in PX4's frames and units.
 #[test]
 fn values_are_px4s() {
     let mut logged = Logged::<65_536>::new();
@@ -543,7 +542,7 @@ fn logged_force_max() -> f32 {
     Configuration::<4>::default().settings.common.rotor_force_max_n
 }
 
-/// What the log is of; parameters at the start, defaults of those that are not as built, and each change.
+/// The log contains the information, the parameters at the start, the defaults of changed ones, and each later change.
 #[test]
 fn parameters_and_information_are_there() {
     let mut logged = Logged::<65_536>::new();
@@ -570,8 +569,8 @@ fn parameters_and_information_are_there() {
     assert_eq!(log.start_us, TICK_US);
 }
 
-/// Writes logs for other readers (`scripts/check-ulog`), through rings that are full and cut short, and what is in
-/// each.
+/// Writes logs for other readers (`scripts/check-ulog`), with a list of their contents. The logs come from rings that
+/// overflow, and some are cut at a byte.
 #[test]
 fn logs_for_other_readers() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ulog");

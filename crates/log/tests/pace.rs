@@ -1,4 +1,4 @@
-//! The beginning of a log, and parameters that change all at once, at a pace: few records of each tick.
+//! Tests that the log's beginning, and a change of all parameters, are spread over ticks at the chosen pace.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
 #[allow(dead_code, reason = "other tests need the rest")]
@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 use strict::read;
 
-/// Returns the kinds of the records in these bytes, after the header of a log that begins with them.
+/// Returns the kinds of the records in these bytes, skipping the log's header if there is one.
 fn kinds(bytes: &[u8], has_header: bool) -> Vec<u8> {
     let (mut rest, mut kinds) = (&bytes[if has_header { 16 } else { 0 }..], Vec::new());
     while let [low, high, kind, behind @ ..] = rest {
@@ -22,8 +22,8 @@ fn kinds(bytes: &[u8], has_header: bool) -> Vec<u8> {
     kinds
 }
 
-/// Logs so many ticks at a pace; the parameters are restored in one of them, and one is changed in another. Returns the
-/// log and the largest number of records of a tick that are not data.
+/// Logs ticks at a pace. Restores all parameters in one tick, and changes one parameter in another. Returns the log,
+/// the largest number of records per tick that are not data, and the parameters.
 fn logged(pace: Option<u16>, ticks: u64, [restored, changed]: [u64; 2]) -> (Vec<u8>, usize, ParameterTable) {
     let configuration = Configuration::default();
     let mut table = ParameterTable::new(configuration.clone());
@@ -72,7 +72,7 @@ proptest! {
     fn a_tick_has_few_records_beside_its_data(pace in 1_u16..60, restored in 1_u64..900, changed in 1_u64..900) {
         let ticks = 1_000 + 1_500 / u64::from(pace);
         let (bytes, most, table) = logged(Some(pace), ticks, [restored, changed]);
-        // One that has changed is written at once, if nothing else waits.
+        // A single changed parameter is written at once if no others wait.
         prop_assert!(most <= usize::from(pace) + 1, "{most}");
         let log = read(&bytes);
         prop_assert_eq!(log.whole, bytes.len());
@@ -85,13 +85,13 @@ proptest! {
             let last = log.parameters.iter().rev().find(|(name, _)| name == parameter.name.as_str());
             prop_assert_eq!(last.unwrap().1, f64::from(parameter.value));
         }
-        // Data follow, without a gap.
+        // After the beginning, the data have no gap.
         let times = log.times("sensor_combined");
         prop_assert!(times.len() > 900 && times.windows(2).all(|pair| pair[1] - pair[0] == 1000));
     }
 }
 
-/// Without a pace, all of it is in the first tick.
+/// Without a pace, the first tick writes the whole beginning.
 #[test]
 fn without_a_pace_it_is_there_at_once() {
     let (bytes, most, _) = logged(None, 5, [0; 2]);

@@ -16,7 +16,7 @@ fn field(field: &LoggedField) -> String {
 
 fn row(topic: &LoggedTopic) -> String {
     let change = if topic.on_change { ", change" } else { "" };
-    // The time is in each.
+    // Leaves out the timestamp, which every topic has.
     let told = topic.fields.iter().skip(1).filter(|field| !field.name.starts_with("_padding"));
     let fields: Vec<_> = told.map(field).collect();
     let [usual, small] = [topic.period_us, topic.small_us].map(|us| us / 1000);

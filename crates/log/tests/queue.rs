@@ -1,5 +1,5 @@
-//! The exact log on a link that takes any amount at any time, beside a task that is late by any number of ticks: it is
-//! whole, or lacks whole ticks and says from which on.
+//! Tests the exact log on a link of varying speed, with a task that is late by some ticks. The log is complete, or
+//! lacks whole ticks and shows where the gap begins.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
 use afbc_log::exact::{FRAME_MAX, Frames, Given, Record, RecordQueue, ReplayDifference, ReplayStep, Replayer, write};
@@ -13,21 +13,21 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 use std::collections::VecDeque;
 
-/// Ticks that wait for the links' task, as in the firmware.
+/// Number of ticks that wait for the links' task, as in the firmware.
 const WAITING: usize = 8;
 /// Bytes of the link's ring.
 const RING: usize = 1024;
 
-/// What happens in a tick.
+/// Events in a tick.
 #[derive(Clone, Copy, Debug)]
 struct Happens {
-    /// The links' task runs.
+    /// True if the links' task runs.
     task: bool,
-    /// Bytes that leave the link's ring.
+    /// Number of bytes that leave the link's ring.
     drains: usize,
-    /// Messages bring something.
+    /// Number of messages with inputs.
     inputs: u8,
-    /// A parameter is changed.
+    /// True if a parameter is changed.
     change: bool,
 }
 
@@ -41,7 +41,7 @@ fn happens() -> impl Strategy<Value = Happens> {
     })
 }
 
-/// A vehicle, and the log that has left it.
+/// A vehicle, and the part of its log that the link has sent.
 struct Vehicle {
     flight: Flight,
     table: ParameterTable,
@@ -49,10 +49,10 @@ struct Vehicle {
     ticks: VecDeque<(Report, TickDetails)>,
     ring: VecDeque<u8>,
     log: Vec<u8>,
-    /// What messages have brought for the next tick, and its number.
+    /// Inputs from messages for the next tick, and its number.
     mail: ControlInputs,
     number: u32,
-    /// The configuration to be flown, and the number of the one that the next tick is the first to fly.
+    /// The configuration to fly, and the number of the configuration that the next tick is the first to fly.
     next: Option<(Prepared, u16)>,
     adopted: Option<u16>,
 }
@@ -91,7 +91,7 @@ impl Vehicle {
         self.log.extend(self.ring.drain(..leaves));
     }
 
-    /// What the links' task does.
+    /// Runs the links' task.
     fn task(&mut self, what: Happens, time_us: u64) {
         for message in 0..what.inputs {
             let mut news = ControlInputs::EMPTY;
@@ -101,7 +101,7 @@ impl Vehicle {
             self.mail.merge(&news);
             self.queue.inputs(self.number, &news);
         }
-        // No station is heard before the first ticks are recorded.
+        // Parameters are changed only after the first ticks are recorded.
         if what.change && self.number > 2 * WAITING as u32 {
             let name = RecordName::new("EST_GATE").unwrap();
             let value = self.table.set(name, 3.0 + (self.number % 5) as f32).unwrap().value;
@@ -119,7 +119,7 @@ impl Vehicle {
         });
     }
 
-    /// Lets all that waits leave, and returns the log.
+    /// Sends everything that waits, and returns the log.
     fn end(mut self) -> Vec<u8> {
         self.log.extend(self.ring.drain(..));
         let log = &mut self.log;
@@ -131,7 +131,7 @@ impl Vehicle {
     }
 }
 
-/// Replays a log; returns how many ticks are the same again, and where it ends early.
+/// Replays a log. Returns the number of matching ticks, and the first difference.
 fn replay(log: &[u8]) -> (u32, Option<ReplayDifference>) {
     let mut replayer = Replayer::new(Configuration::<4>::default()).unwrap();
     let mut frames = Frames::default();
@@ -149,7 +149,7 @@ fn replay(log: &[u8]) -> (u32, Option<ReplayDifference>) {
     (same, first)
 }
 
-/// Returns the number of the first tick that a log lacks, of those before `end`.
+/// Returns the number of the first tick before `end` that the log lacks.
 fn first_missing(log: &[u8], end: u32) -> Option<u32> {
     let mut frames = Frames::default();
     let mut there = vec![false; end as usize];
@@ -168,7 +168,7 @@ proptest! {
     fn it_is_whole_or_says_from_where_on_not(steps in prop::collection::vec(happens(), 50..900)) {
         let mut vehicle = Vehicle::new();
         steps.iter().for_each(|what| vehicle.tick(*what));
-        // After all that was late, there is room again: a gap before them is told.
+        // Gives the link room again, so that an earlier gap shows.
         (0..5).for_each(|_| vehicle.tick(Happens { task: true, drains: 10_000, inputs: 0, change: false }));
         let ticks = vehicle.number;
         let log = vehicle.end();
@@ -183,7 +183,7 @@ proptest! {
     }
 }
 
-/// A link that keeps up has all of it, though the task is late by as many ticks as can wait.
+/// A link that is fast enough gets the whole log, even if the task is late by as many ticks as can wait.
 #[test]
 fn a_link_that_keeps_up_has_all_of_it() {
     let mut vehicle = Vehicle::new();
@@ -195,7 +195,7 @@ fn a_link_that_keeps_up_has_all_of_it() {
     assert_eq!(replay(&vehicle.end()), (ticks, None));
 }
 
-/// A link that takes nothing for ever, and then again: later ticks are there, and none without what it took.
+/// A link that takes nothing for a long time gets later ticks once it is back, each with its inputs.
 #[test]
 fn a_link_that_comes_back_has_later_ticks() {
     let mut vehicle = Vehicle::new();
@@ -216,14 +216,14 @@ fn a_link_that_comes_back_has_later_ticks() {
     assert_eq!(last.last(), Some(ticks - 1));
 }
 
-/// What is asked of the queue.
+/// A call to the queue.
 #[derive(Clone, Copy, Debug)]
 enum Asked {
     Inputs(u8),
     Tick(u8),
-    /// The link takes so many frames, and then no more.
+    /// The link takes this many frames, and then refuses.
     Takes(usize),
-    /// It takes nothing, so many times.
+    /// The link refuses this many times.
     Refuses(u16),
 }
 
@@ -237,8 +237,8 @@ fn asked() -> impl Strategy<Value = Asked> {
     ]
 }
 
-/// The queue as it is described: a kilobyte of whole frames; without room for one, it and all up to the end of the next
-/// tick are missing; so if the link has refused one a thousand times in a row.
+/// Model of the queue as documented: it holds a kilobyte of whole frames. If a frame does not fit, or is refused a
+/// thousand times in a row, all frames up to the end of the next tick are dropped.
 #[derive(Default)]
 struct Described {
     waiting: VecDeque<Vec<u8>>,
@@ -285,7 +285,7 @@ impl Described {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// The same frames as those of the queue that is described leave it, each whole.
+    /// The queue sends the same whole frames as its model.
     #[test]
     fn it_is_a_queue_of_a_kilobyte(steps in prop::collection::vec(asked(), 1..200)) {
         let (mut queue, mut described, mut number) = (RecordQueue::default(), Described::default(), 0);

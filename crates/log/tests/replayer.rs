@@ -1,4 +1,4 @@
-//! A replay is the flight again, whatever happened in it, and names what a log lacks or has wrong.
+//! Tests that a replay repeats the flight, and names what a log lacks or has wrong.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
 use afbc_control::Trace;
@@ -13,14 +13,14 @@ use afbc_types::{Rotor, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-/// Changes what is estimated, also while disarmed.
+/// A parameter that changes the estimate, even while disarmed.
 const OFFSET: &str = "CAL_GYRO0_OFF_X";
 
 fn name(name: &str) -> RecordName {
     RecordName::new(name).unwrap()
 }
 
-/// What a tick takes beside its readings.
+/// Inputs of a tick besides its readings and messages.
 #[derive(Clone, Copy, Debug, Default)]
 struct Beside {
     battery: Option<BatteryReading>,
@@ -28,7 +28,7 @@ struct Beside {
     notch_rad_s: Option<f32>,
 }
 
-/// A vehicle, and the records of its log.
+/// A vehicle and the records of its log.
 struct Vehicle {
     flight: Flight,
     table: ParameterTable,
@@ -38,7 +38,7 @@ struct Vehicle {
     taken: ControlInputs,
     number: u32,
     adopted: Option<u16>,
-    /// For the next tick.
+    /// Inputs for the next tick.
     beside: Beside,
 }
 
@@ -47,7 +47,7 @@ impl Vehicle {
         Vehicle::with(|_| ())
     }
 
-    /// A vehicle whose parameters are not all those of the image.
+    /// Creates a vehicle whose parameters differ from the image's.
     fn with(set: impl FnOnce(&mut ParameterTable)) -> Self {
         let mut table = ParameterTable::new(Configuration::default());
         set(&mut table);
@@ -64,7 +64,7 @@ impl Vehicle {
         what(recorder, table, &mut |frame| records.push(decode(&mut frame[..frame.len() - 1].to_vec()).unwrap()))
     }
 
-    /// Sets a parameter, to be flown from the next tick on, unless it is armed.
+    /// Sets a parameter. The next tick flies it, unless the vehicle is armed.
     fn set(&mut self, parameter: &str, value: f32) {
         let value = self.table.set(name(parameter), value).unwrap().value;
         let change = RecordChange::Set(name(parameter), Some(value));
@@ -95,14 +95,14 @@ impl Vehicle {
         report
     }
 
-    /// Stands for so many ticks from its start on.
+    /// Runs ticks of a vehicle that stands still.
     fn stand(&mut self, ticks: u32) {
         for number in 0..ticks {
             self.tick(&ControlInputs::EMPTY, stands(number));
         }
     }
 
-    /// A vehicle on states from the link that is armed after a while.
+    /// Returns a vehicle that flies on states from the link and is armed at 1,050 ms.
     fn armed() -> Self {
         let mut vehicle = Vehicle::new();
         for ms in 0..1_100 {
@@ -113,7 +113,7 @@ impl Vehicle {
     }
 }
 
-/// A state from the link, and a request to arm.
+/// Returns a state from the link, with a request to arm if `arm` is true.
 fn seen(ms: u64, arm: bool) -> ControlInputs {
     let mut news = ControlInputs::EMPTY;
     let position_m = Vector3::new(0.0, 0.0, 1e-6 * (ms % 2) as f32);
@@ -125,14 +125,14 @@ fn seen(ms: u64, arm: bool) -> ControlInputs {
     news
 }
 
-/// Readings of a vehicle that stands.
+/// Returns readings of a vehicle that stands still.
 fn stands(ms: u32) -> Readings {
     let noise = 1e-3 * (ms % 7) as f32;
     let imu = Some(Aged { value: [Vector3::new(0.0, noise, 0.0), Vector3::new(noise, 0.0, 9.81)], age_us: 0 });
     Readings { imu, ..Readings::NONE }
 }
 
-/// Readings of a vehicle that stands, and of a tracker that sees it.
+/// Returns readings of a vehicle that stands still, with a tracker's pose in every tenth tick.
 fn seen_to_stand(ms: u32) -> Readings {
     let position_m = Vector3::new(1e-3 * (ms % 3) as f32, 0.0, 0.0);
     let attitude = [1.0, 0.0, 0.0, 0.0];
@@ -145,7 +145,7 @@ fn replayer() -> Replayer<4> {
     Replayer::new(Configuration::default()).unwrap()
 }
 
-/// Replays; returns how many ticks gave the same, and the differences.
+/// Replays records. Returns the number of matching ticks, and the differences.
 fn replay(replayer: &mut Replayer<4>, records: &[Record]) -> (usize, Vec<ReplayDifference>) {
     let (mut same, mut differences) = (0, Vec::new());
     for record in records {
@@ -161,8 +161,8 @@ fn replay(replayer: &mut Replayer<4>, records: &[Record]) -> (usize, Vec<ReplayD
 proptest! {
     #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// With parameters that change at any time: every report again, and the parameters as they became. Without one of
-    /// the changes that were flown, the tick that first flew it is named.
+    /// With parameter changes at any time, a replay repeats every report and ends with the same parameters. If the log
+    /// lacks a change, the tick that first flew it is named.
     #[test]
     fn a_flight_is_flown_again(
         sets in prop::collection::btree_map(40..300_u32, -0.3..0.3_f32, 1..30),
@@ -195,7 +195,8 @@ proptest! {
         );
     }
 
-    /// A log without a tick ends there, and goes on with the next start; a tick that gave something else is named.
+    /// A log that lacks a tick is replayed up to the gap, and again from the next start. A tick with changed outputs is
+    /// named.
     #[test]
     fn what_is_missing_or_else_is_named(at in 0..50_usize, throttle in 1..2_000_u16) {
         let mut vehicle = Vehicle::new();
@@ -218,7 +219,7 @@ proptest! {
     }
 }
 
-/// Replays, and returns every report that is given again, the same as then or not.
+/// Replays records. Returns all replayed reports, whether they match or not.
 fn reports(replayer: &mut Replayer<4>, records: &[Record]) -> Vec<Report> {
     let report = |record: &Record| match replayer.take(record) {
         ReplayStep::Same(report) | ReplayStep::Differs(_, Some(report)) => Some(report),
@@ -227,7 +228,7 @@ fn reports(replayer: &mut Replayer<4>, records: &[Record]) -> Vec<Report> {
     records.iter().filter_map(report).collect()
 }
 
-/// What messages bring for a tick of a vehicle that is to take off.
+/// Returns the messages' inputs for a tick of a vehicle that takes off.
 fn takes_off(number: usize) -> ControlInputs {
     let mut news = ControlInputs::EMPTY;
     match number {
@@ -241,8 +242,8 @@ fn takes_off(number: usize) -> ControlInputs {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 4, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// The battery, the clock that is not trusted any more, and the notch are those of the tick; none is left out, and
-    /// the law's signals are those of then.
+    /// The battery, a failed clock and the notch are replayed: leaving out any of them changes the reports. The law's
+    /// signals match as well.
     #[test]
     fn what_a_tick_takes_beside_its_readings_is_taken_again(
         volts in prop::collection::vec(11.8..12.5_f32, 4_000),
@@ -275,14 +276,14 @@ proptest! {
     }
 }
 
-/// Armed: the same again; a configuration that an armed vehicle cannot have flown is named, unless other changes are
-/// flown, with which it may be armed where it was not.
+/// An armed vehicle's flight is replayed. The replay names a configuration that an armed vehicle cannot have flown.
+/// With the caller's changes it accepts that, for the vehicle may then be armed where it was not.
 #[test]
 fn an_armed_vehicle_flies_no_other_configuration() {
     let mut vehicle = Vehicle::armed();
     let mut replayer = replayer();
     assert_eq!(replay(&mut replayer, &vehicle.records), (1_100, Vec::new()));
-    // Set while armed, it is not flown.
+    // A parameter set while armed is not flown.
     vehicle.set(OFFSET, 0.1);
     assert_eq!(vehicle.adopted, None);
     vehicle.tick(&seen(1_100, false), Readings::NONE);
@@ -293,17 +294,17 @@ fn an_armed_vehicle_flies_no_other_configuration() {
     let impossible = (1_100, vec![ReplayDifference::Configuration(1_100)]);
     assert_eq!(replay(&mut self::replayer(), &wrong), impossible);
     let mut changed = self::replayer();
-    // A change that changes nothing here.
+    // A change without effect on this flight.
     changed.change(name("EST_GATE"), 4.0).unwrap();
     assert_eq!(replay(&mut changed, &wrong), (1_101, Vec::new()));
-    // The change was lost, too.
+    // Adopts a configuration that is not in the log.
     let Some(Record::Tick(last, _)) = wrong.last_mut() else { panic!("a tick") };
     last.adopted = Some(2);
     assert_eq!(replay(&mut self::replayer(), &wrong), impossible);
 }
 
-/// A change is flown from the start on, whatever the log says of it, while the parameters are the log's; one that is
-/// not possible is refused, and so is one too many.
+/// The caller's changes are flown from the start on, but `parameters` returns the log's values. Impossible changes, and
+/// one too many, are refused.
 #[test]
 fn changes_are_flown_or_refused() {
     let mut vehicle = Vehicle::new();
@@ -316,7 +317,7 @@ fn changes_are_flown_or_refused() {
     let (same, differences) = replay(&mut replayer, &vehicle.records);
     assert!(same < 10 && matches!(differences[0], ReplayDifference::Given { .. }), "{same}");
     assert!(replayer.parameters().iter().eq(vehicle.table.iter()));
-    // A vehicle with that parameter flies as the change has told.
+    // A vehicle that really has this parameter gives the same outputs.
     let mut other = Vehicle::new();
     other.set(OFFSET, 0.2);
     let wanted = (0..50).map(|number| other.tick(&ControlInputs::EMPTY, stands(number))).last().unwrap();
@@ -326,8 +327,8 @@ fn changes_are_flown_or_refused() {
     assert_eq!(more, 63);
 }
 
-/// A log of another vehicle is not flown: with other rotors, another number of parameters, parameters of unknown names
-/// or values, or others than its digest says.
+/// A log of another vehicle is not replayed: the number of rotors or of parameters, a parameter's name or value, or the
+/// digest differs.
 #[test]
 fn another_vehicle_is_named() {
     let mut vehicle = Vehicle::new();
@@ -349,17 +350,17 @@ fn another_vehicle_is_named() {
         let records = [&vehicle.records[..1], &[unknown], &vehicle.records[1..]].concat();
         assert_eq!(replay(&mut replayer(), &records), (20, vec![ReplayDifference::Parameter]));
     }
-    // Ticks before a start are nothing.
+    // Ticks before a start are ignored.
     assert_eq!(replay(&mut replayer(), &vehicle.records[1..]), (0, Vec::new()));
 }
 
-/// A vehicle whose parameters are not the image's is flown with them; one whose rotor is elsewhere is another.
+/// A vehicle whose parameters differ from the image's is replayed with them. A displaced rotor means another vehicle.
 #[test]
 fn a_start_brings_its_parameters() {
     let mut vehicle = Vehicle::with(|table| assert!(table.set(name(OFFSET), 0.1).is_ok()));
     vehicle.stand(50);
     assert_eq!(replay(&mut replayer(), &vehicle.records), (50, Vec::new()));
-    // As many as there are, and then one that is changed beside them.
+    // Changes every parameter that can be changed, and then another one in flight.
     let mut changed = 0;
     let mut vehicle = Vehicle::with(|table| {
         for parameter in table.clone().iter() {

@@ -1,4 +1,4 @@
-//! What a log says of an estimate, of measurements and of modes, in PX4's frames, units and numbers.
+//! Tests the logged estimate, measurements and modes for PX4's frames, units and numbers.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
 #[allow(dead_code, reason = "other tests need the rest")]
@@ -16,10 +16,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use strict::{StrictLog, read};
 
-/// Time of the tick that is looked at \[us\].
+/// Time of the tested tick \[us\].
 const NOW_US: u64 = 5_000_000;
 
-/// A tick, which a test changes.
+/// A tick that a test changes.
 struct Tick {
     report: Report,
     details: TickDetails,
@@ -27,7 +27,7 @@ struct Tick {
 }
 
 impl Tick {
-    /// Of a vehicle that has just been switched on.
+    /// Creates a tick of a vehicle that has just been switched on.
     fn new() -> Self {
         let mut flight = Flight::<4>::new(&Configuration::default()).unwrap();
         let (mut messages, inputs) = (ControlInputs::EMPTY, TickInputs { time_us: 1_000, ..TickInputs::default() });
@@ -37,14 +37,14 @@ impl Tick {
         Tick { report, details: flight.details(&inputs, &before, &messages), origin: None }
     }
 
-    /// Reads aids, of which the estimator is offered `local`.
+    /// Sets readings of aiding sensors, and what the estimator is offered of them (`local`).
     fn reads(&mut self, aids: [Option<Measurement>; 2], local: [Option<Measurement>; 2], age_us: u32) {
         self.details.inputs.readings.aids = aids.map(|aid| aid.map(|value| Aged { value, age_us }));
         (self.details.local, self.details.offers) = (local, true);
     }
 }
 
-/// Returns a log of these ticks, a millisecond after one another.
+/// Returns a log of these ticks, one millisecond apart.
 fn log_of(ticks: &[Tick], start: &LogStart<'_>) -> StrictLog {
     let table = ParameterTable::new(Configuration::<4>::default());
     let (mut log, mut ring) = (BlackBox::new(start, &table), Box::<LogRing<65_536>>::default());
@@ -78,14 +78,14 @@ fn has(log: &StrictLog, topic: &str, wanted: &[(&str, f64)]) {
     }
 }
 
-/// Checks a vector's coordinates.
+/// Checks the elements of an array field.
 fn has_all(log: &StrictLog, topic: &str, name: &str, wanted: &[f64]) {
     for (index, wanted) in wanted.iter().enumerate() {
         has(log, topic, &[(&format!("{name}[{index}]"), *wanted)]);
     }
 }
 
-/// An estimate whose numbers all differ, but for this change.
+/// Returns an estimate with different numbers in all fields, then changed by `change`.
 fn estimate(change: impl FnOnce(&mut Estimate)) -> Estimate {
     let mut estimate = Estimate::default();
     estimate.at_us = 4_999_000;
@@ -111,12 +111,12 @@ fn estimate(change: impl FnOnce(&mut Estimate)) -> Estimate {
     estimate
 }
 
-/// Where the receiver measures from, where the local frame is in it, and where the vehicle is on the earth.
+/// Returns the receiver's geographic origin, and the local frame's origin in the receiver's frame \[m\].
 fn place() -> (Origin, Vector3<f32>) {
     (Origin::new(47.0, 8.5, 400.0).unwrap(), Vector3::new(100.0, 200.0, 10.0))
 }
 
-/// The estimate, its variances, and where on the earth it is.
+/// The estimate, its variances and its geographic position are logged.
 #[test]
 fn an_estimate_is_told() {
     let (origin, origin_m) = place();
@@ -186,7 +186,7 @@ fn an_estimate_is_told() {
     has_all(&log, "afbc_estimator", "rejected", &[21.0, 22.0, 23.0, 24.0, 25.0, 26.0, 27.0]);
     let figures = [("heading_sigma_rad", 0.13), ("height_offset_m", 0.4), ("vibration_m_s2", 0.6), ("at_rest", 0.0)];
     has(&log, "afbc_estimator", &figures);
-    // Before the first tick it was disarmed.
+    // The vehicle was disarmed before the first tick.
     has(&log, "afbc_estimator", &[("on_ground", 1.0)]);
 }
 
@@ -197,7 +197,7 @@ fn valid([attitude, heading, velocity, position, height]: [bool; 5]) -> Validity
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// MAVLink's flags of an estimator, and PX4's of a position, are by what is valid.
+    /// MAVLink's flags of the estimator and PX4's of the position match what is valid.
     #[test]
     fn what_is_valid_is_told(parts in prop::array::uniform5(any::<bool>()), has_origin: bool, observed: bool) {
         let [attitude, heading, velocity, position, height] = parts;
@@ -228,7 +228,7 @@ proptest! {
     }
 }
 
-/// An estimate that has not started says nothing of where the vehicle is.
+/// An estimator that has not started yields no state.
 #[test]
 fn an_estimate_that_has_not_started_is_no_state() {
     let log = told(|tick| {
@@ -241,7 +241,7 @@ fn an_estimate_that_has_not_started_is_no_state() {
     assert_eq!(log.times("estimator_status"), [NOW_US]);
 }
 
-/// Fixes, poses and positions, each with its time, and as the estimator was offered them: in the local frame.
+/// Fixes, poses and positions are logged with their times, and as the estimator was offered them, in the local frame.
 #[test]
 fn measurements_are_told() {
     let (origin, origin_m) = place();
@@ -311,7 +311,7 @@ fn measurements_are_told() {
     has_all(&log, "vehicle_visual_odometry", "q", &[f64::NAN; 4]);
     assert_eq!(log.field("afbc_aid", "kind"), [2.0, 6.0]);
     has_all(&log, "afbc_aid", "numbers", &[0.5, 0.1, 0.0]);
-    // As long as nobody knows where it is measured from, a fix is none.
+    // As long as the origin is unknown, a fix is not logged.
     let log = told(|tick| {
         tick.details.estimate = Some(estimate(|_| ()));
         tick.reads([Some(fix), None], [None; 2], 0);
@@ -319,7 +319,7 @@ fn measurements_are_told() {
     assert!(log.times("vehicle_gps_position").is_empty() && log.times("afbc_aid").is_empty());
 }
 
-/// A tracker's pose that a message has brought is told once.
+/// A tracker's pose from a message is logged once.
 #[test]
 fn a_pose_that_was_brought_is_told_once() {
     let pose = Pose { position_m: Vector3::new(1.0, 2.0, 3.0), ..Pose::of(&State::default(), PoseSigmas::UNKNOWN) };
@@ -337,7 +337,7 @@ fn a_pose_that_was_brought_is_told_once() {
     has_all(&log, "vehicle_visual_odometry", "position", &[1.0, -2.0, -3.0]);
 }
 
-/// Modes by PX4's numbers (`NAVIGATION_STATE` of vehicle_status), and failsafes.
+/// Modes have PX4's numbers (`NAVIGATION_STATE` of vehicle_status), and failsafes are flagged.
 #[test]
 fn modes_have_px4s_numbers() {
     for mode in FlightMode::ALL {
@@ -372,7 +372,7 @@ fn modes_have_px4s_numbers() {
     }
 }
 
-/// When it was armed and when it took off, for as long as it is.
+/// The times of arming and of take-off are logged while the vehicle is armed or airborne.
 #[test]
 fn arming_and_taking_off_have_their_times() {
     let states =
@@ -387,7 +387,7 @@ fn arming_and_taking_off_have_their_times() {
         })
         .collect();
     let log = log_of(&ticks, &LogStart::default());
-    // Each change is there at once.
+    // Each change is logged at once.
     let times: Vec<_> = [0, 1, 3, 5, 6].map(|ms| NOW_US + 1_000 * ms).to_vec();
     assert_eq!(log.times("vehicle_status"), times);
     let [armed_us, airborne_us] = [NOW_US + 1_000, NOW_US + 3_000].map(|at_us| at_us as f64);
@@ -398,7 +398,7 @@ fn arming_and_taking_off_have_their_times() {
     assert_eq!(log.field("actuator_armed", "armed"), [0.0, 1.0, 0.0]);
 }
 
-/// Setpoints are the law's while armed, and the law's signals are as it has them.
+/// Setpoints are logged while armed, and the law's signals as in its trace.
 #[test]
 fn the_laws_signals_are_told() {
     let change = |tick: &mut Tick| {
@@ -454,7 +454,7 @@ fn the_laws_signals_are_told() {
     has_all(&log, "actuator_motors", "control", &[f64::NAN; 12]);
 }
 
-/// What a log is of: texts up to 32 bytes of whole letters, and none where there is none.
+/// The information has texts of at most 32 bytes, cut between letters, and leaves out empty ones.
 #[test]
 fn a_log_says_what_it_is_of() {
     let start = LogStart {

@@ -1,5 +1,5 @@
-//! Which volumes a card may have: each number of their heads at its bound, by Microsoft's specification of FAT
-//! (fatgen103) and by how large the card is.
+//! Tests which volumes a card may have: each number of their first block at its limit, by Microsoft's specification of
+//! FAT (fatgen103) and the card's size.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
 mod room;
@@ -7,7 +7,7 @@ mod room;
 use afbc_log::storage::{CardError, FlashFailed, LogKeeper, StorageState};
 use room::{Card, Storage, VOLUME, fat16, fat32};
 
-/// Places in a volume's head, and their bytes.
+/// Offsets of the numbers in a volume's first block, and their lengths \[bytes\].
 const BYTES_PER_SECTOR: (usize, usize) = (11, 2);
 const SECTORS_PER_CLUSTER: (usize, usize) = (13, 1);
 const RESERVED: (usize, usize) = (14, 2);
@@ -27,7 +27,7 @@ fn number(card: &Card, (at, bytes): (usize, usize)) -> u32 {
     disk.bytes[VOLUME * 512 + at..][..bytes].iter().rev().fold(0, |number, byte| number << 8 | u32::from(*byte))
 }
 
-/// Returns what is known of a card after these bytes of it were changed.
+/// Returns the storage's state for a card with these bytes changed.
 fn with_bytes(card: &Card, changes: &[(usize, &[u8])]) -> StorageState {
     let before = card.0.lock().unwrap().bytes.clone();
     for (at, bytes) in changes {
@@ -41,7 +41,7 @@ fn with_bytes(card: &Card, changes: &[(usize, &[u8])]) -> StorageState {
     keeper.state()
 }
 
-/// True if a card is taken whose volume has these numbers in its head.
+/// Returns true if a card is accepted whose volume has these numbers in its first block.
 fn takes(card: &Card, numbers: &[((usize, usize), u32)]) -> bool {
     let numbers: Vec<_> = numbers.iter().map(|((at, bytes), value)| (*at, *bytes, value.to_le_bytes())).collect();
     let changes: Vec<_> = numbers.iter().map(|(at, bytes, value)| (VOLUME * 512 + at, &value[..*bytes])).collect();
@@ -52,7 +52,8 @@ fn takes(card: &Card, numbers: &[((usize, usize), u32)]) -> bool {
     }
 }
 
-/// The first partition is one of FAT, begins behind the table and on the card, and its table is signed.
+/// The first partition must have a FAT type and begin after block 0 and on the card. The partition table must be
+/// signed.
 #[test]
 fn partitions_are_checked() {
     for card in [fat16(), fat32()] {
@@ -87,20 +88,22 @@ fn shapes_are_checked() {
         for change in refused {
             assert!(!takes(&card, &[change]), "{change:?}");
         }
-        // Its end is the card's; one more block is not there. Either number may say so, if it has room for it.
+        // The volume ends where the card ends; one more block is too much. Either field may hold the size, if it is
+        // large enough.
         assert!(takes(&card, &[(TOTAL_16, 0), (TOTAL_32, total)]));
         assert!(!takes(&card, &[(TOTAL_16, 0), (TOTAL_32, total + 1)]));
         assert!(!takes(&card, &[(TOTAL_16, 0), (TOTAL_32, total + 0x1_0000)]));
         if total <= 0xFFFF {
             assert!(takes(&card, &[(TOTAL_16, total), (TOTAL_32, 0)]));
             assert!(!takes(&card, &[(TOTAL_16, total + 1), (TOTAL_32, 0)]));
-            // Nothing is left for clusters.
+            // No blocks are left for clusters.
             assert!(!takes(&card, &[(RESERVED, total)]));
         }
     }
 }
 
-/// By its number of clusters a volume is FAT12, which is not read, FAT16 or FAT32; the last two differ in their heads.
+/// The number of clusters makes a volume FAT12, which is refused, FAT16 or FAT32. Each of the last two needs its own
+/// kind of first block.
 #[test]
 fn clusters_tell_the_kind() {
     let card = fat16();
@@ -132,7 +135,7 @@ fn clusters_tell_the_kind() {
     }
 }
 
-/// A table has an entry for each cluster, and two more: one that is too short would be read beyond its end.
+/// The table must have an entry for each cluster, and two more. A shorter one would be read beyond its end.
 #[test]
 fn tables_hold_all_clusters() {
     for (card, per_sector, table) in [(fat16(), 256, TABLE_16), (fat32(), 128, TABLE_32)] {

@@ -1,4 +1,4 @@
-//! Frames: records on a wire or in a file, with a checksum.
+//! Reads and writes frames: records of the exact log with a checksum, as they go over a link or into a file.
 
 use crate::exact::record::{Record, VERSION};
 use crc::{CRC_32_ISO_HDLC, Crc};
@@ -10,25 +10,26 @@ const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// Length of the longest frame \[bytes\].
 pub const FRAME_MAX: usize = 1024;
 
-/// Writes a record's frame into `buffer`; none if it does not fit, which [`FRAME_MAX`] bytes always do.
+/// Writes a record's frame into `buffer`. Returns none if the frame does not fit; every frame fits into [`FRAME_MAX`]
+/// bytes.
 pub fn write<'b>(record: &Record, buffer: &'b mut [u8]) -> Option<&'b mut [u8]> {
     let cobs = Cobs::try_new(Slice::new(buffer)).ok()?;
     postcard::serialize_with_flavor(record, CrcModifier::new(cobs, CRC.digest())).ok()
 }
 
-/// Why bytes are no record.
+/// Reasons why bytes cannot be read as a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
-    /// They are damaged, cut off, or something else.
+    /// The bytes are damaged, cut off, or no frame at all.
     Damaged,
-    /// They are whole, but of another version of the format: this one, if they say so.
+    /// The frame is intact, but written by another version of the format. Holds that version, if the frame states it.
     Foreign(Option<u16>),
 }
 
-/// Reads a frame, without the zero at its end; its bytes are overwritten.
+/// Reads a frame without its terminating zero. Overwrites the frame's bytes.
 ///
 /// # Errors
-/// Why it is no record.
+/// A [`FrameError`] if the frame holds no record of this version.
 pub fn decode(frame: &mut [u8]) -> Result<Record, FrameError> {
     let length = cobs::decode_in_place(frame).map_err(|_| FrameError::Damaged)?;
     let (body, sum) = frame.get(..length).and_then(<[u8]>::split_last_chunk::<4>).ok_or(FrameError::Damaged)?;
@@ -38,20 +39,20 @@ pub fn decode(frame: &mut [u8]) -> Result<Record, FrameError> {
     let foreign = || FrameError::Foreign(version(body).filter(|version| *version != VERSION));
     match postcard::take_from_bytes(body) {
         Ok((Record::Start(start), _)) if start.version != VERSION => Err(foreign()),
-        // Bytes that are left show another version, whose beginning happens to read as a record of this one.
+        // Leftover bytes mean another version, whose first bytes happen to read as a record of this one.
         Ok((record, [])) => Ok(record),
         _ => Err(foreign()),
     }
 }
 
-/// Returns the version that a start of any version says.
+/// Returns the version that a start record of any version states.
 fn version(body: &[u8]) -> Option<u16> {
-    // The first kind of record, and its first field.
+    // A start record is kind 0, and the version is its first field.
     let (kind, rest): (u8, _) = postcard::take_from_bytes(body).ok()?;
     if kind == 0 { postcard::take_from_bytes(rest).ok().map(|(version, _)| version) } else { None }
 }
 
-/// Takes frames from bytes as they come, and counts those that are damaged.
+/// Splits a stream of bytes into frames, reads their records, and counts damaged frames.
 #[derive(Clone, Debug)]
 pub struct Frames {
     bytes: [u8; FRAME_MAX],
@@ -66,15 +67,15 @@ impl Default for Frames {
 }
 
 impl Frames {
-    /// Returns the number of frames that were none: damaged, cut off, or longer than any.
+    /// Returns the number of frames that could not be read: damaged, cut off, too long, or of another version.
     pub fn damaged(&self) -> u32 {
         self.damaged
     }
 
-    /// Takes a byte, and returns the record whose frame ends with it.
+    /// Takes one byte. Returns the record if the byte completes a readable frame.
     pub fn take(&mut self, byte: u8) -> Option<Record> {
         if byte != 0 {
-            // One that is too long is counted at its end.
+            // Bytes beyond the buffer are dropped; the frame counts as damaged when it ends.
             if let Some(place) = self.bytes.get_mut(self.length) {
                 *place = byte;
             }

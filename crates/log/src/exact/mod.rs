@@ -1,13 +1,12 @@
-//! The exact log of a flight: everything that a control tick takes, and enough of what it gives to see whether the same
-//! tick, run again, gives the same.
+//! Records a flight exactly: every input of every control tick, and enough of its outputs to check a replay.
 //!
-//! A [`Recorder`] makes frames of it beside the control tick, from power-up on; a [`Replayer`] runs the flight's own
-//! code over them, and finds the first tick that differs. Emulator, board and host have the same arithmetic, so that
-//! any difference is a defect.
+//! A [`Recorder`] writes the log beside the control tick, from power-up on. A [`Replayer`] runs the flight's own code
+//! on the recorded inputs and finds the first tick whose outputs differ. Emulator, board and host have the same
+//! arithmetic, so any difference is a defect.
 //!
-//! A frame is a [`Record`] in [postcard](https://postcard.jamesmunns.com)'s format, its CRC-32 (ISO-HDLC), both
-//! COBS-encoded, and a zero: a reader finds the next frame whatever was lost. The format is that of one version of this
-//! software ([`StartRecord::version`]).
+//! A frame is a [`Record`] in [postcard](https://postcard.jamesmunns.com)'s format and its CRC-32 (ISO-HDLC), both
+//! COBS-encoded, then a zero. After a loss, a reader resumes at the next zero. Only software of the same format version
+//! can read a log ([`StartRecord::version`]).
 
 mod frame;
 mod queue;

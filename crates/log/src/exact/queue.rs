@@ -1,34 +1,34 @@
-//! Frames on their way to a link that takes some of them now and some later.
+//! Queues frames for a link that may refuse them at times.
 
 use crate::exact::recorder::Recorder;
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{ControlInputs, TickRecord};
 use heapless::Vec;
 
-/// Bytes that wait for the link, at most.
+/// Largest number of bytes that wait for the link.
 const BYTES: usize = 1024;
-/// Times after which a link that takes nothing has the next frame dropped, which may be longer than it ever takes.
+/// Consecutive refusals after which the oldest frame is dropped; the frame may be longer than the link ever takes.
 const PATIENCE: u16 = 1_000;
 
-/// Frames that wait for a link, at most a kilobyte of them.
+/// Queues frames for a link, at most one kilobyte.
 ///
-/// Without room for a frame, it and all up to the end of the next tick are missing: a log lacks whole ticks, whose
-/// numbers say so, and never only what a tick has taken.
+/// If a frame does not fit, all frames up to the end of the next tick are dropped. So a log lacks whole ticks, and the
+/// tick numbers show the gap. A recorded tick never lacks its inputs.
 #[derive(Clone, Debug, Default)]
 pub struct RecordQueue {
     recorder: Recorder,
     waiting: Waiting,
-    /// Times in a row that the link has taken nothing.
+    /// Number of consecutive refusals by the link.
     refused: u16,
 }
 
-/// The bytes.
+/// Bytes of the queued frames.
 #[derive(Clone, Debug, Default)]
 struct Waiting {
     bytes: Vec<u8, BYTES>,
-    /// Of them, those at the beginning that have left.
+    /// Number of bytes at the beginning that are already sent.
     sent: usize,
-    /// True if a frame is missing whose tick is not.
+    /// True if a frame was dropped but the next tick is not dropped yet.
     lacks: bool,
 }
 
@@ -39,30 +39,30 @@ impl RecordQueue {
         recorder.start(names, table, &mut |frame| waiting.append(frame));
     }
 
-    /// Records a change of the table ([`Recorder::change`]), and returns the number of the configuration.
+    /// Records a change of the parameter table ([`Recorder::change`]). Returns the number of the new configuration.
     pub fn change<const N: usize>(&mut self, table: &ParameterTable<N>, change: RecordChange) -> u16 {
         let RecordQueue { recorder, waiting, .. } = self;
         recorder.change(table, change, &mut |frame| waiting.append(frame))
     }
 
-    /// Records what messages have brought for a tick ([`Recorder::inputs`]).
+    /// Records the inputs that messages brought for a tick ([`Recorder::inputs`]).
     pub fn inputs(&mut self, tick: u32, inputs: &ControlInputs) {
         let RecordQueue { recorder, waiting, .. } = self;
         recorder.inputs(tick, inputs, &mut |frame| waiting.append(frame));
     }
 
-    /// Records a tick.
+    /// Records a tick, or drops it if one of the frames before it was dropped.
     pub fn tick<const N: usize>(&mut self, tick: &TickRecord<'_, N>) {
         let RecordQueue { recorder, waiting, .. } = self;
         if !core::mem::take(&mut waiting.lacks) {
             recorder.tick(&tick.details.inputs, tick.report, &mut |frame| waiting.append(frame));
-            // One that does not fit is itself the gap.
+            // A tick that does not fit is itself the gap: no further tick need be dropped.
             waiting.lacks = false;
         }
     }
 
-    /// Sends frame by frame through `send`, which says whether the link has taken it, until it takes no more; to be
-    /// called in every tick.
+    /// Sends frames through `send` until it refuses one. `send` returns true if the link has taken the frame. Call this
+    /// in every tick.
     #[inline(never)]
     pub fn send(&mut self, send: &mut dyn FnMut(&[u8]) -> bool) {
         let RecordQueue { waiting, refused, .. } = self;
@@ -95,7 +95,7 @@ impl Waiting {
     fn append(&mut self, frame: &[u8]) {
         let Waiting { bytes, sent, lacks } = self;
         if bytes.extend_from_slice(frame).is_err() {
-            // What has left makes room.
+            // Removes the bytes that are sent, to make room.
             let left = bytes.len().saturating_sub(*sent);
             for place in 0..left {
                 let byte = bytes.get(*sent + place).copied().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! What is recorded.
+//! Defines the records of the exact log.
 
 use afbc_onboard::parameters::ParameterTable;
 use afbc_onboard::{ControlInputs, Report, TickInputs};
@@ -8,65 +8,65 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 use heapless::String;
 use serde::{Deserialize, Serialize};
 
-/// Version of the format, and of what the records mean.
+/// Version of the record format and of the records' meaning.
 pub const VERSION: u16 = 5;
 
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// A part of the log, in the order of its making.
+/// One record of the log. Records are in the order in which they were made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[allow(clippy::large_enum_variant, reason = "one at a time")]
 pub enum Record {
     /// The processor has started.
     Start(StartRecord),
-    /// A parameter has this value in the configuration of this number, and in those that follow.
+    /// A parameter's value in this configuration and all later ones.
     Parameter {
-        /// Number of the configuration, 0 for that of the start.
+        /// Number of the configuration; 0 is the configuration at the start.
         configuration: u16,
-        /// Its name.
+        /// Name of the parameter.
         #[serde(with = "name")]
         name: RecordName,
-        /// Its value.
+        /// Value of the parameter.
         value: f32,
     },
-    /// All parameters are as in the image, in the configuration of this number.
+    /// From this configuration on, all parameters have the values of the firmware image.
     Restored {
-        /// Its number.
+        /// Number of the configuration.
         configuration: u16,
     },
-    /// What messages have brought, for the tick of this number.
+    /// Inputs that messages brought for a tick.
     Inputs {
         /// Number of the tick.
         tick: u32,
-        /// What they have brought.
+        /// The inputs.
         inputs: ControlInputs,
     },
-    /// A tick: what it took, and what it gave.
+    /// A tick: its inputs and its outputs.
     Tick(TickInputs, Given),
 }
 
-/// Longest name of a vehicle, or of a law, that is written; of a longer one the beginning is \[bytes\].
+/// Longest name of a vehicle or law in a record \[bytes\]. A longer name is cut off.
 pub const WORD_MAX: usize = 24;
 
-/// What was started.
+/// Identifies the vehicle, the law and the parameters at the start of a log.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StartRecord {
-    /// [`VERSION`] of the writer. First, so that a reader of another version can say which one it is.
+    /// [`VERSION`] of the writer. It is the first field, so that readers of any version can find it.
     pub version: u16,
-    /// Motors of the vehicle.
+    /// Number of the vehicle's motors.
     pub rotors: u8,
-    /// Parameters in the vehicle's table.
+    /// Number of parameters in the vehicle's table.
     pub parameters: u16,
-    /// CRC-32 of their values at the start, and of the places of the rotors.
+    /// CRC-32 of the parameter values at the start and of the rotors' positions and directions of rotation.
     pub digest: u32,
-    /// Name of the vehicle, or its beginning.
+    /// Name of the vehicle, perhaps cut off.
     pub vehicle: String<WORD_MAX>,
-    /// Name of the law, or its beginning.
+    /// Name of the law, perhaps cut off.
     pub law: String<WORD_MAX>,
 }
 
 impl StartRecord {
-    /// Returns the start of a vehicle with these names and parameters.
+    /// Returns the start record of a vehicle with these names and parameters.
     pub fn of<const N: usize>(vehicle: &str, law: &str, table: &ParameterTable<N>) -> Self {
         let mut digest = CRC.digest();
         table.iter().for_each(|parameter| digest.update(&parameter.value.to_le_bytes()));
@@ -86,28 +86,28 @@ impl StartRecord {
     }
 }
 
-/// Returns as much of a text as is written.
+/// Returns the text, shortened to the whole letters that fit.
 fn word(text: &str) -> String<WORD_MAX> {
     let mut word = String::new();
     let _ = text.chars().try_for_each(|letter| word.push(letter));
     word
 }
 
-/// What a tick gave.
+/// Outputs of a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Given {
-    /// The motors' throttles: 0, or 48 to 2047.
+    /// DSHOT throttles of the motors: 0, or 48 to 2047.
     pub throttles: [u16; ROTORS_MAX],
     /// Number of the flight core's mode.
     pub mode: u8,
-    /// Half of the CRC-32 of the estimate.
+    /// Lower half of the CRC-32 of the estimated state.
     pub estimate: u16,
-    /// Half of the CRC-32 of the rotor speeds.
+    /// Lower half of the CRC-32 of the commanded rotor speeds.
     pub speeds: u16,
 }
 
 impl Given {
-    /// Returns what a report says.
+    /// Returns the outputs that a report contains.
     pub fn of<const N: usize>(report: &Report<N>) -> Self {
         let mut throttles = [0; ROTORS_MAX];
         throttles.iter_mut().zip(report.throttles).for_each(|(to, from)| *to = from);
@@ -127,7 +127,7 @@ fn half_crc<'a>(values: impl Iterator<Item = &'a f32>) -> u16 {
     digest.finalize() as u16
 }
 
-/// A parameter's name as text.
+/// Serializes a parameter's name as text.
 mod name {
     use afbc_store::RecordName;
     use serde::de::Error;

@@ -1,11 +1,11 @@
-//! The writing side.
+//! Writes the exact log.
 
 use crate::exact::frame::{FRAME_MAX, write};
 use crate::exact::record::{Given, Record, StartRecord};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{ControlInputs, Report, TickInputs};
 
-/// Makes the frames of a log, in the order in which it is called: beside the control tick, not in it.
+/// Makes the frames of a log, in the order of the calls. Runs beside the control tick, not in it.
 #[derive(Clone, Debug)]
 pub struct Recorder {
     buffer: [u8; FRAME_MAX],
@@ -19,8 +19,8 @@ impl Default for Recorder {
 }
 
 impl Recorder {
-    /// Records the start of a processor that flies the vehicle and the law of these names, with the parameters that are
-    /// not as its image has them; calls `send` with each frame.
+    /// Records the start of a processor that flies this vehicle and law, and all parameters that differ from the
+    /// firmware image. Calls `send` with each frame.
     pub fn start<const N: usize>(
         &mut self,
         [vehicle, law]: [&str; 2],
@@ -30,7 +30,7 @@ impl Recorder {
         self.configuration = 0;
         self.frame(&Record::Start(StartRecord::of(vehicle, law, table)), send);
         for parameter in table.iter() {
-            // By bits: 0 and -0 are equal, and a replay is to the last bit.
+            // Compared bit by bit: 0 and -0 are equal, but a replay must match to the last bit.
             let image = table.default_of(parameter.name).map(|parameter| parameter.value.to_bits());
             if image != Some(parameter.value.to_bits()) {
                 self.frame(&Record::Parameter { configuration: 0, name: parameter.name, value: parameter.value }, send);
@@ -38,7 +38,7 @@ impl Recorder {
         }
     }
 
-    /// Records a change of the table, and returns the number of the configuration that it makes.
+    /// Records a change of the parameter table. Returns the number of the new configuration.
     pub fn change<const N: usize>(
         &mut self,
         table: &ParameterTable<N>,
@@ -58,8 +58,8 @@ impl Recorder {
         configuration
     }
 
-    /// Records what messages have brought for the tick of this number, if they have brought anything. The battery is
-    /// recorded with the tick.
+    /// Records the inputs that messages brought for a tick, unless there are none. The battery is left out: the tick's
+    /// own record contains it.
     pub fn inputs(&mut self, tick: u32, inputs: &ControlInputs, send: &mut dyn FnMut(&[u8])) {
         let mut inputs = inputs.clone();
         inputs.battery = None;
@@ -68,7 +68,7 @@ impl Recorder {
         }
     }
 
-    /// Records a tick that took this and gave this.
+    /// Records a tick with its inputs and outputs.
     pub fn tick<const N: usize>(&mut self, took: &TickInputs, gave: &Report<N>, send: &mut dyn FnMut(&[u8])) {
         self.frame(&Record::Tick(*took, Given::of(gave)), send);
     }

@@ -1,4 +1,4 @@
-//! The reading side: the flight again.
+//! Replays the exact log: flies the recorded ticks again.
 
 use crate::exact::record::{Given, Record, StartRecord};
 use afbc_control::Trace;
@@ -9,71 +9,72 @@ use afbc_store::RecordName;
 use afbc_types::OutOfRange;
 use heapless::{Deque, Vec};
 
-/// Configurations that may wait to be flown, and inputs that may wait for their tick.
+/// Largest number of configurations that wait to be flown, and of inputs that wait for their tick.
 const WAITING: usize = 16;
-/// Parameters that may be changed.
+/// Largest number of parameters that the caller may change.
 const CHANGES_MAX: usize = 64;
 
-/// Runs the ticks of a log, under the firmware's law or that of `P`.
+/// Flies the ticks of a log again, under the firmware's law or the law of `P`.
 #[derive(Debug)]
 pub struct Replayer<const N: usize, P: Prepare<N> = ()> {
     prepare: P,
     image: Configuration<N>,
     table: ParameterTable<N>,
-    /// Parameters that are not as in the log.
+    /// Parameters that the caller changed from the log's values.
     changes: Vec<(RecordName, f32), CHANGES_MAX>,
-    /// The start whose parameters are being read.
+    /// Start record whose parameters are still being read.
     start: Option<StartRecord>,
     flight: Flight<N, P::Law>,
     inputs: ControlInputs,
     taken: ControlInputs,
-    /// Configurations that were made and not flown yet.
+    /// Configurations by number that are recorded but not flown yet.
     waiting: Deque<(u16, Configuration<N>), WAITING>,
     /// Inputs with the number of the tick that took them.
     coming: Deque<(u32, ControlInputs), WAITING>,
-    /// True from a start on; number of the next tick.
+    /// True from a valid start record to the first gap. `next` is the number of the next tick.
     began: bool,
     next: u32,
 }
 
-/// What became of a record.
+/// Result of replaying one record.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "one at a time")]
 pub enum ReplayStep<const N: usize> {
-    /// It is no tick, or one before the start.
+    /// The record is no tick, or a tick that cannot be flown because no valid start or a gap precedes it.
     Nothing,
-    /// The tick gives the same again.
+    /// The tick has the same outputs as in the log.
     Same(Report<N>),
-    /// It gives something else, or cannot be run.
+    /// The outputs differ from the log's, or the tick cannot be flown.
     Differs(ReplayDifference, Option<Report<N>>),
 }
 
-/// What differs.
+/// The way in which a replay differs from the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ReplayDifference {
-    /// The log is of a vehicle with other rotors or parameters.
+    /// The log's vehicle has another number of rotors or parameters.
     Start(StartRecord),
-    /// A parameter has a name, a value, or makes a vehicle that this software does not know.
+    /// This software rejects a parameter's name or value, or the vehicle that the parameters describe.
     Parameter,
-    /// The parameters of the start are not those of the log: it is another vehicle, or some of them are lost.
+    /// The parameters read do not match the start record: the vehicle is another one, or records are lost.
     Parameters(StartRecord),
-    /// The log lacks the ticks from this number on.
+    /// The log lacks ticks, beginning with this number.
     Missing(u32),
-    /// The log lacks the configuration that the tick of this number was the first to fly.
+    /// The log lacks the configuration that this tick was the first to fly.
     Configuration(u32),
-    /// The tick of this number gave this, and gives this again.
+    /// The outputs of a tick differ.
     Given {
         /// Number of the tick.
         number: u32,
-        /// What it gave.
+        /// Outputs in the log.
         then: Given,
-        /// What it gives again.
+        /// Outputs of the replay.
         now: Given,
     },
 }
 
 impl<const N: usize> Replayer<N> {
-    /// Begins with the image's configuration: a log starts with what differs from it.
+    /// Creates a replayer for the firmware's law. A log records its parameters as differences from the image's
+    /// configuration.
     ///
     /// # Errors
     /// The first parameter out of range.
@@ -83,7 +84,7 @@ impl<const N: usize> Replayer<N> {
 }
 
 impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
-    /// The same under the law of `prepare`.
+    /// Creates a replayer for the law of `prepare`.
     ///
     /// # Errors
     /// The first parameter out of range.
@@ -105,40 +106,39 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
         })
     }
 
-    /// Flies with this parameter from the next start on, whatever the log says of it: what it commands then is not what
-    /// the log says, of course.
+    /// Sets a parameter from the next start on, whatever the log says. The outputs will then differ from the log's.
     ///
     /// # Errors
-    /// The reason: no such parameter, a value out of its range, or too many changes.
+    /// The reason: the parameter is unknown, the value is out of range, or there are too many changes.
     pub fn change(&mut self, name: RecordName, value: f32) -> Result<(), Reason> {
         self.table.clone().put(name, value)?;
         self.changes.push((name, value)).map_err(|_| Reason::on(name, "too many changes"))
     }
 
-    /// Returns the law's internal signals of the last tick.
+    /// Returns the law's internal signals in the last tick.
     pub fn trace(&self) -> Trace {
         self.flight.trace()
     }
 
-    /// Returns the parameters as the log has them.
+    /// Returns the log's parameters, without the caller's changes.
     pub fn parameters(&self) -> &ParameterTable<N> {
         &self.table
     }
 
-    /// Returns the configuration that is flown with the changes.
+    /// Returns the configuration with the caller's changes.
     fn configuration(&self) -> Configuration<N> {
         if self.changes.is_empty() {
             return self.table.configuration().clone();
         }
         let mut table = self.table.clone();
         for (name, value) in &self.changes {
-            // Each has been checked alone.
+            // The table accepted each change when it was checked alone.
             let _ = table.put(*name, *value);
         }
         table.configuration().clone()
     }
 
-    /// Takes the next record of the log; a tick is run again.
+    /// Takes the next record of the log. If the record is a tick, flies the tick again.
     pub fn take(&mut self, record: &Record) -> ReplayStep<N> {
         match record {
             Record::Start(start) => match self.start(start) {
@@ -157,7 +157,7 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
                 if self.coming.is_full() {
                     self.coming.pop_front();
                 }
-                // There is room: the oldest has given way.
+                // Always fits: the oldest inputs have been removed.
                 let _ = self.coming.push_back((*tick, inputs.clone()));
                 ReplayStep::Nothing
             }
@@ -171,12 +171,12 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
         (self.inputs, self.taken) = (ControlInputs::EMPTY, ControlInputs::EMPTY);
         self.waiting.clear();
         self.coming.clear();
-        // The flight itself begins with the first tick: the parameters of this start are still to come.
+        // The flight itself begins with the first tick, because the start's parameters are still to come.
         (self.start, self.began, self.next) = (Some(start.clone()), is_mine, 0);
         if is_mine { Ok(()) } else { Err(ReplayDifference::Start(start.clone())) }
     }
 
-    /// Notes a configuration, until a tick flies it; that of the start is flown at once, whatever waits.
+    /// Stores a configuration until a tick flies it. The start's configuration is flown by the first tick in any case.
     fn configured(&mut self, number: u16, known: bool) -> ReplayStep<N> {
         if self.waiting.is_full() {
             self.waiting.pop_front();
@@ -189,7 +189,7 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
         if !self.began {
             return ReplayStep::Nothing;
         }
-        // A tick needs all before it: what follows a gap cannot be run, up to the next start.
+        // A tick depends on all ticks before it. After a gap, nothing can be flown until the next start.
         if tick.number != self.next {
             self.began = false;
             return ReplayStep::Differs(ReplayDifference::Missing(self.next), None);
@@ -213,12 +213,12 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
             self.coming.pop_front();
         }
         self.inputs.take_into(&mut self.taken);
-        // Not from messages, and not only what is new.
+        // The battery comes with every tick, not from messages, and replaces the last one even if it is none.
         self.taken.battery = tick.battery;
         if tick.clock_failed {
             self.flight.distrust_clock();
         }
-        // Before what follows from another configuration, as it was.
+        // As in flight, the notch moves before another configuration is adopted.
         if let Some(notch) = tick.notch_rad_s.and_then(VelocityNotch::at) {
             self.flight.move_notch(&notch);
         }
@@ -237,12 +237,14 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
         }
     }
 
-    /// Flies the configuration of this number from now on; those before it were replaced before they were flown.
+    /// Flies the configuration of this number from now on. Removes older ones: they were replaced before they were
+    /// flown.
     fn adopt(&mut self, number: u16) -> bool {
         while let Some((waiting, configuration)) = self.waiting.pop_front() {
             if waiting == number {
                 let prepared = self.prepare.prepare(&configuration);
-                // With changes it may be armed where it was not.
+                // With the caller's changes the vehicle may be armed where it was disarmed in flight, so `adopt` may
+                // refuse.
                 return prepared.is_ok_and(|prepared| self.flight.adopt(&prepared) || !self.changes.is_empty());
             }
         }

@@ -1,6 +1,6 @@
-//! Blocks of a log on their way to where they are kept.
+//! Blocks of a log on their way to the storage.
 
-/// Bytes of a block: as many as a card writes at once.
+/// Bytes in a block, equal to a block of an SD card.
 pub const BLOCK_BYTES: usize = 512;
 
 /// A part of a log.
@@ -19,30 +19,30 @@ impl Default for LogBlock {
 }
 
 impl LogBlock {
-    /// Without content.
+    /// A block without content.
     pub const EMPTY: Self = LogBlock { bytes: [0; BLOCK_BYTES], length: 0, begins: false, ends: false };
 
-    /// Returns its content: all but the last block of a log are full.
+    /// Returns the block's content. All blocks of a log are full, except the last.
     pub fn bytes(&self) -> &[u8] {
         self.bytes.get(..self.length).unwrap_or_default()
     }
 
-    /// True of the first block of a log.
+    /// Returns true for the first block of a log.
     pub fn begins(&self) -> bool {
         self.begins
     }
 
-    /// True of the last one. A log whose writer has given up has none.
+    /// Returns true for the last block of a log. A log that its writer has given up has no last block.
     pub fn ends(&self) -> bool {
         self.ends
     }
 
-    /// Makes it a block without content.
+    /// Removes the content, and marks the block as the first or last of its log.
     pub(crate) fn clear(&mut self, begins: bool, ends: bool) {
         (self.length, self.begins, self.ends) = (0, begins, ends);
     }
 
-    /// Appends as many of the bytes as there is room for; returns how many.
+    /// Appends as many of the bytes as fit. Returns their number.
     pub(crate) fn append(&mut self, bytes: &[u8]) -> usize {
         let room = self.bytes.get_mut(self.length..).unwrap_or_default();
         let count = room.len().min(bytes.len());
@@ -52,11 +52,11 @@ impl LogBlock {
     }
 }
 
-/// Where blocks go: a queue.
+/// A queue of blocks to the storage.
 pub trait BlockSink {
-    /// Returns the block to be filled next; none if the queue is full.
+    /// Returns the block to fill next, or none if the queue is full.
     fn free(&mut self) -> Option<&mut LogBlock>;
 
-    /// Queues that block.
+    /// Queues the block that [`free`](Self::free) returned.
     fn done(&mut self);
 }

@@ -1,15 +1,15 @@
-//! A memory card.
+//! Interface to a memory card.
 
 use embedded_sdmmc::Block;
 
-/// Why a card does not do something.
+/// Reasons why a call to a card fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CardError {
-    /// There is none, or it does not answer.
+    /// There is no card, or it does not answer.
     Absent,
-    /// It has refused, taken too long, or its answer is damaged.
+    /// The card has refused, taken too long, or sent a damaged answer.
     Failed,
-    /// A call would touch more blocks than a sound volume has it do.
+    /// The volume is damaged: a call would touch too many blocks, or one that it must not touch.
     Endless,
 }
 
@@ -25,23 +25,23 @@ impl core::fmt::Display for CardError {
 
 impl core::error::Error for CardError {}
 
-/// A memory card: blocks of 512 bytes by number. Every call may wait for it.
+/// A memory card: blocks of 512 bytes, addressed by number. Every call may block until the card is done.
 pub trait LogCard: Send {
-    /// Begins anew, after a failure or with another card; returns its number of blocks.
+    /// Initialises the card, at first, after a failure, or after another one is inserted. Returns its number of blocks.
     ///
     /// # Errors
-    /// If there is no card, or none that works.
+    /// If there is no card, or the card does not work.
     fn start(&mut self) -> Result<u32, CardError>;
 
     /// Reads a block.
     ///
     /// # Errors
-    /// If the card does not do it.
+    /// If the card fails.
     fn read(&mut self, number: u32, block: &mut Block) -> Result<(), CardError>;
 
-    /// Writes a block, and waits until it is kept.
+    /// Writes a block, and waits until it is stored.
     ///
     /// # Errors
-    /// If the card does not do it; the block may be written or not.
+    /// If the card fails. The block may be written or not.
     fn write(&mut self, number: u32, block: &Block) -> Result<(), CardError>;
 }

@@ -1,4 +1,4 @@
-//! Logs as files on a memory card.
+//! Keeps logs as files on a memory card.
 
 use crate::storage::block::LogBlock;
 use crate::storage::card::{CardError, LogCard};
@@ -8,31 +8,31 @@ use crate::storage::volume::{Device, NoClock};
 use core::ops::ControlFlow;
 use embedded_sdmmc::{DirEntry, Error, Mode, RawDirectory, RawFile, ShortFileName, VolumeIdx, VolumeManager};
 
-/// Time after which what is written can be read, even if the power is cut \[us\].
+/// Longest time until written data can be read back, even after a power cut \[us\].
 const SYNC_US: u64 = 500_000;
 /// Time between two attempts to start a card \[us\].
 const RETRY_US: u64 = 1_000_000;
-/// Beginning and extension of a log's name.
+/// Prefix and extension of a log's file name.
 const PREFIX: &[u8] = b"LOG";
 const EXTENSION: &[u8] = b"ULG";
-/// Digits of the least number, and the largest number whose name FAT can have.
+/// Fewest digits in a file name, and the largest log number that fits into a FAT file name.
 const DIGITS: usize = 3;
 const NUMBER_MAX: u32 = 99_999;
 
-/// A file that is written, and one that is read.
+/// The volume manager, with room for two open files: one being written and one being read.
 type Volumes<'a> = VolumeManager<Device<'a>, NoClock, 1, 2, 1>;
 
-/// What is read.
+/// State of reading logs back.
 #[derive(Debug, Default)]
 pub(crate) struct Reader {
-    /// Number of the first log that was not there, or not whole, when they were counted.
+    /// Number of the first log that was missing or unfinished when the logs were counted last.
     pub(crate) bound: Option<u32>,
-    /// The file that is open, and its place.
+    /// Place in the list of logs and handle of the file that is open for reading.
     pub(crate) open: Option<(u16, RawFile)>,
 }
 
 impl Reader {
-    /// True while a file is open.
+    /// Returns true while a file is open for reading.
     fn is_open(&self) -> bool {
         self.open.is_some()
     }
@@ -40,7 +40,7 @@ impl Reader {
 
 /// Keeps logs on a card.
 pub struct CardKeeper<'a> {
-    /// None only while it is exchanged.
+    /// The volumes. None only while [`forget`](Self::forget) replaces them.
     pub(crate) volumes: Option<Volumes<'a>>,
     pub(crate) root: Option<RawDirectory>,
     pub(crate) file: Option<RawFile>,
@@ -48,15 +48,15 @@ pub struct CardKeeper<'a> {
     pub(crate) state: StorageState,
     /// Number of the next log.
     pub(crate) next: u32,
-    /// When it was called last, and when the card is tried again \[us\].
+    /// Time of the last call, and the time of the next attempt to start the card \[us\].
     pub(crate) now_us: u64,
     retry_us: u64,
-    /// When the file was written so that it can be read \[us\].
+    /// Time at which the file was last flushed, so that its data can be read back \[us\].
     synced_us: u64,
 }
 
 impl<'a> CardKeeper<'a> {
-    /// Creates it, with nothing known of the card.
+    /// Creates the keeper. The card's state is unknown until [`poll`](LogKeeper::poll).
     pub fn new(card: &'a mut dyn LogCard) -> Self {
         CardKeeper {
             volumes: Some(volumes(Device::new(card))),
@@ -71,7 +71,7 @@ impl<'a> CardKeeper<'a> {
         }
     }
 
-    /// Writes where the file ends, if it is time to.
+    /// Writes the file's length to the card, if [`SYNC_US`] have passed since the last time.
     fn sync(&mut self, now_us: u64) {
         if self.file.is_some() && now_us.saturating_sub(self.synced_us) >= SYNC_US {
             self.synced_us = now_us;
@@ -82,7 +82,7 @@ impl<'a> CardKeeper<'a> {
         }
     }
 
-    /// Ends the file.
+    /// Closes the file being written.
     fn close(&mut self) {
         if self.file.is_some() {
             self.attempt(&mut |keeper| {
@@ -94,10 +94,10 @@ impl<'a> CardKeeper<'a> {
         }
     }
 
-    /// Starts the card, and counts its logs.
+    /// Starts the card, and finds the number of the next log.
     fn start(&mut self) {
         let Some(volumes) = &self.volumes else { return };
-        // A full one stays so while it is there.
+        // A full card stays full as long as the same card is inserted.
         let started = volumes.device(|device| device.start());
         let was_full = self.state == StorageState::Full;
         self.state = match started {
@@ -108,7 +108,7 @@ impl<'a> CardKeeper<'a> {
             Err(_) => StorageState::Failed,
         };
         match self.state {
-            // Also of a full one, logs are read and erased.
+            // Logs on a full card can still be read and erased.
             StorageState::Ready | StorageState::Full if self.root.is_none() => self.attempt(&mut Self::open_root),
             StorageState::Ready | StorageState::Full => (),
             _ => self.forget(),
@@ -128,7 +128,7 @@ impl<'a> CardKeeper<'a> {
         Ok(())
     }
 
-    /// Calls `see` with number and size of each log, and whatever else has the name of one, without a size.
+    /// Calls `see` with each log's number and size. A directory with a log's name has no size.
     pub(crate) fn each_log(
         &self,
         see: &mut dyn FnMut(u32, Option<u32>) -> ControlFlow<()>,
@@ -140,7 +140,7 @@ impl<'a> CardKeeper<'a> {
         })
     }
 
-    /// Creates the next file.
+    /// Creates the next log's file.
     fn create(&mut self) -> Result<(), Error<CardError>> {
         let (Some(volumes), Some(root)) = (&self.volumes, self.root) else { return Err(Error::BadHandle) };
         let name = log_name(self.next).ok_or(Error::DiskFull)?;
@@ -153,39 +153,39 @@ impl<'a> CardKeeper<'a> {
         self.volumes.as_ref().zip(self.file).ok_or(Error::BadHandle)
     }
 
-    /// Calls what needs the card; if that fails, gives up file and volume.
+    /// Makes a call that needs the card. If the call fails, gives up the file and the volume.
     #[inline(never)]
     pub(crate) fn attempt(&mut self, call: &mut dyn FnMut(&mut Self) -> Result<(), Error<CardError>>) {
         if let Some(volumes) = &self.volumes {
             volumes.device(|device| device.begin());
         }
         let done = call(self);
-        // Of some blocks that the card does not give, the library does not tell.
+        // `embedded-sdmmc` does not report every block that the card failed to deliver.
         let failure = self.volumes.as_ref().and_then(|volumes| volumes.device(|device| device.failure()));
         self.state = match (failure, done) {
             (None, Ok(())) => return,
             (Some(CardError::Absent), _) => StorageState::Absent,
             (Some(_), _) => StorageState::Failed,
             (None, Err(Error::DiskFull | Error::NotEnoughSpace)) => {
-                // What there is of it can be read.
+                // The part that fitted can still be read.
                 self.end_full();
                 StorageState::Full
             }
             (None, Err(_)) => StorageState::Foreign,
         };
-        // Not at once: the writer must see it, so that it begins anew.
+        // The next attempt waits, so that the writer sees the failure and begins a new log.
         self.retry_us = self.now_us.saturating_add(RETRY_US);
         self.forget();
     }
 
-    /// Has nothing open any more, and writes nothing of what was.
+    /// Closes everything without writing to the card.
     fn forget(&mut self) {
         (self.root, self.file, self.reader) = (None, None, Reader::default());
         let device = self.volumes.take().map(|volumes| volumes.free().0);
         self.volumes = device.map(volumes);
     }
 
-    /// Ends the file of a full card.
+    /// Closes the file on a full card.
     fn end_full(&mut self) {
         if let Ok((volumes, file)) = self.open() {
             volumes.device(|device| device.begin());
@@ -201,7 +201,7 @@ impl LogKeeper for CardKeeper<'_> {
 
     fn poll(&mut self, now_us: u64) {
         self.now_us = now_us;
-        // A full one may be another now.
+        // A full card may have been exchanged.
         let is_waited_for = self.root.is_none() || self.state == StorageState::Full && !self.reader.is_open();
         if is_waited_for && now_us >= self.retry_us {
             self.retry_us = now_us.saturating_add(RETRY_US);
@@ -213,7 +213,7 @@ impl LogKeeper for CardKeeper<'_> {
     fn take(&mut self, now_us: u64, block: &LogBlock) {
         self.now_us = now_us;
         if block.begins() {
-            // The log before may have had no last block.
+            // The previous log may have had no last block.
             self.close();
             self.synced_us = now_us;
             if self.state == StorageState::Ready {
@@ -241,7 +241,7 @@ impl LogKeeper for CardKeeper<'_> {
                 Ok(())
             });
         }
-        // Of some blocks that the card does not give, the library does not tell.
+        // The call may have given up the volume although it returned an answer.
         if self.root.is_none() {
             page.answer = KeeperAnswer::Failed;
         }
@@ -252,7 +252,8 @@ fn volumes(device: Device<'_>) -> Volumes<'_> {
     VolumeManager::new_with_limits(device, NoClock, 1)
 }
 
-/// Returns the name of a log, `LOG001.ULG` of the first; none if FAT can have no name for that.
+/// Returns the file name of a log, such as `LOG001.ULG` for the first. Returns none if the number does not fit into a
+/// FAT name.
 #[inline(never)]
 pub fn log_name(number: u32) -> Option<ShortFileName> {
     if number > NUMBER_MAX {
@@ -274,10 +275,10 @@ pub fn log_name(number: u32) -> Option<ShortFileName> {
     ShortFileName::create_from_str(core::str::from_utf8(name).ok()?).ok()
 }
 
-/// Returns the number of a log; none of any other entry.
+/// Returns the number of a log's file, or none for any other entry.
 fn number(entry: &DirEntry) -> Option<u32> {
     let digits = entry.name.base_name().strip_prefix(PREFIX)?;
-    // No other zeros before the number than its name has.
+    // A number of more than three digits has no leading zero.
     let is_longer = digits.len() > DIGITS && digits.first() == Some(&b'0');
     if entry.name.extension() != EXTENSION || digits.len() < DIGITS || is_longer {
         return None;

@@ -1,4 +1,4 @@
-//! Logs that are on the card already.
+//! Reads, counts and erases the logs on a card.
 
 use crate::storage::card::CardError;
 use crate::storage::card_keeper::{CardKeeper, log_name};
@@ -8,7 +8,7 @@ use core::ops::ControlFlow;
 use embedded_sdmmc::{Error, Mode};
 
 impl CardKeeper<'_> {
-    /// Answers a question; of a log that is read, with what is on the page.
+    /// Answers a query. For a read, fills `page` with the log's bytes.
     pub(crate) fn look_up(&mut self, query: LogQuery, page: &mut [u8]) -> Result<KeeperAnswer, Error<CardError>> {
         match query {
             LogQuery::Nothing => Ok(KeeperAnswer::None),
@@ -21,7 +21,7 @@ impl CardKeeper<'_> {
         }
     }
 
-    /// Returns the number of the log that is being written, or of the next one.
+    /// Returns the number of the log being written, or else of the next log.
     fn bound(&self) -> u32 {
         self.next.saturating_sub(u32::from(self.file.is_some()))
     }
@@ -38,16 +38,16 @@ impl CardKeeper<'_> {
         Ok(KeeperAnswer::Is(count))
     }
 
-    /// Returns number and size of the log at a place among those that were counted.
+    /// Returns number and size of the log at a place in the counted list.
     fn find(&mut self, place: u16) -> Result<Option<(u32, u32)>, Error<CardError>> {
-        // Whoever has not asked how many there are knows it from an earlier time.
+        // A station may ask for a log without asking for the count. Then the logs finished by now count.
         let now = self.bound();
         let bound = *self.reader.bound.get_or_insert(now);
         let (mut left, mut found) = (place, None);
         self.each_log(&mut |number, size| {
             let Some(size) = size.filter(|_| number < bound) else { return ControlFlow::Continue(()) };
             found = (left == 0).then_some((number, size));
-            // It wraps with the log that is found, behind which nobody looks.
+            // Wraps at the log that is found, but the search ends there.
             left = left.wrapping_sub(1);
             if found.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
@@ -63,7 +63,7 @@ impl CardKeeper<'_> {
             self.reader.open = Some((place, volumes.open_file_in_dir(root, name, Mode::ReadOnly)?));
         }
         let (Some(volumes), Some((_, file))) = (&self.volumes, self.reader.open) else { return Err(Error::BadHandle) };
-        // Asked before the library refuses to go there: an error would give up the volume.
+        // Checked first: a seek beyond the end is an error in `embedded-sdmmc`, and an error would give up the volume.
         if offset > volumes.file_length(file)? {
             return Ok(KeeperAnswer::Is(0));
         }
@@ -72,7 +72,7 @@ impl CardKeeper<'_> {
         Ok(KeeperAnswer::Is(length as u32))
     }
 
-    /// Erases the first of the logs: first what it occupies, then its name.
+    /// Erases the first log: frees its clusters, then deletes its directory entry.
     fn erase_one(&mut self) -> Result<KeeperAnswer, Error<CardError>> {
         self.close_read()?;
         self.reader.bound = None;
@@ -82,14 +82,14 @@ impl CardKeeper<'_> {
         let emptied = volumes.open_file_in_dir(root, name, Mode::ReadWriteTruncate)?;
         volumes.close_file(emptied)?;
         volumes.delete_entry_in_dir(root, name)?;
-        // There is room again.
+        // The card has room again.
         if self.state == StorageState::Full {
             self.state = StorageState::Ready;
         }
         Ok(KeeperAnswer::Is(1))
     }
 
-    /// Closes the file that is read.
+    /// Closes the file being read.
     fn close_read(&mut self) -> Result<(), Error<CardError>> {
         if let (Some(volumes), Some((_, file))) = (&self.volumes, self.reader.open.take()) {
             volumes.close_file(file)?;

@@ -1,8 +1,8 @@
-//! Flash for logs.
+//! Interface to flash for logs.
 
-/// Bytes that are erased at once.
+/// Bytes in a sector, the unit of erasure.
 pub const SECTOR_BYTES: u32 = 65_536;
-/// Bytes that are programmed at once, at most, none beyond a multiple of it.
+/// Bytes in a page, the unit of programming: one call must not cross a multiple of this number.
 pub const PROGRAM_BYTES: u32 = 256;
 
 /// The flash has refused, taken too long, or does not answer.
@@ -17,29 +17,29 @@ impl core::fmt::Display for FlashFailed {
 
 impl core::error::Error for FlashFailed {}
 
-/// NOR flash of sectors that are erased as a whole. Every call may wait for it.
+/// NOR flash whose sectors are erased as a whole. Every call may block until the flash is done.
 pub trait LogFlash: Send {
-    /// Begins anew, after a reset or a failure; returns its number of sectors.
+    /// Initialises the flash, at first, or after a reset or a failure. Returns its number of sectors.
     ///
     /// # Errors
-    /// If there is none that works.
+    /// If there is no working flash.
     fn start(&mut self) -> Result<u32, FlashFailed>;
 
-    /// Reads from an address on.
+    /// Reads the bytes that begin at an address.
     ///
     /// # Errors
-    /// If the flash does not do it.
+    /// If the flash fails.
     fn read(&mut self, address: u32, into: &mut [u8]) -> Result<(), FlashFailed>;
 
-    /// Makes those bits 0 that are 0 in `bytes`, which are of one page, and waits until it is done.
+    /// Clears each bit that is 0 in `bytes`, and waits until that is done. The bytes must lie in one page.
     ///
     /// # Errors
-    /// If the flash does not do it; some of it may be done.
+    /// If the flash fails. Some bytes may be programmed.
     fn program(&mut self, address: u32, bytes: &[u8]) -> Result<(), FlashFailed>;
 
-    /// Makes all bits of a sector 1, and waits until it is done.
+    /// Sets all bits of a sector to 1, and waits until that is done.
     ///
     /// # Errors
-    /// If the flash does not do it; the sector's content is unknown then.
+    /// If the flash fails. The sector's content is then unknown.
     fn erase(&mut self, sector: u32) -> Result<(), FlashFailed>;
 }

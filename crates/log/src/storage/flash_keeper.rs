@@ -1,4 +1,4 @@
-//! Logs in flash, one after another, from the first sector on: what is written stays until all is erased.
+//! Keeps logs in flash one after another, from the first sector on. They stay until all logs are erased.
 
 use crate::storage::block::LogBlock;
 use crate::storage::flash::{FlashFailed, LogFlash, PROGRAM_BYTES, SECTOR_BYTES};
@@ -8,29 +8,29 @@ use crate::storage::sector::{HEAD_BYTES, Head, LENGTH_AT, ROOM, START, length_by
 
 /// Time between two attempts to start the flash \[us\].
 const RETRY_US: u64 = 1_000_000;
-/// Bytes of the sector ahead that are looked at with each block of a log, twice as many as it has, and at once
-/// otherwise.
+/// Bytes of the sector ahead checked for blankness: with each block of a log (twice its size), and in each poll between
+/// logs.
 const LOOK_BYTES: u32 = 1_024;
 const IDLE_LOOK_BYTES: u32 = 4_096;
 
-/// The sector in which the next log begins, or this one goes on.
+/// The sector in which the next log begins, or the present one continues.
 #[derive(Clone, Copy, Debug, Default)]
 struct Ahead {
     sector: u32,
-    /// Bytes of it that are known to be blank.
+    /// Bytes at the sector's beginning that are known to be blank.
     blank: u32,
 }
 
-/// Where a log is being written.
+/// Place at which a log is being written.
 #[derive(Clone, Copy, Debug)]
 struct Written {
     head: Head,
     sector: u32,
-    /// Bytes of it in this sector.
+    /// Bytes of the log in this sector.
     length: u32,
 }
 
-/// A log that is there.
+/// A stored log: its number, its first sector and its length.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     log: u32,
@@ -47,19 +47,19 @@ pub struct FlashKeeper<'a> {
     written: Option<Written>,
     /// Number of the next log.
     next: u32,
-    /// Number of the first log that was not there, or not whole, when they were counted.
+    /// Number of the first log that was missing or unfinished when the logs were counted last.
     bound: Option<u32>,
-    /// The log that is read, and its place.
+    /// Place in the list of logs and location of the log being read.
     open: Option<(u16, Stretch)>,
-    /// While logs are being erased, the sector from which on that is done.
+    /// During an erasure, the sector erased last; the erasure goes from the last sector to the first.
     erased: Option<u32>,
-    /// When it was called last, and when the flash is tried again \[us\].
+    /// Time of the last call, and the time of the next attempt to start the flash \[us\].
     now_us: u64,
     retry_us: u64,
 }
 
 impl<'a> FlashKeeper<'a> {
-    /// Creates it, with nothing known of the flash.
+    /// Creates the keeper. The flash's state is unknown until [`poll`](LogKeeper::poll).
     pub fn new(flash: &'a mut dyn LogFlash) -> Self {
         FlashKeeper {
             flash,
@@ -76,29 +76,29 @@ impl<'a> FlashKeeper<'a> {
         }
     }
 
-    /// True once it has started, and has not failed since.
+    /// Returns true if the flash has started and not failed since.
     fn works(&self) -> bool {
         matches!(self.state, StorageState::Ready | StorageState::Full)
     }
 
-    /// Calls what needs the flash; if that fails, gives up the log.
+    /// Makes a call that needs the flash. If the call fails, gives up the log.
     fn attempt(&mut self, call: &mut dyn FnMut(&mut Self) -> Result<(), FlashFailed>) {
         if call(self).is_err() {
             self.state = StorageState::Failed;
             (self.written, self.open, self.erased) = (None, None, None);
-            // Not at once: the writer must see it, so that it begins anew.
+            // The next attempt waits, so that the writer sees the failure and begins a new log.
             self.retry_us = self.now_us.saturating_add(RETRY_US);
         }
     }
 
-    /// Starts the flash, and looks at each of its sectors.
+    /// Starts the flash, and reads the head of every sector.
     fn start(&mut self) -> Result<(), FlashFailed> {
         self.sectors = self.flash.start()?.min(u32::MAX / SECTOR_BYTES);
         self.ahead = Ahead::default();
         for sector in 0..self.sectors {
             let head = self.head_bytes(sector)?;
-            // Whatever is not blank is used: something else, or what a cut of the power has left. The look ahead passes
-            // over the last of them.
+            // A sector that is not blank is in use: by other data, or by the remains of an interrupted write.
+            // `look_ahead` moves on behind the last such sector.
             if head != [0xFF; HEAD_BYTES] {
                 self.ahead.sector = sector;
             }
@@ -120,15 +120,15 @@ impl<'a> FlashKeeper<'a> {
         Ok(Head::read(&self.head_bytes(sector)?))
     }
 
-    /// True if nothing is written in a page.
+    /// Returns true if a page is blank.
     fn is_blank(&mut self, address: u32) -> Result<bool, FlashFailed> {
         let mut page = [0; PROGRAM_BYTES as usize];
         self.flash.read(address, &mut page)?;
         Ok(page.iter().all(|byte| *byte == 0xFF))
     }
 
-    /// Looks at so many bytes more of the sector ahead. One that is not blank is passed over; without another, the
-    /// flash is full.
+    /// Checks this many more bytes of the sector ahead. Skips a sector that is not blank. The flash is full if no
+    /// sector is left.
     fn look_ahead(&mut self, bytes: u32) -> Result<(), FlashFailed> {
         let until = self.ahead.blank.saturating_add(bytes).min(SECTOR_BYTES);
         while self.ahead.sector < self.sectors && self.ahead.blank < until {
@@ -144,7 +144,7 @@ impl<'a> FlashKeeper<'a> {
         Ok(())
     }
 
-    /// Begins a part of a log in the next sector that is blank. Without one, no log is written any more.
+    /// Begins a part of a log in the next blank sector. If there is none, the flash is full and the log ends.
     fn begin(&mut self, head: Head) -> Result<(), FlashFailed> {
         while self.ahead.sector < self.sectors && self.ahead.blank < SECTOR_BYTES {
             self.look_ahead(SECTOR_BYTES)?;
@@ -156,7 +156,7 @@ impl<'a> FlashKeeper<'a> {
         let sector = self.ahead.sector;
         self.ahead = Ahead { sector: sector + 1, blank: 0 };
         self.flash.program(sector * SECTOR_BYTES, &head.bytes())?;
-        // A chip may be protected, and take nothing.
+        // Reads the head back: a write-protected chip ignores the command.
         if self.head(sector)? != Some(head) {
             return Err(FlashFailed);
         }
@@ -174,7 +174,7 @@ impl<'a> FlashKeeper<'a> {
                 continue;
             }
             let at = START + written.length;
-            // `START` is a page: what a page has room for, the sector has.
+            // `START` is a multiple of the page size, so the rest of the page is also within the sector.
             let count = (PROGRAM_BYTES - at % PROGRAM_BYTES) as usize;
             let (page, behind) = rest.split_at_checked(count).unwrap_or((rest, &[]));
             self.flash.program(written.sector * SECTOR_BYTES + at, page)?;
@@ -184,7 +184,7 @@ impl<'a> FlashKeeper<'a> {
         self.look_ahead(LOOK_BYTES)
     }
 
-    /// Notes how much of the log is in its last sector, if there is one.
+    /// Writes the log's length in its last sector into that sector's head. Does nothing if no log is being written.
     fn finish(&mut self) -> Result<(), FlashFailed> {
         let Some(Written { sector, length, .. }) = self.written.take() else { return Ok(()) };
         self.flash.program(sector * SECTOR_BYTES + LENGTH_AT, &length_bytes(length))
@@ -198,7 +198,7 @@ impl<'a> FlashKeeper<'a> {
         });
     }
 
-    /// Returns the number of the log that is being written, or of the next one.
+    /// Returns the number of the log being written, or else of the next log.
     fn first_unfinished(&self) -> u32 {
         self.written.map_or(self.next, |written| written.head.log)
     }
@@ -214,12 +214,12 @@ impl<'a> FlashKeeper<'a> {
         Ok(KeeperAnswer::Is(count))
     }
 
-    /// Returns the log at a place among those that were counted.
+    /// Returns the log at a place in the counted list.
     fn find(&mut self, place: u16) -> Result<Option<Stretch>, FlashFailed> {
         if let Some((_, stretch)) = self.open.filter(|(open, _)| *open == place) {
             return Ok(Some(stretch));
         }
-        // Whoever has not asked how many there are knows it from an earlier time.
+        // A station may ask for a log without asking for the count. Then the logs finished by now count.
         let now = self.first_unfinished();
         let bound = *self.bound.get_or_insert(now);
         let mut left = place;
@@ -235,7 +235,7 @@ impl<'a> FlashKeeper<'a> {
         Ok(None)
     }
 
-    /// Returns how long a log is that begins in this sector.
+    /// Returns the length of a log that begins in this sector \[bytes\].
     fn measure(&mut self, first: u32, log: u32) -> Result<u32, FlashFailed> {
         let (mut last, mut parts) = (first, 1);
         for sector in first + 1..self.ahead.sector {
@@ -249,14 +249,14 @@ impl<'a> FlashKeeper<'a> {
         self.flash.read(last * SECTOR_BYTES + LENGTH_AT, &mut length)?;
         let in_last = match read_length(&length) {
             Some(length) => length,
-            // The power was cut before its end.
+            // The power was cut before the log ended.
             None => self.unfinished(last)?,
         };
         Ok((parts - 1) * ROOM + in_last)
     }
 
-    /// Returns how much of a sector's room has anything written in it, in pages but for the last, whose bits may have
-    /// been changing when the power was cut.
+    /// Returns the length of the written pages in a sector, without the last one: its bits may have been changing when
+    /// the power was cut.
     fn unfinished(&mut self, sector: u32) -> Result<u32, FlashFailed> {
         let mut length = ROOM;
         while length > 0 && self.is_blank(sector * SECTOR_BYTES + START + length - PROGRAM_BYTES)? {
@@ -265,9 +265,9 @@ impl<'a> FlashKeeper<'a> {
         Ok(length.saturating_sub(PROGRAM_BYTES))
     }
 
-    /// Returns the sector of a part of a log.
+    /// Returns the sector that contains a part of a log.
     fn sector_of(&mut self, log: u32, part: u32, first: u32) -> Result<Option<u32>, FlashFailed> {
-        // Later, if some were passed over.
+        // The part lies further on if sectors were skipped.
         for sector in first.saturating_add(part)..self.ahead.sector {
             if self.head(sector)? == Some(Head { log, part }) {
                 return Ok(Some(sector));
@@ -280,7 +280,7 @@ impl<'a> FlashKeeper<'a> {
         let Some(Stretch { log, first, bytes }) = self.find(place)? else { return Ok(KeeperAnswer::None) };
         let (mut at, mut rest, mut count) = (offset, page, 0);
         while at < bytes && !rest.is_empty() {
-            // The log had this part when it was measured: without it, this is not its end, but a flash that has gone.
+            // `measure` has seen this part. If it is missing now, the flash has failed; the log does not end here.
             let sector = self.sector_of(log, at / ROOM, first)?.ok_or(FlashFailed)?;
             let within = at % ROOM;
             let length = rest.len().min((ROOM - within).min(bytes - at) as usize);
@@ -291,10 +291,10 @@ impl<'a> FlashKeeper<'a> {
         Ok(KeeperAnswer::Is(count))
     }
 
-    /// Erases a sector, the last one that is not erased yet: what a cut of the power leaves are whole logs, and perhaps
-    /// the beginning of one.
+    /// Erases the last sector that is not erased yet. So a power cut leaves whole logs, and at most the beginning of
+    /// one more.
     fn erase_one(&mut self) -> Result<KeeperAnswer, FlashFailed> {
-        // It would keep the blocks of a log waiting for too long.
+        // An erasure would delay the blocks of a log too long.
         if self.written.is_some() {
             return Ok(KeeperAnswer::Failed);
         }
@@ -336,7 +336,7 @@ impl LogKeeper for FlashKeeper<'_> {
     fn take(&mut self, now_us: u64, block: &LogBlock) {
         self.now_us = now_us;
         if block.begins() {
-            // The log before may have had no last block.
+            // The previous log may have had no last block.
             self.end();
             self.erased = None;
             if self.state == StorageState::Ready {

@@ -1,48 +1,49 @@
-//! What keeps logs.
+//! Interface of a storage for logs.
 
 use crate::storage::block::LogBlock;
 use crate::storage::query::{LogPage, LogQuery};
 
-/// Keeps the blocks of logs, and gives logs back. It may wait for its card or flash in every call but
-/// [`state`](Self::state).
+/// Stores the blocks of logs, and reads logs back. Every call except [`state`](Self::state) may block on the card or
+/// flash.
 ///
-/// A keeper holds its card or flash as a trait object: what is generic is compiled in the crate that uses it, a
-/// board's, for speed and not for size.
+/// A keeper holds its card or flash as a trait object. Generic code would be compiled in the board's crate, which
+/// optimises for speed, not for size.
 pub trait LogKeeper {
-    /// Returns what is known of the card or flash.
+    /// Returns the state of the card or flash.
     fn state(&self) -> StorageState;
 
-    /// Looks after a card that is not ready, to be called several times a second while there is no block.
+    /// Restarts a failed card or flash and does background work. Call it several times a second while no block waits.
     fn poll(&mut self, now_us: u64);
 
-    /// Keeps a block. Without room for its log, or after a failure, those up to the beginning of the next log are lost.
+    /// Stores a block. If there is no room, or after a failure, all blocks up to the beginning of the next log are
+    /// lost.
     fn take(&mut self, now_us: u64, block: &LogBlock);
 
-    /// Answers a question about the logs but the one that is being written, on a page.
+    /// Answers a query about all logs except the one being written. Writes the answer into `page`.
     fn answer(&mut self, now_us: u64, query: LogQuery, page: &mut LogPage);
 }
 
-/// What is known of the card or flash.
+/// State of the card or flash.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum StorageState {
-    /// Nothing yet.
+    /// Not known yet.
     #[default]
     Unknown,
-    /// It can take a log.
+    /// Ready for a log.
     Ready,
     /// There is no card.
     Absent,
-    /// The card has no volume of FAT16 or FAT32 in its first partition.
+    /// The card's first partition holds no intact FAT16 or FAT32 volume.
     Foreign,
-    /// It is full.
+    /// Full.
     Full,
-    /// It has failed, and is tried again.
+    /// Failed; started again at intervals.
     Failed,
 }
 
 impl StorageState {
-    /// All of them, each at the place of its number.
+    /// All states, each at the index of its number.
     pub const ALL: [Self; 6] = [
         StorageState::Unknown,
         StorageState::Ready,
@@ -52,12 +53,12 @@ impl StorageState {
         StorageState::Failed,
     ];
 
-    /// Returns the state of this number, unknown for any other.
+    /// Returns the state with this number, or [`Unknown`](Self::Unknown) for any other number.
     pub fn of(number: u8) -> Self {
         Self::ALL.get(usize::from(number)).copied().unwrap_or_default()
     }
 
-    /// Returns what stations are told of it, in at most 50 characters; none if there is nothing to tell.
+    /// Returns the text for ground stations, at most 50 characters, or none if there is nothing to report.
     pub fn text(self) -> Option<&'static str> {
         match self {
             StorageState::Unknown => None,

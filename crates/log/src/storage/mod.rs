@@ -1,15 +1,17 @@
-//! The black box on a memory card, or in flash.
+//! Keeps the black box on a memory card or in flash.
 //!
-//! A [`LogWriter`], beside the task that hears of every tick, decides when there is a log ([`LogMode`]), lets an
-//! [`crate::ulog::BlackBox`] write it, and cuts it into [`LogBlock`]s. A [`LogKeeper`], in a task that may wait for it,
-//! keeps them: a [`CardKeeper`] in the files `LOG001.ULG`, `LOG002.ULG` and so on of a card's FAT volume, a
-//! [`FlashKeeper`] in sectors of flash. Between them is a queue of blocks of the shell's; back comes what is known of
-//! the storage ([`StorageState`]). Back come also logs, to be downloaded and erased: [`KeptLogs`] asks the keeper for
-//! pages of them. Whatever a card or flash does costs log: a queue that is full, records, which the log counts as
-//! dropouts; a failure, the end of its log.
+//! A [`LogWriter`] runs beside the task that receives every tick's record. It decides when to log ([`LogMode`]), has a
+//! [`crate::ulog::BlackBox`] write the log, and cuts the log into [`LogBlock`]s. A [`LogKeeper`] stores the blocks, in
+//! a task that may block. A [`CardKeeper`] writes the files `LOG001.ULG`, `LOG002.ULG` and so on into a card's FAT
+//! volume; a [`FlashKeeper`] writes sectors of flash. The firmware or host provides the queue of blocks between the two
+//! tasks, and carries the storage's state back ([`StorageState`]). [`KeptLogs`] asks the keeper for pages of stored
+//! logs, so that stations can download and erase them.
 //!
-//! FAT is `embedded-sdmmc`'s, which can panic on a volume that is none; so a volume is checked before it is opened, and
-//! the number of blocks that one call may touch is limited.
+//! A slow or failed storage never delays a tick. When the queue is full, records are dropped, and the log counts them
+//! as dropouts. When the storage fails, the log ends.
+//!
+//! The FAT library, `embedded-sdmmc`, can panic on an invalid volume. Therefore a volume is checked before it is
+//! opened, and the number of blocks that one call may touch is limited.
 
 mod block;
 mod card;

@@ -1,5 +1,5 @@
-//! A serial NOR flash chip by the commands that all of their makers have, as the data sheet of Winbond's W25Q128JV
-//! names them (revision F, section 8).
+//! Drives a serial NOR flash chip with the commands that all makers share. The commands are named as in the data sheet
+//! of Winbond's W25Q128JV (revision F, section 8).
 
 use crate::storage::flash::{FlashFailed, LogFlash, SECTOR_BYTES};
 use core::ops::RangeInclusive;
@@ -13,25 +13,26 @@ const BLOCK_ERASE: u8 = 0xD8;
 const RELEASE_POWER_DOWN: u8 = 0xAB;
 const JEDEC_ID: u8 = 0x9F;
 
-/// Status: it programs or erases; it would.
+/// Bits of the status register: busy programming or erasing, and write enabled.
 const BUSY: u8 = 1 << 0;
 const ENABLED: u8 = 1 << 1;
-/// Longest time that is waited for \[us\]: twice that of a sector, 2 s; a page takes 3 ms at most (9.6).
+/// Longest wait \[us\]: twice the longest erasure of a block, 2 s. A page takes at most 3 ms (section 9.6).
 const PATIENCE_US: u64 = 4_000_000;
-/// The third byte of the identification, of 2^n bytes: from 128 KiB on, and what three bytes of address reach.
+/// The third byte n of the identification means 2^n bytes. Accepted values, from 128 KiB on; then the value of the
+/// largest size that three address bytes reach.
 const SIZES: RangeInclusive<u8> = 0x11..=0x22;
 const REACH: u8 = 0x18;
 
-/// A chip that is alone on its bus, or selected by it.
+/// A chip on an SPI bus.
 #[derive(Debug)]
 pub struct NorChip<D> {
     device: D,
-    /// The clock \[us\].
+    /// Returns the time \[us\].
     now_us: fn() -> u64,
 }
 
 impl<D: SpiDevice> NorChip<D> {
-    /// Creates it, for a bus of at most 50 MHz in mode 0 or 3, and a clock.
+    /// Creates the driver, for a bus of at most 50 MHz in mode 0 or 3. `now_us` returns the time \[us\].
     pub fn new(device: D, now_us: fn() -> u64) -> Self {
         NorChip { device, now_us }
     }
@@ -46,7 +47,7 @@ impl<D: SpiDevice> NorChip<D> {
         Ok(status[0])
     }
 
-    /// Waits until it neither programs nor erases.
+    /// Waits until the chip neither programs nor erases.
     fn finish(&mut self) -> Result<(), FlashFailed> {
         let since_us = (self.now_us)();
         while self.status()? & BUSY != 0 {
@@ -67,7 +68,7 @@ impl<D: SpiDevice> NorChip<D> {
     }
 }
 
-/// Returns a command with its address, in three bytes.
+/// Returns a command followed by an address of three bytes.
 fn addressed(command: u8, address: u32) -> [u8; 4] {
     let [_, high, middle, low] = address.to_be_bytes();
     [command, high, middle, low]
@@ -76,12 +77,12 @@ fn addressed(command: u8, address: u32) -> [u8; 4] {
 impl<D: SpiDevice + Send> LogFlash for NorChip<D> {
     fn start(&mut self) -> Result<u32, FlashFailed> {
         self.call(&mut [Operation::Write(&[RELEASE_POWER_DOWN])])?;
-        // What it had begun before a reset of the processor it finishes.
+        // After a reset of the processor, the chip first finishes an earlier command.
         self.finish()?;
         let mut id = [0; 3];
         self.call(&mut [Operation::Write(&[JEDEC_ID]), Operation::Read(&mut id)])?;
         let [maker, _, size] = id;
-        // A line on which nobody is rests high or low.
+        // Without a chip the line reads all zeros or all ones.
         if matches!(maker, 0 | 0xFF) || !SIZES.contains(&size) {
             return Err(FlashFailed);
         }

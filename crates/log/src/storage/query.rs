@@ -1,61 +1,62 @@
-//! What is asked of kept logs, by a task that cannot wait for card or flash, and answered by the one that can.
+//! Queries about stored logs, from a task that must not block on the storage to the task that may.
 
 use afbc_station::services::storage::{LogInfo, LogStore};
 use core::task::Poll;
 
-/// Bytes of a log that are read at once: five parts of a download.
+/// Bytes of a log read at once: five parts of a download.
 pub const PAGE_BYTES: usize = 450;
 
-/// A question about the logs that are kept, except the one that is being written. Each has its place, in the order of
-/// the directory, which it keeps until they are counted again.
+/// A query about the stored logs, without the log being written. A log is addressed by its place in the order of the
+/// directory. Places stay valid until the logs are counted again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LogQuery {
-    /// None.
+    /// No query.
     #[default]
     Nothing,
-    /// How many there are.
+    /// The number of logs.
     Count,
-    /// The size of the one at this place \[bytes\].
+    /// The size of the log at this place \[bytes\].
     Size(u16),
-    /// What is in the one at this place, from this byte on.
+    /// The content of the log at this place, from this offset on.
     Read(u16, u32),
-    /// That one of them be erased.
+    /// Erase one log, or one sector of flash.
     Erase,
 }
 
-/// The answer to a question.
+/// The answer to a query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum KeeperAnswer {
-    /// There is no such log; of [`LogQuery::Erase`], none is left.
+    /// There is no such log. For [`LogQuery::Erase`]: nothing is left to erase.
     #[default]
     None,
-    /// The number that was asked for; of [`LogQuery::Read`], of the bytes that were read: fewer than a page at the end.
+    /// The number asked for. For [`LogQuery::Read`]: the number of bytes read, less than a page at the log's end.
     Is(u32),
-    /// The storage does not do it.
+    /// The storage has failed or refused.
     Failed,
 }
 
-/// A question with its answer.
+/// A query with its answer.
 #[derive(Clone, Debug)]
 pub struct LogPage {
     pub(crate) query: LogQuery,
     pub(crate) answer: KeeperAnswer,
-    /// What was read.
+    /// The bytes that were read.
     pub(crate) bytes: [u8; PAGE_BYTES],
 }
 
 impl LogPage {
-    /// Without a question.
+    /// A page without a query.
     pub const EMPTY: Self = LogPage { query: LogQuery::Nothing, answer: KeeperAnswer::None, bytes: [0; PAGE_BYTES] };
 
-    /// Copies what was read from `offset` on; none if it is not on this page, not all of what fits, or was not read.
+    /// Copies bytes of the page that begin at `offset` of the log. Returns none if the page was not read, or holds too
+    /// few of them although the log continues.
     fn copy(&self, place: u16, offset: u32, into: &mut [u8]) -> Option<usize> {
         let LogQuery::Read(at, from) = self.query else { return None };
         let skipped = offset.checked_sub(from).filter(|_| at == place)? as usize;
         let length = match self.answer {
             KeeperAnswer::Is(length) => (length as usize).min(PAGE_BYTES),
             KeeperAnswer::None => 0,
-            // Not the end of the log: it goes on once the storage does.
+            // A failure is not the log's end: the storage may recover.
             KeeperAnswer::Failed => return None,
         };
         let rest = self.bytes.get(skipped..length).unwrap_or_default();
@@ -68,33 +69,34 @@ impl LogPage {
     }
 }
 
-/// A queue of one page, from the task that waits for it, and one of questions to it.
+/// Channels between the task that reads logs and the task that owns the storage: a queue of one page, and one of
+/// queries.
 pub trait LogPages {
-    /// Returns the page that is there, if one is.
+    /// Returns the page in the queue, if there is one.
     fn page(&mut self) -> Option<&LogPage>;
 
-    /// Gives it back.
+    /// Releases the page.
     fn done(&mut self);
 
-    /// Asks, in the place of what was asked before.
+    /// Sends a query, which replaces an earlier one.
     fn ask(&mut self, query: LogQuery);
 }
 
-/// The logs that are kept, as the services for stations want them.
+/// Gives the station services access to the stored logs.
 #[derive(Clone, Debug)]
 pub struct KeptLogs<P> {
     pages: P,
-    /// What is asked and not answered.
+    /// The query that has no answer yet.
     asked: LogQuery,
 }
 
 impl<P: LogPages> KeptLogs<P> {
-    /// With nothing asked.
+    /// Creates it without a query.
     pub fn new(pages: P) -> Self {
         KeptLogs { pages, asked: LogQuery::Nothing }
     }
 
-    /// Asks, once until there is an answer.
+    /// Sends the query, unless it is already waiting for its answer.
     fn wait_for(&mut self, query: LogQuery) {
         if self.asked != query {
             self.asked = query;
@@ -102,7 +104,7 @@ impl<P: LogPages> KeptLogs<P> {
         }
     }
 
-    /// Asks, or returns the answer, once.
+    /// Returns the query's answer if there is one, else sends the query.
     #[inline(never)]
     fn ask(&mut self, query: LogQuery) -> Poll<KeeperAnswer> {
         let answered = self.pages.page().map(|page| (page.query, page.answer));
@@ -138,7 +140,7 @@ impl<P: LogPages> LogStore for KeptLogs<P> {
     }
 
     fn read_log(&mut self, place: u16, offset: u32, into: &mut [u8]) -> Poll<usize> {
-        // The page stays for what follows on it.
+        // The page stays in the queue, for the next read may need more of it.
         let copied = self.pages.page().map(|page| page.copy(place, offset, into));
         if let Some(Some(count)) = copied {
             self.asked = LogQuery::Nothing;
@@ -156,7 +158,7 @@ impl<P: LogPages> LogStore for KeptLogs<P> {
         match self.ask(LogQuery::Erase) {
             Poll::Ready(KeeperAnswer::None) => Poll::Ready(true),
             Poll::Ready(KeeperAnswer::Failed) => Poll::Ready(false),
-            // One at a time, so that blocks of a log are not kept waiting for all of them.
+            // Erased one by one, so that the blocks of a log never wait for all of them.
             Poll::Ready(KeeperAnswer::Is(_)) => {
                 self.wait_for(LogQuery::Erase);
                 Poll::Pending

@@ -1,24 +1,24 @@
-//! A sector of a log: a page with what it is, then the log.
+//! Reads and writes the head of a sector of flash that contains a log.
 //!
-//! Of that page, in little-endian words: the mark (8 bytes), the log's number, the part of it that this is, both
-//! inverted, and in the last part of a log that has ended the bytes of the log in it, the same inverted. What a cut of
-//! the power leaves of a word is not the inverse of what it leaves of the other, unless both are whole: programming
-//! makes ones zeros, and of each pair of bits one stays.
+//! The sector's first page is its head, in little-endian words: the mark (8 bytes), the log's number, the part's
+//! number, and both numbers inverted. In a finished log's last part, its length in this sector follows, and the same
+//! inverted. The inverses reveal words that a power cut left half programmed: programming only turns ones into zeros,
+//! and one bit of each pair must stay one.
 
 use crate::storage::flash::{PROGRAM_BYTES, SECTOR_BYTES};
 
-/// Where the log begins in a sector, and its bytes in it, at most.
+/// Offset of the log's data in a sector, and the most bytes of data in one sector.
 pub(crate) const START: u32 = PROGRAM_BYTES;
 pub(crate) const ROOM: u32 = SECTOR_BYTES - START;
-/// The mark, the part's words, and the length's.
+/// Length of the mark and the part's words, and the offset of the length's words.
 pub(crate) const HEAD_BYTES: usize = 24;
 pub(crate) const LENGTH_AT: u32 = HEAD_BYTES as u32;
 const MARK: &[u8; 8] = b"AFBCLOG1";
 
-/// What a sector is.
+/// Head of a sector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Head {
-    /// The log, numbered from 1 on, and the part of it, from 0 on.
+    /// Number of the log, from 1 on, and number of the part, from 0 on.
     pub(crate) log: u32,
     pub(crate) part: u32,
 }
@@ -31,7 +31,7 @@ impl Head {
         bytes
     }
 
-    /// Returns what these bytes say, if they are whole.
+    /// Returns the head that these bytes encode, or none if they are not intact.
     pub(crate) fn read(bytes: &[u8; HEAD_BYTES]) -> Option<Self> {
         let (log, part) = (word(bytes, 8), word(bytes, 12));
         let head = Head { log, part };
@@ -39,7 +39,7 @@ impl Head {
     }
 }
 
-/// Returns the bytes that say how much of the log is in its last sector.
+/// Returns the encoded length of the log in its last sector.
 pub(crate) fn length_bytes(length: u32) -> [u8; 8] {
     let mut bytes = [0; 8];
     let words = [length, !length].into_iter().flat_map(u32::to_le_bytes);
@@ -47,7 +47,7 @@ pub(crate) fn length_bytes(length: u32) -> [u8; 8] {
     bytes
 }
 
-/// Returns what they say, if they are whole.
+/// Returns the length that these bytes encode, or none if they are not intact.
 pub(crate) fn read_length(bytes: &[u8; 8]) -> Option<u32> {
     let length = word(bytes, 0);
     (length <= ROOM && length_bytes(length) == *bytes).then_some(length)

@@ -1,25 +1,25 @@
-//! The volume on a card: what of it must be sound before anything is opened, and how much a call may touch.
+//! Checks a card's volume before it is opened, and limits the blocks that one call may touch.
 
 use crate::storage::card::{CardError, LogCard};
 use core::cell::{Cell, RefCell};
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx, TimeSource, Timestamp};
 
-/// Blocks that a call may touch, at most: more than the table of the largest FAT32 has that SD cards come with
-/// (2^26 clusters, 128 in a block).
+/// Most blocks that one call may touch: more than the allocation table of the largest FAT32 volume on SD cards (2^26
+/// clusters, 128 in a block).
 const TOUCHED_MAX: u32 = 1 << 20;
-/// Partition types: FAT16 in three sorts, and FAT32 in two.
+/// Partition types: three of FAT16 and two of FAT32.
 const TYPES: [u8; 5] = [0x04, 0x06, 0x0E, 0x0B, 0x0C];
-/// Fewest clusters of a FAT16, and of a FAT32.
+/// Fewest clusters of a FAT16 and of a FAT32 volume.
 const CLUSTERS: [u64; 2] = [4_085, 65_525];
 
-/// A card as `embedded-sdmmc` wants it.
+/// A card as `embedded-sdmmc` uses it.
 pub(crate) struct Device<'a> {
     card: RefCell<&'a mut dyn LogCard>,
-    /// Blocks, once the card has started.
+    /// Number of blocks, 0 until the card has started.
     blocks: Cell<u32>,
-    /// What the call may still touch.
+    /// Number of blocks that the present call may still touch.
     left: Cell<u32>,
-    /// How the card failed in this call: `embedded-sdmmc` may call that a full disk.
+    /// The card's failure in the present call. `embedded-sdmmc` may report it as a full disk.
     failure: Cell<Option<CardError>>,
 }
 
@@ -28,18 +28,18 @@ impl<'a> Device<'a> {
         Device { card: RefCell::new(card), blocks: Cell::new(0), left: Cell::new(0), failure: Cell::new(None) }
     }
 
-    /// Begins a call.
+    /// Begins a call: resets its block limit and its failure.
     pub(crate) fn begin(&self) {
         self.left.set(TOUCHED_MAX);
         self.failure.set(None);
     }
 
-    /// Returns how the card has failed in this call, if it has.
+    /// Returns the card's failure in the present call, if any.
     pub(crate) fn failure(&self) -> Option<CardError> {
         self.failure.get()
     }
 
-    /// Starts the card; true if its first volume is sound.
+    /// Starts the card. Returns true if its first partition holds an intact FAT volume.
     pub(crate) fn start(&self) -> Result<bool, CardError> {
         self.begin();
         let blocks = self.touch(|card| card.start())?;
@@ -55,7 +55,7 @@ impl<'a> Device<'a> {
     }
 
     fn touch<T>(&self, call: impl FnOnce(&mut dyn LogCard) -> Result<T, CardError>) -> Result<T, CardError> {
-        // `try`: the library must not make it panic, in whatever order it calls.
+        // `try_borrow_mut` cannot panic, in whatever order the library calls.
         let done = match (self.left.get().checked_sub(1), self.card.try_borrow_mut()) {
             (Some(left), Ok(mut card)) => {
                 self.left.set(left);
@@ -82,7 +82,7 @@ impl BlockDevice for Device<'_> {
 
     fn write(&self, blocks: &[Block], start: BlockIdx) -> Result<(), CardError> {
         (start.0..).zip(blocks).try_for_each(|(number, block)| {
-            // The first block is never written: it has the partitions.
+            // Block 0 holds the partition table and is never written.
             let is_there = number > 0 && number < self.blocks.get();
             self.touch(|card| if is_there { card.write(number, block) } else { Err(CardError::Endless) })
         })
@@ -93,7 +93,7 @@ impl BlockDevice for Device<'_> {
     }
 }
 
-/// No clock: files are of the earliest day that FAT knows.
+/// Stamps all files with the first day that FAT can express, 1 January 1980, because there is no clock.
 pub(crate) struct NoClock;
 
 impl TimeSource for NoClock {
@@ -118,16 +118,16 @@ fn is_signed(block: &[u8; 512]) -> bool {
     word(block, 510) == 0xAA55
 }
 
-/// Returns the first block of the first partition, if it is FAT's.
+/// Returns the first block of the first partition, if its type is FAT.
 fn first_partition(block: &[u8; 512]) -> Option<u32> {
     let is_fat = is_signed(block) && byte(block, 446) & 0x7F == 0 && TYPES.contains(&byte(block, 450));
     let start = u32::try_from(long(block, 454)).ok()?;
     (is_fat && start > 0).then_some(start)
 }
 
-/// True of the first block of a volume that fits into so many blocks and whose numbers fit together.
+/// Returns true if this first block describes a consistent FAT volume that fits into `room` blocks.
 fn is_sound(block: &[u8; 512], room: u64) -> bool {
-    // The short number of a volume that is too large for it is 0: then the long one counts.
+    // A count too large for its 16-bit field is 0 there and stands in the 32-bit field.
     let either = |short, long: u64| if short == 0 { long } else { short };
     let per_cluster = u64::from(byte(block, 13));
     let (reserved, tables, entries) = (word(block, 14), u64::from(byte(block, 16)), word(block, 17));
@@ -143,16 +143,16 @@ fn is_sound(block: &[u8; 512], room: u64) -> bool {
     if !shape {
         return false;
     }
-    // `shape` sees to it that this neither divides by zero nor underflows.
+    // `shape` ensures that the next line neither divides by zero nor underflows.
     let clusters = (total - before) / per_cluster;
     let [fat16, fat32] = CLUSTERS;
-    // Clusters are numbered from 2 on. Their table must hold all, or the library would read behind it.
+    // Clusters are numbered from 2 on. The table must have room for all, or the library would read beyond it.
     let ends = clusters + 2;
     if clusters < fat32 {
         return clusters >= fat16 && entries > 0 && table * 256 >= ends;
     }
     let (root, info) = (long(block, 44), word(block, 48));
-    // The library takes a FAT with fewer clusters for FAT16, one with more for FAT32, as this does.
+    // Both this check and the library tell FAT16 from FAT32 by the number of clusters alone.
     clusters < 1 << 28
         && entries == 0
         && word(block, 42) == 0

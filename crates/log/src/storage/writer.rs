@@ -1,4 +1,4 @@
-//! From ticks to blocks.
+//! Turns ticks into blocks of a log.
 
 use crate::storage::block::{BLOCK_BYTES, BlockSink};
 use crate::storage::keeper::StorageState;
@@ -6,38 +6,38 @@ use crate::ulog::{BesideTick, BlackBox, LogRing, LogStart};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{LogMode, TickRecord};
 
-/// Bytes that wait for a block, at most: more than a tick in which every topic is due writes, beside what does not
-/// fill one.
+/// Size of the ring of bytes that wait for a block. It holds a tick in which every topic is due, and the unfinished
+/// block before.
 pub const STAGING: usize = 2560;
-/// Entries of a log's beginning that are looked at in a tick, at most: each is searched for in the vehicle's table, and
-/// the task that hears of ticks has other things to do.
+/// Most entries of a log's beginning handled in one tick. Each entry is looked up in the vehicle's table, and the task
+/// has other work.
 const PACE: u16 = 2;
-/// Time for which a log goes on once the vehicle is disarmed \[us\].
+/// Time for which a log continues after the vehicle is disarmed \[us\].
 const TAIL_US: u64 = 1_000_000;
 
 /// Writes the logs of a vehicle into blocks.
 #[derive(Clone, Debug, Default)]
 pub struct LogWriter {
-    /// The log that is being written.
+    /// The log being written.
     log: Option<BlackBox>,
     ring: LogRing<STAGING>,
-    /// True until its first block has gone.
+    /// True until the log's first block is sent.
     begins: bool,
-    /// True once it only has to leave.
+    /// True once the log is complete and only waits to be sent.
     ends: bool,
-    /// When the vehicle was armed last \[us\].
+    /// Time of the last tick in which the vehicle was armed \[us\].
     armed_us: Option<u64>,
-    /// When the last tick was \[us\].
+    /// Time of the last tick \[us\].
     ticked_us: Option<u64>,
-    /// What stations know of the storage.
+    /// State of the storage that stations were told last.
     told: StorageState,
-    /// True if logs are to be small.
+    /// True for small logs.
     small: bool,
 }
 
 impl LogWriter {
-    /// Creates it, with no log, for small logs, where there is room for minutes only ([`BlackBox::small`]), or usual
-    /// ones.
+    /// Creates the writer, without a log. `small` selects small logs, for a storage that holds only minutes
+    /// ([`BlackBox::small`]).
     pub const fn new(small: bool) -> Self {
         LogWriter {
             log: None,
@@ -51,8 +51,8 @@ impl LogWriter {
         }
     }
 
-    /// True if a log is being written, or would be with a storage that is ready: then [`tick`](Self::tick) is to be
-    /// called for every tick. To be asked once in each.
+    /// Returns true if a tick at this time belongs into a log. Then call [`tick`](Self::tick). Call this once in every
+    /// tick.
     pub fn wants(&mut self, now_us: u64, armed: bool, mode: LogMode) -> bool {
         if armed {
             self.armed_us = Some(now_us);
@@ -63,13 +63,13 @@ impl LogWriter {
             LogMode::BootUntilDisarm => is_recent || self.armed_us.is_none(),
             LogMode::Boot => true,
         };
-        // A log that has ended leaves before the next begins.
+        // A finished log is sent completely before the next one begins.
         self.ends |= self.log.is_some() && !wanted;
         wanted && !self.ends
     }
 
-    /// Writes a tick, into the log of a vehicle as `start` has it, if the storage takes one. Ticks that are missing
-    /// before it, more than `period_us` apart, count as a dropout.
+    /// Writes a tick into the log. Begins a log, described by `start`, if the storage is ready and there is none. A gap
+    /// of more than one and a half `period_us` since the last tick is logged as a dropout.
     pub fn tick<const M: usize, const N: usize>(
         &mut self,
         (tick, beside): (&TickRecord<'_, M>, &BesideTick<'_>),
@@ -80,7 +80,7 @@ impl LogWriter {
     ) {
         if self.log.is_none() && storage == StorageState::Ready && !self.ends {
             (self.begins, self.ticked_us) = (true, None);
-            // A log that was given up has left bytes.
+            // A log that was given up may have left bytes in the ring.
             self.ring = LogRing::new();
             let log = BlackBox::new(start, table).paced(PACE);
             self.log = Some(if self.small { log.small() } else { log });
@@ -88,7 +88,7 @@ impl LogWriter {
         let Some(log) = self.log.as_mut().filter(|_| !self.ends) else { return };
         let now_us = tick.report.time_us;
         if let Some(due_us) = self.ticked_us.map(|ticked_us| ticked_us.saturating_add(period_us))
-            // Half a period: no tick is that early or late.
+            // Half a period of tolerance: no tick comes that early or late.
             && now_us > due_us.saturating_add(period_us / 2)
         {
             log.miss(due_us);
@@ -97,7 +97,7 @@ impl LogWriter {
         log.tick(tick, beside, table, &mut self.ring);
     }
 
-    /// Writes a change of the parameters, to be called after it.
+    /// Writes a parameter change. Call it after the table has changed.
     pub fn change<const N: usize>(&mut self, table: &ParameterTable<N>, change: RecordChange) {
         if let Some(log) = &mut self.log {
             log.change(table, change, &mut self.ring);
@@ -111,8 +111,8 @@ impl LogWriter {
         }
     }
 
-    /// Hands over what fills blocks, and all that is left of a log that has ended; to be called in every tick. A log
-    /// whose storage is not ready any more is given up.
+    /// Hands full blocks to `sink`, and the whole rest of a finished log. Call it in every tick. Gives up the log if
+    /// the storage is not ready any more.
     pub fn send(&mut self, sink: &mut impl BlockSink, storage: StorageState) {
         if self.log.is_some() && storage != StorageState::Ready {
             (self.log, self.ends) = (None, false);
@@ -125,7 +125,7 @@ impl LogWriter {
             let Some(block) = sink.free() else { return };
             let is_last = self.ends && self.ring.len() <= BLOCK_BYTES;
             block.clear(self.begins, is_last);
-            // Twice: the ring's end, and its beginning.
+            // The ring's bytes may lie in two pieces: up to the memory's end, and from its beginning.
             for _ in 0..2 {
                 let count = block.append(self.ring.front());
                 self.ring.consume(count);
@@ -138,13 +138,13 @@ impl LogWriter {
         }
     }
 
-    /// Returns a text for stations when there is something new about the storage, and whether it is a warning. That a
-    /// storage is ready is told only after it was not.
+    /// Returns a text for ground stations when the storage's state has changed, and true if the text is a warning.
+    /// `Ready` is reported only after another state was.
     pub fn news(&mut self, storage: StorageState) -> Option<(&'static str, bool)> {
         if storage == self.told || storage == StorageState::Unknown {
             return None;
         }
-        // What has failed is tried again, which does not tell more of it.
+        // At the first start, a ready storage is no news.
         let is_news = !(self.told == StorageState::Unknown && storage == StorageState::Ready);
         self.told = storage;
         let text = storage.text().filter(|_| is_news)?;

@@ -1,4 +1,4 @@
-//! The writer.
+//! Writes the black box.
 
 use crate::ulog::definitions::{Definitions, LogStart, parameter};
 use crate::ulog::dropouts::Dropouts;
@@ -18,25 +18,25 @@ use afbc_onboard::{Aged, TickRecord, tracker_aid};
 use afbc_store::RecordName;
 use afbc_types::{PerAxis, ROTORS_MAX, Stamped};
 
-/// Bytes by which a damaged log is found again, and the time between two of them \[us\].
+/// Bytes from which a reader resumes in a damaged log, and the time between two such marks \[us\].
 const SYNC: [u8; 8] = [0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
 const SYNC_US: u64 = 500_000;
-/// Kinds of measurements, numbered as in `afbc_aid`, from 1 on.
+/// Length of an array with an entry per kind of measurement: `afbc_aid` numbers the six kinds from 1 on.
 const AID_KINDS: usize = 7;
-/// Longest text; of a longer one the beginning is written \[bytes\].
+/// Longest text in the log \[bytes\]. A longer text is cut off.
 const TEXT_MAX: usize = 128;
 
-/// Writes the log of a vehicle from its power-up on: beside the control tick, not in it.
+/// Writes the log of a vehicle. Runs beside the control tick, not in it.
 #[derive(Clone, Debug)]
 pub struct BlackBox {
     known: Known,
     definitions: Definitions,
-    /// Entries of the beginning, and changed parameters, that are written in a tick, at most.
+    /// Most entries of the log's beginning, or changed parameters, written in one tick.
     pace: u16,
     small: bool,
     unwritten: Unwritten,
     dropouts: Dropouts,
-    /// When each topic is due \[us\].
+    /// Time at which each topic is due \[us\].
     due_us: [u64; TOPICS.len()],
     synced_us: u64,
     last: Last,
@@ -47,20 +47,20 @@ pub struct BlackBox {
 enum Unwritten {
     None,
     One(RecordName),
-    /// All from this place on.
+    /// All parameters from this place in the table on.
     From(u16),
 }
 
-/// What the last tick has left.
+/// State carried from tick to tick.
 #[derive(Clone, Debug, Default)]
 struct Last {
     armed: bool,
     airborne: bool,
-    /// When it was armed, and when it has taken off \[us\].
+    /// Times of arming and of take-off, 0 while disarmed or on the ground \[us\].
     since_us: [u64; 2],
-    /// Samples that are in no message yet.
+    /// Inertial samples that are in no message yet.
     mean: Option<MeanSample>,
-    /// When a measurement of each kind is due in a small log \[us\].
+    /// Time at which each kind of measurement is due in a small log \[us\].
     aids_due_us: [u64; AID_KINDS],
     sampled: Option<(SensorCombined, u64)>,
     pose_us: Option<u64>,
@@ -72,7 +72,7 @@ struct Last {
 }
 
 impl BlackBox {
-    /// Creates it, with nothing written, for a vehicle with these parameters.
+    /// Creates a log with nothing written yet, for a vehicle with these parameters.
     pub fn new<const N: usize>(start: &LogStart<'_>, table: &ParameterTable<N>) -> Self {
         BlackBox {
             known: Known::of(table.configuration()),
@@ -87,23 +87,23 @@ impl BlackBox {
         }
     }
 
-    /// Looks at so many entries of the log's beginning in a tick, at most, one at least: formats, parameters and the
-    /// like, some hundreds in all, each looked up in the vehicle's table. So it is also with parameters that have
-    /// changed all at once. Without that it is as many as there is room for.
+    /// Limits the entries of the log's beginning that one tick handles; the limit is at least one. There are some
+    /// hundreds of entries: formats, parameters and the like, each looked up in the vehicle's table. The limit also
+    /// holds when all parameters change at once. Without `paced`, only the ring's room limits them.
     #[must_use]
     pub fn paced(self, entries: u16) -> Self {
         BlackBox { pace: entries.max(1), ..self }
     }
 
-    /// Makes it a small log: each topic by its longer period
-    /// ([`LoggedTopic::small_us`](crate::ulog::LoggedTopic::small_us)), and the inertial sensor's as the mean of its
+    /// Makes this a small log. Each topic is written at its longer period
+    /// ([`LoggedTopic::small_us`](crate::ulog::LoggedTopic::small_us)), and the inertial sensor as the mean of its
     /// samples since the last message.
     #[must_use]
     pub fn small(self) -> Self {
         BlackBox { small: true, ..self }
     }
 
-    /// Writes a change of the table, to be called after it.
+    /// Writes a parameter change. Call it after the table has changed.
     pub fn change<const N: usize, const R: usize>(
         &mut self,
         table: &ParameterTable<N>,
@@ -113,10 +113,10 @@ impl BlackBox {
         self.known = Known::of(table.configuration());
         self.unwritten = match (self.unwritten, change) {
             (Unwritten::None, RecordChange::Set(name, _)) => Unwritten::One(name),
-            // There is place for one.
+            // Only one name can be remembered, so all parameters are written again.
             _ => Unwritten::From(0),
         };
-        // All of them go at their pace.
+        // A change of all parameters is written by `tick`, at its pace.
         if self.definitions.is_done() && matches!(self.unwritten, Unwritten::One(_)) {
             self.write_parameters(table, &mut ring.view());
         }
@@ -127,7 +127,7 @@ impl BlackBox {
         if !self.definitions.is_done() {
             return;
         }
-        // Between letters: readers take it for UTF-8.
+        // Cut between letters, for readers expect UTF-8.
         let end = (0..=TEXT_MAX.min(text.len())).rfind(|end| text.is_char_boundary(*end)).unwrap_or_default();
         let text = text.get(..end).unwrap_or_default();
         let _ = self.dropouts.put(now_us, &mut ring.view(), &mut |ring| {
@@ -139,15 +139,15 @@ impl BlackBox {
         });
     }
 
-    /// Notes that ticks are missing from a time on, up to the next one that is written: a dropout.
+    /// Logs a dropout from a time to the next written tick: ticks are missing.
     pub fn miss(&mut self, since_us: u64) {
         if self.definitions.is_done() {
             self.dropouts.miss(since_us);
         }
     }
 
-    /// Writes a tick, after what is left of the log's beginning. Without room for all of that, nothing of the tick is
-    /// written.
+    /// Writes the rest of the log's beginning, if any, then the tick. The tick is left out until the beginning is
+    /// complete.
     pub fn tick<const M: usize, const N: usize, const R: usize>(
         &mut self,
         tick: &TickRecord<'_, M>,
@@ -170,7 +170,8 @@ impl BlackBox {
         self.topics(&TickRecord { report: &report, details: tick.details }, beside, writes, &mut ring);
     }
 
-    /// Writes the topics of a tick, or only remembers it. Once, for vehicles with any number of rotors.
+    /// Writes a tick's topics, or only updates the state carried between ticks. Not generic, so that it is compiled
+    /// once for all numbers of rotors.
     #[inline(never)]
     fn topics(
         &mut self,
@@ -189,7 +190,7 @@ impl BlackBox {
         (self.last.armed, self.last.airborne) = (report.mode.armed(), report.guided.airborne);
     }
 
-    /// Writes what has changed of the parameters, as far as there is room, and at its pace.
+    /// Writes changed parameters, as far as room and pace allow.
     fn write_parameters<const N: usize>(&mut self, table: &ParameterTable<N>, ring: &mut RingView<'_>) {
         for _ in 0..self.pace {
             let (found, next) = match self.unwritten {
@@ -221,17 +222,17 @@ struct Topics<'a, 'r> {
 }
 
 impl Topics<'_, '_> {
-    /// Writes a message of a topic each time, in a small log at its rate; false if it is not due.
+    /// Writes a message in every tick, but in a small log at the topic's rate. Returns false if it is not due.
     fn each<T: Listed>(&mut self, message: T) -> bool {
         if !self.small {
-            // One that finds no room is in the log as a dropout.
+            // A message that does not fit leaves a dropout in the log.
             let _ = self.at_once(&message);
             return true;
         }
         self.at_rate(|| Some(message))
     }
 
-    /// Writes a message at its topic's rate; false if it is not due.
+    /// Writes a message at its topic's rate. Returns false if it is not due.
     fn at_rate<T: Listed>(&mut self, make: impl FnOnce() -> Option<T>) -> bool {
         let place = usize::from(T::ID);
         let (Some(due_us), Some(topic)) = (self.due_us.get(place), TOPICS.get(place)) else { return false };
@@ -239,19 +240,19 @@ impl Topics<'_, '_> {
             return false;
         }
         let Some(message) = make() else { return false };
-        // On time it keeps its phase.
+        // A message that is on time keeps the phase of its topic.
         let period_us = u64::from(if self.small { topic.small_us } else { topic.period_us });
         let next_us = due_us.saturating_add(period_us);
-        // 0 is no phase: that of a first message, of a change, or of one that is made up for.
+        // 0 means no phase: the first message, a change, or a message to be made up for.
         let is_on_time = *due_us > 0 && next_us > self.now_us;
         let next_us = if is_on_time { next_us } else { self.now_us.saturating_add(period_us) };
-        // One that is missing is made up for.
+        // A message that did not fit is made up for in the next tick.
         let next_us = if self.at_once(&message) { next_us } else { 0 };
         self.due_us.get_mut(place).into_iter().for_each(|due_us| *due_us = next_us);
         true
     }
 
-    /// Writes a message; false if it is missing.
+    /// Writes a message. Returns false if it did not fit or the log's beginning is unfinished.
     fn at_once<T: Listed>(&mut self, message: &T) -> bool {
         self.writes
             && self.dropouts.put(self.now_us, self.ring, &mut |ring| {
@@ -262,7 +263,7 @@ impl Topics<'_, '_> {
             })
     }
 
-    /// Writes a message at its topic's rate, or at once if it is not `like` the last one.
+    /// Writes a message at its topic's rate, or at once if `like` finds it different from the last one.
     fn on_change<T: Listed + Copy>(&mut self, last: &mut Option<T>, message: T, like: impl FnOnce(&T, &T) -> bool) {
         if !last.as_ref().is_some_and(|last| like(last, &message)) {
             self.due_us.get_mut(usize::from(T::ID)).into_iter().for_each(|due_us| *due_us = 0);
@@ -273,7 +274,7 @@ impl Topics<'_, '_> {
 }
 
 impl Last {
-    /// Writes what the sensors have read, and what the estimator was offered of it.
+    /// Writes the sensor readings, and the measurements that the estimator was offered.
     fn sensors(&mut self, moment: &Moment<'_>, topics: &mut Topics<'_, '_>) {
         let (now_us, details) = (moment.now_us(), moment.details);
         if let Some(sample) = &details.sample {
@@ -298,7 +299,7 @@ impl Last {
             if topics.small && !self.is_due(&read.value, now_us) {
                 continue;
             }
-            // A fix is told as the receiver has it, in its own frame.
+            // A GNSS fix is logged as the receiver reports it, in the receiver's frame.
             let told = local.filter(|_| !matches!(read.value, Measurement::Gnss { .. })).unwrap_or(read.value);
             let _ = match Aiding::of(moment, &Aged { value: told, ..read }) {
                 Some(Aiding::Air(message)) => topics.at_once(&message),
@@ -314,7 +315,7 @@ impl Last {
         }
     }
 
-    /// True if a measurement of its kind is due in a small log: then the next one is not.
+    /// Returns true if this kind of measurement is due in a small log, and schedules the next one.
     fn is_due(&mut self, value: &Measurement, now_us: u64) -> bool {
         let (kind, _) = value.numbers();
         let period_us = TOPICS.get(usize::from(AidOffered::ID)).map_or(0, |topic| topic.small_us);
@@ -325,7 +326,7 @@ impl Last {
         true
     }
 
-    /// Writes states, setpoints, commands and figures.
+    /// Writes states, setpoints, commands and the estimator's figures.
     fn states(&mut self, moment: &Moment<'_>, topics: &mut Topics<'_, '_>) {
         let (report, now_us) = (moment.report, moment.now_us());
         if let Some((axis, norm)) = report.norms {

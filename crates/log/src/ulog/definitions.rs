@@ -1,4 +1,4 @@
-//! The log's beginning: what it is of, formats, parameters, subscriptions.
+//! Writes the log's beginning: information, formats, parameters, default values, subscriptions.
 
 use crate::ulog::layout::Wire;
 use crate::ulog::record::Content;
@@ -7,23 +7,23 @@ use crate::ulog::topics::{ESC_REPORT, EscReport, TOPICS};
 use afbc_onboard::parameters::{Kind, Parameter, ParameterTable};
 use heapless::String;
 
-/// Longest word about the vehicle; of a longer one the beginning is written \[bytes\].
+/// Longest name of vehicle, law or hardware \[bytes\]. A longer name is cut off.
 const WORD_MAX: usize = 32;
-/// First bytes of every log, and the version of the format.
+/// First bytes of every log, with the version of the format.
 const MAGIC: [u8; 8] = *b"ULog\x01\x12\x35\x01";
-/// Flags, compatible and incompatible, and places of appended data: none.
+/// Content of the flag bits message: no flags, no appended data.
 const FLAGS: [u8; 40] = [0; 40];
-/// This software's name, and its version.
+/// Name and version of this software.
 const SYSTEM: &str = "AFBC";
 const VERSION: &str = env!("CARGO_PKG_VERSION");
-/// A release, in the lowest byte of the version's number.
+/// Lowest byte of the version's number: a release.
 const RELEASE: u32 = 255;
-/// PX4's number of the layouts of version 1.15, which readers ask for.
+/// PX4's number of the message layouts of version 1.15; readers query it.
 const DATA_FORMAT: u32 = 2;
-/// Default of a parameter: the system's.
+/// Type of default value: the system's default.
 const SYSTEM_DEFAULT: u8 = 1;
 
-/// What a log is of.
+/// Describes the vehicle for the log's beginning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LogStart<'a> {
     /// Name of the vehicle.
@@ -32,13 +32,13 @@ pub struct LogStart<'a> {
     pub law: &'a str,
     /// Name of the hardware.
     pub hardware: &'a str,
-    /// Name of this one piece of hardware, if it has one.
+    /// Unique identifier of this board, if it has one.
     pub unique: Option<&'a str>,
     /// Offset of local time from UTC \[s\].
     pub utc_offset_s: i32,
 }
 
-/// Writes the beginning, as far as there is room, and knows what is left.
+/// Writes the log's beginning, piece by piece as there is room.
 #[derive(Clone, Debug)]
 pub(crate) struct Definitions {
     vehicle: String<WORD_MAX>,
@@ -47,11 +47,11 @@ pub(crate) struct Definitions {
     unique: Option<String<WORD_MAX>>,
     utc_offset_s: i32,
     part: Part,
-    /// Number of the next one of its part.
+    /// Number of the next entry of this part.
     next: u16,
 }
 
-/// A part of the beginning.
+/// A part of the log's beginning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Part {
     Header,
@@ -63,10 +63,10 @@ enum Part {
     Done,
 }
 
-/// Returns as much of a text as is written.
+/// Returns the text, shortened to the whole letters that fit.
 fn word(text: &str) -> String<WORD_MAX> {
     let mut word = String::new();
-    // It ends at the first letter that does not fit.
+    // Stops at the first letter that does not fit.
     let _ = text.chars().try_for_each(|letter| word.push(letter));
     word
 }
@@ -84,12 +84,12 @@ impl Definitions {
         }
     }
 
-    /// True once all is written.
+    /// Returns true once the beginning is complete.
     pub(crate) fn is_done(&self) -> bool {
         self.part == Part::Done
     }
 
-    /// Writes what there is room for, of at most `pace` entries: one that needs no record counts, too.
+    /// Writes at most `pace` entries, as far as there is room. An entry that needs no record counts as well.
     #[inline(never)]
     pub(crate) fn write<const N: usize>(
         &mut self,
@@ -108,12 +108,12 @@ impl Definitions {
         }
     }
 
-    /// Writes the next one of the part; none if there are no more of it, false if there is no room.
+    /// Writes the part's next entry. Returns none after the last entry, and false if there is no room.
     fn one<const N: usize>(&self, now_us: u64, table: &ParameterTable<N>, ring: &mut RingView<'_>) -> Option<bool> {
         let index = usize::from(self.next);
         Some(match self.part {
             Part::Header => match index {
-                // Both at once: a log without flags is an old one.
+                // Header and flags in one piece: readers take a log without flags for an old one.
                 0 => ring.bytes(&mut |content| {
                     content.put(&MAGIC);
                     content.put(&now_us.to_le_bytes());
@@ -124,7 +124,7 @@ impl Definitions {
             },
             Part::Information => self.information(index, ring)?,
             Part::Formats => {
-                // What a topic is made of comes before it.
+                // `esc_report` comes first, because a topic contains it.
                 let (name, fields) = match index.checked_sub(1) {
                     None => (EscReport::KIND, ESC_REPORT),
                     Some(index) => TOPICS.get(index).map(|topic| (topic.name, topic.fields))?,
@@ -160,7 +160,7 @@ impl Definitions {
         })
     }
 
-    /// Writes one piece of information; none if there are no more.
+    /// Writes an information message. Returns none after the last one.
     fn information(&self, index: usize, ring: &mut RingView<'_>) -> Option<bool> {
         let text = |ring: &mut RingView<'_>, name: &str, text: &str| match text {
             "" => true,
@@ -185,7 +185,7 @@ impl Definitions {
             1 => text(ring, "ver_hw", &self.hardware),
             2 => text(ring, "ver_sw", VERSION),
             3 => number(ring, "uint32_t ver_sw_release", release(VERSION).to_le_bytes()),
-            // Which layouts of topics they are.
+            // Tells readers which version of PX4's topic layouts the log has.
             4 => number(ring, "uint32_t ver_data_format", DATA_FORMAT.to_le_bytes()),
             5 => text(ring, "sys_uuid", self.unique.as_deref().unwrap_or_default()),
             6 => number(ring, "int32_t time_ref_utc", self.utc_offset_s.to_le_bytes()),
@@ -209,7 +209,7 @@ impl Part {
     }
 }
 
-/// Returns the number of a version like `1.2.3`: a byte for each of its parts, and one for its kind.
+/// Returns the number of a version like `1.2.3`: a byte for each part, and a byte for the type of release.
 fn release(version: &str) -> u32 {
     let parts = version.split('.').map(|part| part.parse::<u8>().unwrap_or_default());
     parts.take(3).zip([24, 16, 8]).map(|(part, shift)| u32::from(part) << shift).sum::<u32>() | RELEASE
@@ -217,14 +217,14 @@ fn release(version: &str) -> u32 {
 
 /// Writes a key after its length.
 fn keyed(content: &mut Content<'_>, key: impl Fn(&mut Content<'_>)) {
-    // Written twice, once to be counted: the length comes first, and there is no buffer for the key.
+    // `key` runs twice, the first time to count: the length comes first, and there is no buffer for the key.
     let mut length = 0_u8;
     key(&mut Content::new(&mut |_| length = length.saturating_add(1)));
     content.put(&[length]);
     key(content);
 }
 
-/// Writes a parameter; false if there is no room.
+/// Writes a parameter. Returns false if there is no room.
 pub(crate) fn parameter(parameter: &Parameter, ring: &mut RingView<'_>) -> bool {
     ring.record(b'P', &mut |content| put_parameter(parameter, content))
 }

@@ -1,22 +1,22 @@
-//! Time for which records are missing.
+//! Logs the time for which records are missing.
 
 use crate::ulog::ring::RingView;
 
-/// Longest dropout of one record \[ms\].
+/// Longest time in one dropout record \[ms\].
 const LONGEST_MS: u64 = u16::MAX as u64;
 
-/// Counts it, and writes it once there is room again.
+/// Measures dropouts, and logs them once there is room again.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Dropouts {
-    /// Since when records are missing \[us\].
+    /// Start of the present dropout \[us\].
     since_us: Option<u64>,
-    /// What is over and not written, less than a millisecond unless the ring is full \[us\].
+    /// Ended dropouts that are not logged yet, less than a millisecond unless the ring is full \[us\].
     owed_us: u64,
 }
 
 impl Dropouts {
-    /// Writes a record by `write`, after the dropout before it; false if it is missing. Once one does not fit, all
-    /// others of the same time are missing, too.
+    /// Writes a record by `write`, after any dropout before it. Returns false if the record did not fit. Then all other
+    /// records with the same time are dropped, too.
     #[inline(never)]
     pub(crate) fn put(
         &mut self,
@@ -31,17 +31,17 @@ impl Dropouts {
         fits
     }
 
-    /// Notes that records are missing from a time on, until one is written.
+    /// Begins a dropout at a time. It ends at the next written record.
     pub(crate) fn miss(&mut self, since_us: u64) {
         self.since_us.get_or_insert(since_us);
     }
 
-    /// Writes what is over; false if there is no room.
+    /// Logs the ended dropouts. Returns false if there is no room.
     fn settle(&mut self, now_us: u64, ring: &mut RingView<'_>) -> bool {
         let missed_us = self.since_us.take().map_or(0, |since_us| now_us.saturating_sub(since_us));
         self.owed_us = self.owed_us.saturating_add(missed_us);
         while self.owed_us >= 1000 {
-            // The record has 16 bits for it: a longer one becomes several.
+            // A dropout record has 16 bits for the time; a longer dropout takes several records.
             let ms = (self.owed_us / 1000).min(LONGEST_MS);
             if !ring.record(b'O', &mut |content| content.put(&(ms as u16).to_le_bytes())) {
                 return false;

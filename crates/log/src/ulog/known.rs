@@ -1,23 +1,23 @@
-//! What the log takes from the vehicle's configuration.
+//! Extracts the figures that the log needs from the vehicle's configuration.
 
 use afbc_flight_core::numbering::{ARDUPILOT, rotors_of_outputs};
 use afbc_onboard::Configuration;
 
-/// Motors in a message.
+/// Number of motors in a message.
 pub(crate) const MOTORS: usize = 12;
 
-/// What is known of a vehicle.
+/// Constants of a vehicle.
 #[derive(Clone, Debug)]
 pub(crate) struct Known {
-    /// Rotors in the order of PX4's motors; beyond the vehicle's for a motor that it lacks.
+    /// Index of the rotor that is each of PX4's motors; beyond the last rotor if there is no such motor.
     pub(crate) rotor_of_motor: [usize; MOTORS],
     /// Number of rotors.
     pub(crate) rotors: usize,
     /// b / F_max: share of a rotor's largest force per squared speed \[s2/rad2\].
     pub(crate) share_per_speed_squared: f32,
-    /// Largest force of all rotors \[N\].
+    /// Largest force of all rotors together \[N\].
     pub(crate) thrust_max_n: f32,
-    /// Its MAVLink system id.
+    /// MAVLink system id of the vehicle.
     pub(crate) system: u8,
 }
 

@@ -1,17 +1,17 @@
-//! Layout of a topic's messages: declared once, so that what the log says of them cannot differ from their bytes.
+//! Declares the layout of each topic once, so that the log's formats always match its messages.
 
 use crate::ulog::record::Content;
 
 /// A field of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LoggedField {
-    /// Name.
+    /// Name of the field.
     pub name: &'static str,
     /// Type in the log: `float`, `uint64_t` and the like.
     pub kind: &'static str,
-    /// Number of values, none for a single one.
+    /// Number of values in an array; none for a single value.
     pub values: Option<usize>,
-    /// Unit or meaning, as documents show it.
+    /// Unit or meaning, for the documentation.
     pub unit: &'static str,
 }
 
@@ -20,7 +20,7 @@ impl LoggedField {
         LoggedField { name, kind: W::KIND, values: W::VALUES, unit }
     }
 
-    /// Writes it as a format has it: `float[3] xyz;`.
+    /// Writes the field as ULog formats do: `float[3] xyz;`.
     pub(crate) fn format(&self, to: &mut Content<'_>) {
         to.put(self.kind.as_bytes());
         if let Some(values) = self.values {
@@ -34,14 +34,14 @@ impl LoggedField {
     }
 }
 
-/// A type of a field.
+/// A field's type.
 pub(crate) trait Wire: Copy {
-    /// Its name in a format.
+    /// Name of the type in a format.
     const KIND: &'static str;
-    /// Number of values, none for a single one.
+    /// Number of values in an array; none for a single value.
     const VALUES: Option<usize> = None;
 
-    /// Writes it, little-endian.
+    /// Writes the value, little-endian.
     fn put(self, to: &mut Content<'_>);
 }
 
@@ -81,20 +81,19 @@ impl<W: Wire, const N: usize> Wire for [W; N] {
     }
 }
 
-/// A topic's message.
+/// A message of a topic.
 pub(crate) trait Message {
     /// Name of the topic.
     const NAME: &'static str;
-    /// Its fields, in the order of their bytes.
+    /// Fields, in the order of their bytes.
     const FIELDS: &'static [LoggedField];
 
     /// Writes the fields.
     fn write(&self, to: &mut Content<'_>);
 }
 
-/// Declares a topic: its name, the type of its messages, and their fields with types and units. Every one begins with
-/// the time since power-up. With `of`, the name of what a message is made of, each field has its value in its line,
-/// too: a signal more is one line more.
+/// Declares a topic: its name, its Rust type, and its fields with types and units. Each message begins with the time
+/// since power-up. After `of`, name the moment that is logged, and give each field its value on the same line.
 macro_rules! message {
     ($(#[$doc:meta])* $name:literal $type:ident of $moment:ident $(, $given:ident: $what:ty)* {
         $($field:ident: $kind:ty = $unit:literal => $value:expr),* $(,)?
@@ -152,7 +151,7 @@ mod tests {
         }
     }
 
-    // The same, and the line that logs another signal.
+    // The same topic with one more line, which logs one more signal.
     message! {
         /// Three signals.
         "three" Three of moment {
@@ -168,7 +167,7 @@ mod tests {
         bytes
     }
 
-    /// One line more in a topic is one signal more in its format and in its messages.
+    /// One more line in a topic adds one signal to its format and to its messages.
     #[test]
     fn a_signal_more_is_one_line_more() {
         let configuration = Configuration::<4>::default();

@@ -1,14 +1,14 @@
-//! The black box: PX4's [ULog](https://docs.px4.io/main/en/dev_log/ulog_file_format.html) of a flight, written tick by
-//! tick.
+//! The black box: logs a flight tick by tick in PX4's [ULog](https://docs.px4.io/main/en/dev_log/ulog_file_format.html)
+//! format.
 //!
-//! A [`BlackBox`] takes what every control tick has taken and given ([`TickRecord`](afbc_onboard::TickRecord)) and puts
-//! the log's bytes into a [`LogRing`] of its caller's, who empties it into a file, a card, flash or a link. Topics,
-//! fields, types and units are PX4's ([`TOPICS`]), so that its tools read the log; what PX4 has no topic for is in
-//! topics of this project, whose names begin with `afbc_`. Frames are PX4's too: earth frame north-east-down, body
-//! frame forward-right-down.
+//! A [`BlackBox`] takes the inputs and outputs of every control tick ([`TickRecord`](afbc_onboard::TickRecord)) and
+//! puts the log's bytes into its caller's [`LogRing`]. The caller empties the ring into a file, a card, flash or a
+//! link. Topics, fields, types and units are PX4's ([`TOPICS`]), so PX4's tools can read the log. Signals for which PX4
+//! has no topic are in topics whose names begin with `afbc_`. Frames are PX4's: earth frame north-east-down, body frame
+//! forward-right-down.
 //!
-//! A ring that is full costs log, never a tick: records go in whole or not at all, and the time for which some are
-//! missing is in the log (a dropout record). A log may be cut anywhere; all whole records before the cut are read.
+//! A full ring loses log records but never delays a tick. A record is written whole or not at all, and dropout records
+//! state for how long records are missing. A log may be cut anywhere; all whole records before the cut can be read.
 //!
 //! ```
 //! use afbc_log::ulog::{BesideTick, BlackBox, LogRing, LogStart};

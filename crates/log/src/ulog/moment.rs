@@ -1,4 +1,4 @@
-//! What is logged of a tick.
+//! Collects the data of a tick for the topics.
 
 use crate::ulog::known::Known;
 use afbc_estimator::Origin;
@@ -6,12 +6,12 @@ use afbc_onboard::{EscTelemetry, Report, TickDetails};
 use afbc_types::{ROTORS_MAX, State};
 use nalgebra::Vector3;
 
-/// What is logged beside a tick: the control task does not know it.
+/// Data that is logged with a tick but unknown to the control task.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BesideTick<'a> {
-    /// What the motor controllers have told, if there is a line for it.
+    /// Telemetry of the motor controllers (ESCs), if there is a telemetry line.
     pub escs: Option<&'a EscTelemetry>,
-    /// Place on the earth from which fixes of a GNSS receiver are measured, once it is known.
+    /// Geographic origin of the GNSS fixes, once it is known.
     pub origin: Option<Origin>,
 }
 
@@ -29,7 +29,8 @@ impl Moment<'_> {
         self.report.time_us
     }
 
-    /// Returns the state: the vehicle's own estimate of it once there is one, or what the flight core flies on.
+    /// Returns the state: the onboard estimate once it is ready, or the state from the link on vehicles without an
+    /// estimator.
     pub(crate) fn state(&self) -> Option<State> {
         let TickDetails { estimate, state, .. } = self.details;
         match estimate {
@@ -38,12 +39,12 @@ impl Moment<'_> {
         }
     }
 
-    /// Returns the time at which the state was true.
+    /// Returns the time for which the state is valid \[us\].
     pub(crate) fn state_us(&self) -> u64 {
         self.details.estimate.as_ref().map_or(self.now_us(), |estimate| estimate.at_us)
     }
 
-    /// Returns the attitude as a quaternion w, x, y, z, between PX4's frames.
+    /// Returns the attitude as a quaternion w, x, y, z in PX4's frames.
     pub(crate) fn attitude(&self) -> Option<[f32; 4]> {
         let state = self.state()?;
         let quaternion = || {
@@ -53,19 +54,19 @@ impl Moment<'_> {
         Some(flip_turn(self.details.estimate.as_ref().map_or_else(quaternion, |estimate| estimate.attitude)))
     }
 
-    /// Returns where on the earth the local frame's origin is.
+    /// Returns latitude \[deg\], longitude \[deg\] and height \[m\] of the local frame's origin.
     pub(crate) fn reference(&self) -> Option<[f64; 3]> {
         let origin = self.beside.origin?;
         Some(origin.global(&self.details.origin_m?))
     }
 }
 
-/// Turns a vector from either frame into the other, by half a turn about x.
+/// Converts a vector between this project's and PX4's frames, in either direction: half a turn about x.
 pub(crate) fn flip(v: Vector3<f32>) -> [f32; 3] {
     [v.x, -v.y, -v.z]
 }
 
-/// Turns an attitude from either pair of frames into the other.
+/// Converts an attitude between this project's and PX4's frames, in either direction.
 pub(crate) fn flip_turn([w, x, y, z]: [f32; 4]) -> [f32; 4] {
     [w, x, -y, -z]
 }

@@ -1,6 +1,6 @@
-//! Content of a record.
+//! Writes the content of a log record.
 
-/// Takes the bytes of a record, of which there may be more than there is room for.
+/// Takes the bytes of a record. There may be more bytes than there is room for.
 pub(crate) struct Content<'a>(&'a mut dyn FnMut(u8));
 
 impl<'a> Content<'a> {
@@ -8,13 +8,13 @@ impl<'a> Content<'a> {
         Content(take)
     }
 
-    /// Appends bytes. Out of line: there are hundreds of fields.
+    /// Appends bytes. Not inlined, because hundreds of fields call it.
     #[inline(never)]
     pub(crate) fn put(&mut self, bytes: &[u8]) {
         bytes.iter().for_each(|byte| (self.0)(*byte));
     }
 
-    /// Appends a number in decimal digits. Without the library's formatting, which takes 10 kB of flash.
+    /// Appends a number in decimal digits. The standard formatting would take 10 kB of flash.
     pub(crate) fn number(&mut self, number: usize) {
         if number > 9 {
             self.number(number / 10);

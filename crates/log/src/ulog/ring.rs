@@ -1,10 +1,10 @@
-//! Bytes of the log that wait to be kept.
+//! Buffers the log's bytes until they are stored.
 
 use crate::ulog::record::Content;
 use heapless::Deque;
 use heapless::deque::DequeView;
 
-/// A ring of the log's bytes, between who writes it and who keeps it: at most `R` of them wait.
+/// A ring buffer of at most `R` log bytes, between the log's writer and the storage.
 #[derive(Clone, Debug)]
 pub struct LogRing<const R: usize>(Deque<u8, R>);
 
@@ -20,23 +20,23 @@ impl<const R: usize> LogRing<R> {
         LogRing(Deque::new())
     }
 
-    /// Returns the number of bytes that wait.
+    /// Returns the number of waiting bytes.
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
-    /// True if none wait.
+    /// Returns true if no bytes wait.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Returns the oldest bytes that lie side by side: all of them, or those up to the end of the memory.
+    /// Returns the oldest contiguous bytes: all bytes, or those up to the end of the memory.
     pub fn front(&self) -> &[u8] {
         let (front, back) = self.0.as_slices();
         if front.is_empty() { back } else { front }
     }
 
-    /// Removes as many of the oldest bytes, all if there are fewer: they are kept now.
+    /// Removes this many of the oldest bytes, or all if there are fewer. Call it once they are stored.
     pub fn consume(&mut self, bytes: usize) {
         for _ in 0..bytes.min(self.0.len()) {
             let _ = self.0.pop_front();
@@ -51,11 +51,11 @@ impl<const R: usize> LogRing<R> {
 /// A ring of any size.
 pub(crate) struct RingView<'a>(&'a mut DequeView<u8>);
 
-/// Length of a record before its content: length of the content, kind.
+/// Bytes of a record before its content: two for the content's length and one for the kind.
 const HEAD: usize = 3;
 
 impl RingView<'_> {
-    /// Appends bytes; false, and nothing is appended, if they do not fit.
+    /// Appends bytes. If they do not all fit, appends none and returns false.
     #[inline(never)]
     pub(crate) fn bytes(&mut self, write: &mut dyn FnMut(&mut Content<'_>)) -> bool {
         let start = self.0.storage_len();
@@ -67,11 +67,11 @@ impl RingView<'_> {
         !overflows
     }
 
-    /// Appends a record of this kind; false, and nothing is appended, if it does not fit.
+    /// Appends a record of this kind. If it does not fit, appends nothing and returns false.
     #[inline(never)]
     pub(crate) fn record(&mut self, kind: u8, write: &mut dyn FnMut(&mut Content<'_>)) -> bool {
         let start = self.0.storage_len();
-        // A place for the length, which is known once the content is written.
+        // Reserves the length's bytes: the length is known only after the content is written.
         let whole = self.bytes(&mut |content| {
             content.put(&[0, 0, kind]);
             write(content);

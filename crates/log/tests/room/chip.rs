@@ -1,4 +1,4 @@
-//! A serial NOR flash chip: what it takes and how long, by its data sheet (Winbond's W25Q128JV, revision F).
+//! Simulates a serial NOR flash chip: its commands and times by the data sheet (Winbond's W25Q128JV, revision F).
 
 use super::Storage;
 use afbc_log::storage::{FlashKeeper, NorChip};
@@ -10,7 +10,7 @@ pub(crate) const SECTOR: usize = 65_536;
 const PAGE: usize = 256;
 
 thread_local! {
-    /// The time of calls \[us\].
+    /// Simulated time \[us\].
     static CLOCK_US: Cell<u64> = const { Cell::new(0) };
 }
 
@@ -18,7 +18,7 @@ fn now_us() -> u64 {
     CLOCK_US.get()
 }
 
-/// What has been done to its cells.
+/// A change of the chip's cells.
 #[derive(Clone, Debug)]
 pub(crate) enum Change {
     Program(usize, Vec<u8>),
@@ -28,14 +28,14 @@ pub(crate) enum Change {
 #[derive(Debug)]
 pub(crate) struct Cells {
     pub(crate) bytes: Vec<u8>,
-    /// Each change, with the time.
+    /// Each change with its time \[us\].
     pub(crate) changes: Vec<(u64, Change)>,
     pub(crate) is_there: bool,
-    /// Calls that fail, counted from now on; none forever.
+    /// Number of calls until one fails; none if no call fails.
     pub(crate) fails_in: Option<u32>,
-    /// It takes commands, and changes nothing.
+    /// True if the chip accepts commands but changes nothing.
     pub(crate) is_protected: bool,
-    /// Time for a page and a sector \[us\].
+    /// Time to program a page and to erase a sector \[us\].
     pub(crate) takes_us: [u64; 2],
     busy_until_us: u64,
     is_enabled: bool,
@@ -46,7 +46,7 @@ pub(crate) struct Cells {
 pub(crate) struct Chip(pub(crate) Arc<Mutex<Cells>>);
 
 impl Chip {
-    /// A blank one.
+    /// Creates a blank chip.
     pub(crate) fn new(sectors: usize) -> Self {
         Chip::holding(vec![0xFF; sectors * SECTOR])
     }
@@ -71,14 +71,14 @@ impl Cells {
         now_us() < self.busy_until_us
     }
 
-    /// Takes a command with what follows it, and returns what it answers.
+    /// Executes a command with its data. Returns the chip's answer.
     fn command(&mut self, command: &[u8], answer: usize) -> Vec<u8> {
         let address = || command[1..4].iter().fold(0, |address, byte| address << 8 | usize::from(*byte));
         let is_busy = self.is_busy();
         let mut answers = match command[0] {
             0x05 => vec![u8::from(is_busy) | u8::from(self.is_enabled) << 1],
             0xAB => Vec::new(),
-            // Busy, it takes no other.
+            // A busy chip accepts only the commands above.
             _ if is_busy => panic!("{command:?} while it is busy"),
             0x9F => vec![0xEF, 0x40, self.bytes.len().ilog2() as u8],
             0x03 => self.bytes[address()..address() + answer].to_vec(),
@@ -113,7 +113,7 @@ impl Cells {
     }
 }
 
-/// Changes cells. What is written must be what is read then.
+/// Changes cells. Panics if a bit would have to change from 0 to 1 without an erasure.
 pub(crate) fn apply(cells: &mut [u8], change: &Change) {
     match change {
         Change::Program(at, bytes) => cells[*at..*at + bytes.len()].iter_mut().zip(bytes).for_each(|(cell, byte)| {
@@ -124,7 +124,7 @@ pub(crate) fn apply(cells: &mut [u8], change: &Change) {
     }
 }
 
-/// Its bus.
+/// The chip's SPI bus.
 #[derive(Debug)]
 pub(crate) struct Wire(Chip);
 
@@ -152,7 +152,7 @@ impl SpiDevice for Wire {
                 _ => panic!("it neither reads nor writes"),
             }
         }
-        // A status costs more, so that waiting takes few.
+        // Reading the status takes longer than on a real bus, so that a wait needs few reads.
         let takes_us = if command[0] == 0x05 { 50 } else { 5 + (command.len() + answer) as u64 / 2 };
         CLOCK_US.set(now_us() + takes_us);
         if let Some(left) = &mut cells.fails_in {
@@ -185,7 +185,7 @@ impl Storage for Chip {
     }
 
     fn begin(&self, now_us: u64) {
-        // What goes on in the chip goes on until then.
+        // A running operation of the chip continues up to this time.
         CLOCK_US.set(now_us);
         self.0.lock().unwrap().began_us = now_us;
     }
@@ -199,7 +199,7 @@ impl Storage for Chip {
     }
 }
 
-/// Returns the logs in these cells, by what docs/ulog.md says of them.
+/// Returns the logs in these cells, as docs/ulog.md describes them.
 pub(crate) fn logs(cells: &[u8]) -> Vec<(String, Vec<u8>)> {
     let word = |sector: &[u8], at: usize| u32::from_le_bytes(sector[at..at + 4].try_into().unwrap());
     let pair = |sector: &[u8], at: usize, other: usize| {
@@ -218,7 +218,7 @@ pub(crate) fn logs(cells: &[u8]) -> Vec<(String, Vec<u8>)> {
     let whole = |(log, sectors): (u32, Vec<&[u8]>)| {
         let (last, full) = sectors.split_last().unwrap();
         let written = last[PAGE..].chunks(PAGE).rposition(|page| page.iter().any(|byte| *byte != 0xFF));
-        // Of a log that has not ended, the last page may be torn.
+        // The last page of an unfinished log may be incomplete.
         let length = pair(last, 24, 28).map_or(written.unwrap_or(0) * PAGE, |length| length as usize);
         let rooms = full.iter().map(|sector| &sector[PAGE..]).chain([&last[PAGE..PAGE + length]]);
         (format!("{log}"), rooms.flatten().copied().collect())

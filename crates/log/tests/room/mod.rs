@@ -1,4 +1,4 @@
-//! A vehicle, a queue of blocks, a task that waits for its storage, and a card in memory: all in the storage's time.
+//! Simulates a logging vehicle: its block queue, a task that waits for its storage, and a card in memory.
 #![allow(dead_code, reason = "shared by tests")]
 
 pub(crate) mod chip;
@@ -24,22 +24,22 @@ use std::sync::{Arc, Mutex};
 
 /// Time between two ticks \[us\].
 pub(crate) const TICK_US: u64 = 1_000;
-/// Where the volume begins.
+/// First block of the volume.
 pub(crate) const VOLUME: usize = 63;
-/// Blocks in the queue.
+/// Number of blocks in the queue.
 const QUEUE: usize = 20;
 
-/// A card.
+/// Content and behaviour of a card.
 pub(crate) struct Disk {
     pub(crate) bytes: Vec<u8>,
-    /// Each block that was written, in order, with the time.
+    /// Each written block with its time \[us\] and number, in order.
     pub(crate) written: Vec<(u64, u32, [u8; 512])>,
     pub(crate) is_there: bool,
-    /// Calls that fail, counted from now on; none forever.
+    /// Number of calls until one fails; none if no call fails.
     pub(crate) fails_in: Option<u32>,
-    /// How long a call takes \[us\].
+    /// Returns the duration of a call \[us\].
     pub(crate) takes_us: Box<dyn FnMut() -> u64 + Send>,
-    /// What the calls since it was asked have taken \[us\].
+    /// Total duration of the calls since the last [`Storage::begin`] \[us\].
     pub(crate) taken_us: u64,
     pub(crate) now_us: u64,
     pub(crate) calls: u64,
@@ -49,7 +49,7 @@ pub(crate) struct Disk {
 pub(crate) struct Card(pub(crate) Arc<Mutex<Disk>>);
 
 impl Disk {
-    /// Returns what is called, if it does not fail.
+    /// Makes one call. Returns the bytes of this block, unless the call fails.
     fn call(&mut self, number: u32) -> Result<&mut [u8], CardError> {
         self.calls += 1;
         self.taken_us += (self.takes_us)();
@@ -90,7 +90,7 @@ impl LogCard for Card {
     }
 }
 
-/// A part of a disk, as another FAT reads and writes it.
+/// The volume on a disk, as the other FAT library accesses it.
 pub(crate) struct Partition<'a>(Cursor<&'a mut [u8]>);
 
 impl Read for Partition<'_> {
@@ -117,13 +117,13 @@ impl Seek for Partition<'_> {
 
 pub(crate) type OtherFat<'a> = fatfs::FileSystem<Partition<'a>>;
 
-/// Mounts the volume by a FAT that is not the logger's.
+/// Mounts the volume with a FAT library that the logger does not use.
 pub(crate) fn mount(disk: &mut [u8]) -> OtherFat<'_> {
     let options = fatfs::FsOptions::new().update_accessed_date(false);
     fatfs::FileSystem::new(Partition(Cursor::new(&mut disk[VOLUME * 512..])), options).unwrap()
 }
 
-/// Returns the logs on a disk by name.
+/// Returns the logs on a disk, sorted by name.
 pub(crate) fn logs(disk: &mut [u8]) -> Vec<(String, Vec<u8>)> {
     let volume = mount(disk);
     let mut logs: Vec<_> = volume
@@ -142,7 +142,7 @@ pub(crate) fn logs(disk: &mut [u8]) -> Vec<(String, Vec<u8>)> {
     logs
 }
 
-/// Returns a card with an empty volume of so many blocks.
+/// Returns a card with an empty volume of this many blocks.
 pub(crate) fn card(fat: fatfs::FatType, blocks: usize) -> Card {
     let mut bytes = vec![0; (VOLUME + blocks) * 512];
     let kind = if fat == fatfs::FatType::Fat32 { 0x0C } else { 0x06 };
@@ -173,7 +173,7 @@ pub(crate) fn fat32() -> Card {
     card(fatfs::FatType::Fat32, 68_000)
 }
 
-/// The queue between the tasks.
+/// The queue of blocks between the tasks.
 #[derive(Default)]
 struct Queue {
     filled: VecDeque<LogBlock>,
@@ -190,14 +190,14 @@ impl BlockSink for Queue {
     }
 }
 
-/// The page between the tasks, and what is asked.
+/// The page between the tasks, and the query.
 struct Between {
     page: LogPage,
     is_full: bool,
     asked: LogQuery,
 }
 
-/// The links' task's end of it.
+/// The page and the query, as the links' task accesses them.
 pub(crate) struct Pages {
     between: Rc<RefCell<Between>>,
     page: LogPage,
@@ -221,10 +221,10 @@ impl LogPages for Pages {
     }
 }
 
-/// Where logs are kept, in a time of its own.
+/// A storage for logs, with its own simulated time.
 pub(crate) trait Storage: Clone {
     type Keeper: LogKeeper;
-    /// True if its logs are small.
+    /// True if the storage holds small logs.
     const SMALL: bool;
 
     fn keeper(&self) -> Self::Keeper;
@@ -232,10 +232,10 @@ pub(crate) trait Storage: Clone {
     /// Begins a call at this time.
     fn begin(&self, now_us: u64);
 
-    /// Returns how long the call has taken \[us\].
+    /// Returns the duration of the call \[us\].
     fn taken_us(&self) -> u64;
 
-    /// Returns its logs by name, as another program reads them.
+    /// Returns the logs by name, read independently of the logger.
     fn logs(&self) -> Vec<(String, Vec<u8>)>;
 }
 
@@ -273,14 +273,14 @@ pub(crate) struct Room<S: Storage = Card> {
     flight: Flight,
     table: ParameterTable,
     pub(crate) now_us: u64,
-    /// Until when the log's task waits for the card \[us\].
+    /// Time up to which the log's task waits for the storage \[us\].
     busy_us: u64,
-    /// The state that the writer sees.
+    /// State of the storage that the writer sees.
     pub(crate) state: StorageState,
     pub(crate) mode: LogMode,
     pub(crate) armed: bool,
     pub(crate) told: Vec<&'static str>,
-    /// Ticks that were to be logged.
+    /// Number of ticks that were to be logged.
     pub(crate) wanted: u64,
 }
 
@@ -310,7 +310,7 @@ impl<S: Storage> Room<S> {
         }
     }
 
-    /// Runs a tick; the writer misses it, or not.
+    /// Runs a tick. If `misses` is true, the writer does not see it.
     pub(crate) fn tick(&mut self, misses: bool) {
         self.now_us += TICK_US;
         let now_us = self.now_us;
@@ -340,10 +340,10 @@ impl<S: Storage> Room<S> {
         self.task();
     }
 
-    /// What the log's task does in this millisecond, for which it may have to wait for the card.
+    /// Runs the log's task for this millisecond, unless it still waits for the storage.
     fn task(&mut self) {
         while self.busy_us <= self.now_us {
-            // What it has found before it waited.
+            // The state that the task found before it waited.
             self.state = self.keeper.state();
             let began_us = self.busy_us.max(self.now_us - TICK_US);
             self.card.begin(began_us);
@@ -361,7 +361,7 @@ impl<S: Storage> Room<S> {
                 }
             }
             let took_us = self.card.taken_us();
-            // Without a block, it looks again in the next tick.
+            // Without a block, the task runs again in the next tick.
             self.busy_us = if took_us == 0 { self.now_us + 1 } else { began_us + took_us };
             if took_us == 0 && !self.queue.filled.is_empty() {
                 self.busy_us = began_us;
@@ -385,12 +385,12 @@ impl<S: Storage> Room<S> {
     }
 }
 
-/// Checks that what is missing of a log in time is what its dropouts say, each to a tick; returns both ends of its
-/// samples \[us\].
+/// Checks that dropouts match the missing samples, to one tick each. Returns the times of the first and last sample
+/// \[us\].
 pub(crate) fn adds_up(log: &ulog::ReadLog) -> Option<[u64; 2]> {
     let times = &log.samples_us;
     let ends = [*times.first()?, *times.last()?];
-    // Before the first sample the log's own beginning is written, which is no dropout of the samples.
+    // Dropouts before the first sample fall into the log's beginning.
     let mut dropouts = log.dropouts.iter().filter(|(_, before)| *before > 0).peekable();
     let (mut missing_ms, mut told_ms, mut number) = (0, 0, 1);
     for (index, pair) in times.windows(2).enumerate() {
@@ -402,7 +402,7 @@ pub(crate) fn adds_up(log: &ulog::ReadLog) -> Option<[u64; 2]> {
         assert!(gap_us == TICK_US || is_told, "a gap of {gap_us} us without a dropout");
         missing_ms += gap_us / TICK_US - 1;
     }
-    // Of the tick in which a dropout begins, the sample may be there.
+    // The sample of the tick in which a dropout begins may exist.
     assert!((missing_ms..=missing_ms + number).contains(&told_ms), "{missing_ms} ms are missing, {told_ms} ms told");
     Some(ends)
 }

@@ -1,4 +1,4 @@
-//! A vehicle with a station.
+//! Simulates a vehicle with a ground station.
 
 use super::{Card, Room, Storage};
 use afbc_link::{LogEntry, LogMessage, LogRequest};
@@ -7,10 +7,10 @@ use afbc_station::services::log_transfer::LogTransfer;
 use afbc_station::services::storage::LogStore;
 use std::task::Poll;
 
-/// Ticks within which a card without stalls answers.
+/// Number of ticks within which a card without stalls answers.
 pub(crate) const PATIENCE: usize = 2_000;
 
-/// A vehicle with a station.
+/// A vehicle with a ground station.
 pub(crate) struct Station<S: Storage = Card> {
     pub(crate) room: Room<S>,
     pub(crate) transfer: LogTransfer,
@@ -24,7 +24,7 @@ impl<S: Storage> Station<S> {
         Station { room, transfer: LogTransfer::default() }
     }
 
-    /// Flies for so long: a log of a second more.
+    /// Flies for this many ticks, which leaves a log one second longer.
     pub(crate) fn fly(&mut self, ticks: u64) {
         self.room.armed = true;
         self.room.run(ticks);
@@ -32,14 +32,14 @@ impl<S: Storage> Station<S> {
         self.room.run(1_300);
     }
 
-    /// Asks, and returns what comes until there is no more, a message of each tick.
+    /// Sends a request. Returns all its answers, at most one message per tick. Panics if they do not end in time.
     pub(crate) fn ask(&mut self, request: LogRequest) -> Vec<LogMessage> {
         let messages = self.ask_for(request, PATIENCE);
         assert!(!self.transfer.is_busy(), "{request:?}: no answer");
         messages
     }
 
-    /// Asks, and returns what comes until there is no more, or nothing for so many ticks.
+    /// Sends a request. Returns its answers until they are complete, or until none has come for this many ticks.
     pub(crate) fn ask_for(&mut self, request: LogRequest, patience: usize) -> Vec<LogMessage> {
         self.transfer.hear(request);
         let (mut messages, mut quiet) = (Vec::new(), 0);
@@ -66,7 +66,7 @@ impl<S: Storage> Station<S> {
         Self::joined(log, offset, found)
     }
 
-    /// Returns what parts of a log hold together.
+    /// Returns the bytes of consecutive parts of a log.
     pub(crate) fn joined(log: u16, offset: u32, messages: Vec<LogMessage>) -> Vec<u8> {
         let mut read = Vec::new();
         for message in messages {

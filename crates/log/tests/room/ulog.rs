@@ -1,19 +1,18 @@
-//! What these tests read of a log, by the specification (PX4 User Guide, "ULog File Format").
+//! Reads the parts of a log that these tests need, by the specification (PX4 User Guide, "ULog File Format").
 
 use std::collections::BTreeMap;
 
-/// Of a log, up to its last whole record.
+/// Content of a log up to its last whole record.
 #[derive(Debug, Default)]
 pub(crate) struct ReadLog {
-    /// Bytes of all whole records.
+    /// Length of all whole records \[bytes\].
     pub(crate) whole: usize,
-    /// When the samples of the inertial sensor were true \[us\].
+    /// Times of the inertial samples \[us\].
     pub(crate) samples_us: Vec<u64>,
     /// Durations of dropouts \[ms\], each with the number of samples before it.
     pub(crate) dropouts: Vec<(u64, usize)>,
-    /// Parameters that have changed since its beginning.
+    /// Parameters changed after the log's beginning.
     pub(crate) changes: Vec<(String, f32)>,
-    /// Texts.
     pub(crate) texts: Vec<String>,
 }
 
@@ -21,7 +20,7 @@ fn number(bytes: &[u8]) -> u64 {
     bytes.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte))
 }
 
-/// Returns where a field of a format is, with its length \[bytes\].
+/// Returns the offset and length of a field in a format \[bytes\].
 fn place(format: &str, name: &str) -> (usize, usize) {
     let mut at = 0;
     for field in format.split(';').filter(|field| !field.is_empty()) {
@@ -64,7 +63,7 @@ pub(crate) fn read(bytes: &[u8]) -> ReadLog {
             }
             b'A' if &content[3..] == b"sensor_combined" => sensor = Some(number(&content[1..3])),
             b'D' if sensor == Some(number(&content[..2])) => {
-                // A message's time is the end of its integration, half of that behind the sample.
+                // A message's time is the end of its integration. Its sample is valid half an integration time earlier.
                 let (at, size) = place(&formats["sensor_combined"], "gyro_integral_dt");
                 let behind_us = number(&content[2 + at..2 + at + size]) / 2;
                 log.samples_us.push(number(&content[2..10]) - behind_us);

@@ -1,9 +1,8 @@
-//! A reader of ULog by its specification (PX4 User Guide, "ULog File Format"), which refuses whatever that does not
-//! allow.
+//! Reads ULog by its specification (PX4 User Guide, "ULog File Format"), and panics at anything that is not allowed.
 
 use std::collections::BTreeMap;
 
-/// A field: type, number of values or none, name.
+/// A field: its type, number of values if it is an array, and name.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FieldFormat {
     pub(crate) kind: String,
@@ -11,21 +10,21 @@ pub(crate) struct FieldFormat {
     pub(crate) name: String,
 }
 
-/// What is in a log.
+/// Content of a log.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct StrictLog {
     pub(crate) start_us: u64,
     pub(crate) formats: BTreeMap<String, Vec<FieldFormat>>,
     pub(crate) information: BTreeMap<String, Vec<u8>>,
-    /// Name and value, in the order of the log; the definitions' first.
+    /// Names and values in the order of the log, beginning with those in the definitions.
     pub(crate) parameters: Vec<(String, f64)>,
-    /// Number of those that are definitions.
+    /// Number of parameters in the definitions.
     pub(crate) initial: usize,
     pub(crate) defaults: Vec<(String, f64)>,
-    /// Messages by topic: time, and the values of all other fields.
+    /// Messages by topic: the time, and the values of all other fields.
     pub(crate) messages: BTreeMap<String, Vec<(u64, Vec<f64>)>>,
     pub(crate) texts: Vec<(u8, u64, String)>,
-    /// Of each dropout its duration \[ms\], and how many messages of each topic stand before it.
+    /// Duration of each dropout \[ms\], with the number of messages of each topic before it.
     pub(crate) dropouts: Vec<(u64, BTreeMap<String, usize>)>,
     pub(crate) syncs: usize,
     /// Number of records.
@@ -35,7 +34,7 @@ pub(crate) struct StrictLog {
 }
 
 impl StrictLog {
-    /// Returns a field's values of all messages of a topic.
+    /// Returns the values of a field in all messages of a topic.
     pub(crate) fn field(&self, topic: &str, name: &str) -> Vec<f64> {
         let mut place = 0;
         let mut found = None;
@@ -106,8 +105,7 @@ pub(crate) fn fields(format: &str) -> Vec<FieldFormat> {
     parts.map(field).collect()
 }
 
-/// Returns the fields with those of other formats in the place of one that is made of them: the second of `esc` has
-/// `esc.1.esc_rpm`.
+/// Replaces each field of a nested format by that format's fields, such as `esc.1.esc_rpm` in the second `esc`.
 fn flat(fields: Vec<FieldFormat>, formats: &BTreeMap<String, Vec<FieldFormat>>) -> Vec<FieldFormat> {
     let flat = |field: FieldFormat| {
         let Some(inner) = formats.get(&field.kind) else {
@@ -123,7 +121,7 @@ fn flat(fields: Vec<FieldFormat>, formats: &BTreeMap<String, Vec<FieldFormat>>) 
     fields.into_iter().flat_map(flat).collect()
 }
 
-/// Returns name and value of a parameter.
+/// Returns the name and value of a parameter.
 fn parameter(content: &[u8]) -> (String, f64) {
     let (length, rest) = content.split_first().unwrap();
     let (key, value) = rest.split_at(usize::from(*length));
@@ -133,7 +131,7 @@ fn parameter(content: &[u8]) -> (String, f64) {
     (name(called).to_owned(), number(kind, value))
 }
 
-/// Reads a log up to its last whole record, and panics at whatever is not allowed.
+/// Reads a log up to its last whole record. Panics at anything that is not allowed.
 pub(crate) fn read(bytes: &[u8]) -> StrictLog {
     let mut log = StrictLog::default();
     if bytes.len() < 16 {

@@ -1,4 +1,4 @@
-//! Attitude and its setpoint.
+//! Topics of the attitude and its setpoint.
 
 use crate::ulog::layout::message;
 use crate::ulog::moment::{Moment, flip_turn};
@@ -22,7 +22,7 @@ impl VehicleAttitude {
             timestamp: moment.now_us(),
             timestamp_sample: moment.state_us(),
             q: moment.attitude()?,
-            // PX4's counters have 8 bits and wrap: readers look for a change.
+            // PX4's counters have 8 bits and wrap; readers look for a change.
             quat_reset_counter: resets as u8,
         })
     }
@@ -41,7 +41,7 @@ message! {
 }
 
 impl VehicleAttitudeSetpoint {
-    /// None while disarmed, or without a setpoint.
+    /// Returns none while disarmed or without a setpoint.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
         let setpoint = moment.report.guided.setpoint.filter(|_| moment.report.mode.armed())?;
         let Trace { inputs, filtered: [roll, pitch], .. } = moment.details.trace;

@@ -1,4 +1,4 @@
-//! The battery.
+//! Topic of the battery.
 
 use crate::ulog::layout::message;
 use crate::ulog::moment::Moment;
@@ -14,7 +14,7 @@ message! {
 }
 
 impl BatteryVoltage {
-    /// None if it is not measured.
+    /// Returns none if the battery is not measured.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
         let reading = moment.details.inputs.battery?;
         Some(BatteryVoltage {

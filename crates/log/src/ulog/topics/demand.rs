@@ -1,4 +1,4 @@
-//! What the law demands of all rotors together, before their limits.
+//! Topics of the law's demanded thrust and torque, before the rotors' limits.
 
 use crate::ulog::layout::message;
 use crate::ulog::moment::{Moment, flip};
@@ -13,7 +13,7 @@ message! {
 }
 
 impl ThrustDemand {
-    /// None while disarmed.
+    /// Returns none while disarmed.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
         moment.report.mode.armed().then(|| ThrustDemand {
             timestamp: moment.now_us(),
@@ -32,7 +32,7 @@ message! {
 }
 
 impl TorqueDemand {
-    /// None while disarmed.
+    /// Returns none while disarmed.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
         let inputs = &moment.details.trace.inputs;
         let forces_n = Vector3::new(inputs.roll_n, inputs.pitch_n, inputs.yaw_n);

@@ -1,16 +1,16 @@
-//! Motor controllers that answer.
+//! Topic of motor controllers (ESCs) with telemetry.
 
 use crate::ulog::layout::{LoggedField, Wire, message};
 use crate::ulog::moment::Moment;
 use crate::ulog::record::Content;
 
-/// Motor controllers in a message.
+/// Number of motor controllers in a message.
 const ESCS: usize = 8;
-/// `ESC_CONNECTION_TYPE_DSHOT`.
+/// PX4's `ESC_CONNECTION_TYPE_DSHOT`.
 const DSHOT: u8 = 5;
-/// Function of the first motor, as PX4 numbers outputs.
+/// PX4's output function of the first motor.
 const MOTOR_1: u8 = 101;
-/// `FAILURE_GENERIC`.
+/// PX4's `FAILURE_GENERIC`.
 const GENERIC: u16 = 128;
 
 /// Fields of an [`EscReport`].
@@ -30,7 +30,7 @@ pub(crate) const ESC_REPORT: &[LoggedField] = &[
     LoggedField::of::<[u8; 5]>("_padding0", ""),
 ];
 
-/// What a motor controller has told; zeros for one that has not.
+/// Telemetry of one motor controller; all zeros if it has sent none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct EscReport {
     at_us: u64,
@@ -72,9 +72,9 @@ message! {
 }
 
 impl EscStatusReport {
-    /// None until one has answered.
+    /// Returns none until a motor controller has answered.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
-        // 60 s / 2 pi: revolutions per minute.
+        // Converts rad/s to revolutions per minute: 60 s / 2 pi.
         const RPM: f32 = 60.0 / core::f32::consts::TAU;
         let (escs, known, now_us) = (moment.beside.escs.filter(|escs| escs.is_known())?, moment.known, moment.now_us());
         let (mut esc, mut online) = ([EscReport::default(); ESCS], 0_u8);
@@ -92,7 +92,7 @@ impl EscStatusReport {
                 failures: if fails { GENERIC } else { 0 },
                 function: MOTOR_1 + motor,
             };
-            // Both below 8: `rotor` has a reading, and `motor` a place in the message.
+            // Both shifts are below 8: `rotor` has a reading, and `motor` has a place in the message.
             online |= u8::from(answers.wrapping_shr(rotor as u32) & 1 != 0).wrapping_shl(motor.into());
         }
         Some(EscStatusReport {

@@ -1,13 +1,13 @@
-//! The estimator: its state, its validity, and the measurements that it was offered.
+//! Topics of the estimator: its state, its validity, and the measurements that it was offered.
 
 use crate::ulog::layout::message;
 use crate::ulog::moment::{Moment, flip, flip_turn};
 use afbc_estimator::{Aid, Estimate, Measurement};
 
 const NUMBERS: usize = Measurement::NUMBERS;
-/// Kinds of aid.
+/// Number of kinds of aiding measurements.
 const AIDS: usize = Aid::ALL.len();
-/// States that it has, and places for them in PX4's message.
+/// Number of the estimator's states, and the sizes of the state and variance arrays in PX4's message.
 const STATES: usize = 16;
 const PX4_STATES: usize = 24;
 const PX4_COVARIANCES: usize = 23;
@@ -23,7 +23,7 @@ message! {
 }
 
 impl EstimatorVector {
-    /// None before the start.
+    /// Returns none before the estimator has started.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
         let estimate = moment.details.estimate.filter(|estimate| estimate.unready.is_none())?;
         let Estimate { state, sigmas, .. } = &estimate;
@@ -67,7 +67,7 @@ message! {
 }
 
 impl EstimatorFlags {
-    /// None without an inertial sensor.
+    /// Returns none without an inertial sensor.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
         let estimate = moment.details.estimate?;
         let (validity, resets, sigmas) = (estimate.validity, estimate.resets, estimate.sigmas);
@@ -113,7 +113,7 @@ message! {
 }
 
 impl EstimatorFigures {
-    /// None without an inertial sensor.
+    /// Returns none without an inertial sensor.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
         let (estimate, aids) = (moment.details.estimate?, &moment.details.aids);
         let records = Aid::ALL.map(|aid| *aids.of(aid));
@@ -131,7 +131,7 @@ impl EstimatorFigures {
         })
     }
 
-    /// True if both say the same of rest.
+    /// Returns true if both agree on `on_ground` and `at_rest`.
     pub(crate) fn is_like(&self, other: &Self) -> bool {
         (self.on_ground, self.at_rest) == (other.on_ground, other.at_rest)
     }

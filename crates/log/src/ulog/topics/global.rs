@@ -1,4 +1,4 @@
-//! The place on the earth.
+//! Topic of the geographic position.
 
 use crate::ulog::layout::message;
 use crate::ulog::moment::Moment;
@@ -17,7 +17,7 @@ message! {
 }
 
 impl VehicleGlobalPosition {
-    /// None unless position and origin are known.
+    /// Returns none unless position and origin are known.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
         let estimate = moment.details.estimate.filter(|estimate| estimate.validity.position)?;
         let place_m = estimate.state.position_m + moment.details.origin_m?;

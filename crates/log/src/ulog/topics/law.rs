@@ -1,11 +1,11 @@
-//! The law's internal signals, in this project's frames (earth north-west-up, body forward-left-up).
+//! Topic of the law's internal signals, in this project's frames (earth north-west-up, body forward-left-up).
 
 use crate::ulog::layout::message;
 use crate::ulog::moment::Moment;
 use afbc_control::Errors;
 use afbc_types::{Axis, PerAxis};
 
-/// Subsystems.
+/// Number of subsystems.
 const AXES: usize = Axis::ALL.len();
 
 message! {
@@ -31,7 +31,7 @@ message! {
     }
 }
 
-/// Returns a part of each subsystem's errors.
+/// Returns one of the errors of each subsystem.
 fn errors(moment: &Moment<'_>, part: fn(&Errors) -> f32) -> [f32; AXES] {
     Axis::ALL.map(|axis| part(&moment.details.trace.errors[axis]))
 }

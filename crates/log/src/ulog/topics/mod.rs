@@ -1,4 +1,4 @@
-//! The topics: which there are, how often each is written, and what of a tick they are made of.
+//! Lists the log's topics and their rates, and fills them from a tick's data.
 
 mod attitude;
 mod battery;
@@ -35,25 +35,25 @@ use crate::ulog::layout::{LoggedField, Message};
 /// A topic of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LoggedTopic {
-    /// Its name: PX4's, unless it begins with `afbc_`.
+    /// Name of the topic: PX4's, unless it begins with `afbc_`.
     pub name: &'static str,
-    /// Its fields, in the order of their bytes.
+    /// Fields, in the order of their bytes.
     pub fields: &'static [LoggedField],
-    /// Time between two messages; 0 for each one that there is \[us\].
+    /// Time between two messages; 0 if every tick's message is written \[us\].
     pub period_us: u32,
-    /// The same of a log that is to be small; of measurements, for each kind \[us\].
+    /// Time between two messages in a small log; for measurements, separately for each kind \[us\].
     pub small_us: u32,
-    /// True if there is a message whenever one of its values changes, too.
+    /// True if a change of the main values is also written at once.
     pub on_change: bool,
 }
 
-/// A message whose topic is in the table.
+/// A message whose topic is in [`TOPICS`].
 pub(crate) trait Listed: Message {
-    /// Number of the topic in the log, and its place in [`TOPICS`].
+    /// Number of the topic in the log, and its index in [`TOPICS`].
     const ID: u16;
 }
 
-/// Lists topics with their period, in a usual and in a small log \[us\], and whether a change is written at once.
+/// Lists topics with their periods in a usual and in a small log \[us\], and whether changes are written at once.
 macro_rules! topics {
     ($($type:ident: $period_us:literal, $small_us:literal $(, $on_change:ident)?;)*) => {
         #[repr(u16)]
@@ -67,7 +67,7 @@ macro_rules! topics {
             }
         )*
 
-        /// Every topic of a log, in the order of their numbers.
+        /// All topics of a log, in the order of their numbers.
         pub const TOPICS: [LoggedTopic; [$($period_us),*].len()] = [$(LoggedTopic {
             name: $type::NAME,
             fields: $type::FIELDS,

@@ -1,10 +1,10 @@
-//! Commands of the motors.
+//! Topics of the motor commands.
 
 use crate::ulog::known::MOTORS;
 use crate::ulog::layout::message;
 use crate::ulog::moment::Moment;
 
-/// Outputs in a message.
+/// Number of outputs in a message.
 const OUTPUTS: usize = 16;
 
 message! {

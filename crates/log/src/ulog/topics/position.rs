@@ -1,4 +1,4 @@
-//! Position and velocity in the local frame, and their setpoint.
+//! Topics of local position and velocity, and their setpoint.
 
 use crate::ulog::layout::message;
 use crate::ulog::moment::{Moment, flip};
@@ -46,7 +46,7 @@ impl VehicleLocalPosition {
         let (resets, sigmas) = (estimate.resets, estimate.sigmas);
         let validity = match &moment.details.estimate {
             Some(estimate) => estimate.validity,
-            // Of a state that the link has brought nothing else is known.
+            // A state from the link comes without validity flags and counts as valid.
             None => {
                 afbc_estimator::Validity { attitude: true, heading: true, velocity: true, position: true, height: true }
             }
@@ -77,7 +77,7 @@ impl VehicleLocalPosition {
             z_valid: validity.height,
             v_xy_valid: validity.velocity,
             v_z_valid: validity.velocity || validity.height,
-            // Counters wrap, as PX4's: readers look for a change.
+            // Counters wrap, like PX4's; readers look for a change.
             xy_reset_counter: resets.position as u8,
             z_reset_counter: resets.height as u8,
             vxy_reset_counter: resets.velocity as u8,

@@ -1,4 +1,4 @@
-//! Body rates and their setpoint.
+//! Topics of the body rates and their setpoint.
 
 use crate::ulog::layout::message;
 use crate::ulog::moment::{Moment, flip};
@@ -34,7 +34,7 @@ message! {
 }
 
 impl VehicleRatesSetpoint {
-    /// None while disarmed, or without a state.
+    /// Returns none while disarmed or without a state.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
         let state = moment.state().filter(|_| moment.report.mode.armed())?;
         let trace = &moment.details.trace;

@@ -1,4 +1,4 @@
-//! What the sensors read.
+//! Topics of the sensor readings.
 
 use crate::ulog::layout::message;
 use crate::ulog::moment::{Moment, flip, flip_turn};
@@ -6,15 +6,16 @@ use afbc_estimator::{ImuSample, Measurement};
 use afbc_onboard::Aged;
 use nalgebra::Vector3;
 
-/// Time of integration of a sample after none, or after a gap longer than this, in a usual and in a small log \[us\].
+/// Integration time of a first sample or of one after a gap. Then the longest interval that is no gap, in a usual and
+/// in a small log \[us\].
 const USUAL_US: u64 = 1_000;
 const GAP_US: u64 = 10_000;
 const SMALL_GAP_US: u64 = 20_000;
-/// Tesla's millionths per gauss.
+/// Microtesla per gauss.
 const UT_PER_GAUSS: f32 = 100.0;
-/// Kind of a fix in three dimensions.
+/// GNSS fix type: three-dimensional.
 const FIX_3D: u8 = 3;
-/// Frame of a pose: north-east-down, whatever north is; and of a velocity that there is not.
+/// Pose frame: north-east-down, though north may be arbitrary. Velocity frame: unknown, as there is no velocity.
 const FRAME_NED: u8 = 1;
 const FRAME_UNKNOWN: u8 = 0;
 
@@ -32,7 +33,7 @@ message! {
     }
 }
 
-/// The mean of samples.
+/// Mean of inertial samples.
 #[derive(Clone, Debug)]
 pub(crate) struct MeanSample {
     first_us: u64,
@@ -42,9 +43,9 @@ pub(crate) struct MeanSample {
 }
 
 impl MeanSample {
-    /// Of one more, after those before, if there are any.
+    /// Adds a sample to a mean, or begins a new mean.
     pub(crate) fn with(before: Option<Self>, sample: &ImuSample, clips: bool) -> Self {
-        // Of one, it is that one, to the last bit.
+        // The mean of one sample is that sample, to the last bit.
         let Some(mut mean) = before else {
             return MeanSample { first_us: sample.at_us, sum: *sample, count: 1, clips };
         };
@@ -56,7 +57,7 @@ impl MeanSample {
         mean
     }
 
-    /// Returns it, true in the middle of its samples.
+    /// Returns the mean, valid at the middle of its samples' times.
     fn sample(&self) -> ImuSample {
         let share = 1.0 / f32::from(self.count);
         ImuSample {
@@ -68,7 +69,7 @@ impl MeanSample {
 }
 
 impl SensorCombined {
-    /// `last` is the message before, and the time of its sample; returns the same of this one.
+    /// Returns the message and the time of its sample. `last` is the same pair of the previous message.
     pub(crate) fn of(mean: &MeanSample, last: Option<&(Self, u64)>, small: bool) -> (Self, u64) {
         let (sample, gap_us) = (mean.sample(), if small { SMALL_GAP_US } else { GAP_US });
         (Self::of_sample(&sample, last.map(|(message, at_us)| (message, *at_us)), mean.clips, gap_us), sample.at_us)
@@ -77,7 +78,8 @@ impl SensorCombined {
     fn of_sample(sample: &ImuSample, last: Option<(&Self, u64)>, clips: bool, gap_us: u64) -> Self {
         let since_us = last.and_then(|(_, last_us)| sample.at_us.checked_sub(last_us));
         let since_us = since_us.filter(|since_us| (1..=gap_us).contains(since_us)).unwrap_or(USUAL_US);
-        // Longer after a longer one, so that no message is before the last, and each says when its sample was true.
+        // A long integration time puts `timestamp` later. The next one must then be long, too: messages stay in order,
+        // and each still says when its sample was valid.
         let behind_us = last.map_or(0, |(message, _)| message.timestamp.saturating_sub(sample.at_us));
         let dt_us = since_us.max(2 * behind_us.min(gap_us)) as u32;
         let clipping = if clips { 7 } else { 0 };
@@ -147,7 +149,7 @@ message! {
     }
 }
 
-/// A reading of an aiding sensor, as its topic has it.
+/// A reading of an aiding sensor, as a message of its topic.
 pub(crate) enum Aiding {
     Air(VehicleAirData),
     Field(VehicleMagnetometer),
@@ -156,7 +158,8 @@ pub(crate) enum Aiding {
 }
 
 impl Aiding {
-    /// Returns a corrected reading as a message; none of a fix as long as nobody knows where it is measured from.
+    /// Returns a corrected reading as a message. Returns none for a heading, and for a GNSS fix until the origin is
+    /// known.
     pub(crate) fn of(moment: &Moment<'_>, aid: &Aged<Measurement>) -> Option<Self> {
         let timestamp = moment.now_us();
         let timestamp_sample = timestamp.saturating_sub(aid.age_us.into());

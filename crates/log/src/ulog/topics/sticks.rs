@@ -1,9 +1,9 @@
-//! The pilot.
+//! Topic of the pilot's sticks.
 
 use crate::ulog::layout::message;
 use crate::ulog::moment::Moment;
 
-/// Data source: a radio.
+/// PX4's data source number of a radio.
 const RADIO: u8 = 1;
 
 message! {
@@ -20,7 +20,7 @@ message! {
 }
 
 impl ManualControl {
-    /// None as long as nobody has moved any.
+    /// Returns none until a pilot has moved a stick.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
         let sticks = moment.details.sticks?;
         Some(ManualControl {

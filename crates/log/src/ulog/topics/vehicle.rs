@@ -1,16 +1,16 @@
-//! Modes, arming and landing.
+//! Topics of modes, arming and landing.
 
 use crate::ulog::layout::message;
 use crate::ulog::moment::Moment;
 use afbc_flight_core::Mode;
 use afbc_guidance::FlightMode;
 
-/// Arming states: disarmed, armed.
+/// PX4's arming states: disarmed, armed.
 const STANDBY: u8 = 1;
 const ARMED: u8 = 2;
-/// Type of vehicle: rotary wing.
+/// PX4's vehicle type: rotary wing.
 const ROTARY_WING: u8 = 1;
-/// Component: autopilot.
+/// MAVLink component id: autopilot.
 const AUTOPILOT: u8 = 1;
 
 message! {
@@ -29,7 +29,7 @@ message! {
 }
 
 impl VehicleState {
-    /// `since_us` are the times of arming and of the last take-off.
+    /// Returns the message. The two times are those of arming and of the last take-off \[us\].
     pub(crate) fn of(moment: &Moment<'_>, [armed_time, takeoff_time]: [u64; 2]) -> Self {
         let report = moment.report;
         VehicleState {
