@@ -1,4 +1,4 @@
-//! What makes the firmware that of one vehicle.
+//! The configuration of a vehicle, which adapts the firmware to it.
 
 use crate::esc_settings::EscSettings;
 use crate::link::Link;
@@ -13,32 +13,32 @@ use afbc_flight_core::protocol::MotorOutputs;
 use afbc_radio::RadioSettings;
 use afbc_types::{Airframe, Declared, Mounting, OutOfRange, Parameters, PerAxis, SensorCalibration};
 
-/// What the firmware knows of the vehicle that it flies; `vehicles/` has one for each.
+/// Everything that the firmware knows about its vehicle. The vehicles' configurations are in `vehicles/`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Configuration<const N: usize = 4> {
     /// Nominal parameters and rotors.
     pub airframe: Airframe<N>,
-    /// Settings of AFBC, largest force of a rotor among them.
+    /// Settings of AFBC, including the largest force of a rotor.
     pub settings: Settings,
-    /// Gains of AFBC for this vehicle.
+    /// Gains of AFBC.
     pub gains: PerAxis<Gains>,
     /// Throttle curve of the motors.
     pub curve: Curve,
-    /// How the rotors follow their commands.
+    /// Dynamic response of the rotors to their commands.
     pub response: Response,
-    /// The outputs to the motor controllers.
+    /// Outputs to the motor controllers.
     pub outputs: MotorOutputs,
     /// Telemetry of the motor controllers.
     pub escs: EscSettings,
     /// Mounting of the inertial sensor.
     pub imu: Mounting,
-    /// Errors of the sensors, found by calibration on the vehicle.
+    /// Sensor errors, found by calibration on the vehicle.
     pub calibration: SensorCalibration,
     /// Settings of the estimator.
     pub estimation: Estimation,
     /// Limits for arming.
     pub arming: ArmingLimits,
-    /// Settings of modes, limits and safety net.
+    /// Settings of flight modes, limits and failsafes.
     pub guidance: afbc_guidance::Settings,
     /// Settings of radio control.
     pub radio: RadioSettings,
@@ -47,7 +47,7 @@ pub struct Configuration<const N: usize = 4> {
 }
 
 impl<const N: usize> Configuration<N> {
-    /// Returns the configuration of this airframe in which everything else is at its declared default.
+    /// Returns the configuration of this airframe with declared defaults for everything else.
     #[must_use]
     pub const fn plain(airframe: Airframe<N>) -> Self {
         const GAINS: Gains = Gains::DEFAULT;
@@ -69,16 +69,16 @@ impl<const N: usize> Configuration<N> {
         }
     }
 
-    /// Returns the firmware's own law for this vehicle: AFBC under its monitor.
+    /// Returns the firmware's own law for this vehicle: AFBC with its monitor.
     ///
     /// # Errors
     /// The first parameter, setting or gain out of range.
-    // Always: out of line, the controller is on the stack of the firmware's start-up twice.
+    // Always inlined: otherwise the controller is on the stack of the firmware's start-up twice.
     #[inline(always)]
     pub fn controller(&self) -> Result<Guarded<N>, OutOfRange> {
         let Configuration { airframe, settings, gains, .. } = self;
         let parameters = &airframe.parameters;
-        // The controller checks what follows from these and assumes that each is in its range.
+        // The controller only checks combinations, and assumes that each value is in its own range.
         parameters.validate()?;
         settings.validate()?;
         gains.validate()?;
@@ -88,7 +88,7 @@ impl<const N: usize> Configuration<N> {
 }
 
 impl Default for Configuration {
-    /// The paper's vehicle in the profile `flight`.
+    /// Returns the paper's vehicle in the profile `flight`.
     fn default() -> Self {
         Configuration {
             settings: Profile::Flight.settings().with_drag(KnownDrag::PAPER),

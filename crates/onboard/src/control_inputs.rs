@@ -1,19 +1,19 @@
-//! What messages bring for a tick.
+//! Inputs that messages bring for a control tick.
 
 use afbc_flight_core::{Inbox, Queue, Ticketed};
 use afbc_guidance::{BatteryReading, Order, Orders};
 
-/// Inputs of the flight core and of the guidance, written by what receives messages and taken by the control tick.
+/// Inputs of the flight core and the guidance. The message services write them, and the control tick takes them.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ControlInputs {
-    /// For the flight core.
+    /// Inputs of the flight core.
     pub inbox: Inbox,
-    /// For the guidance.
+    /// Inputs of the guidance.
     pub orders: Orders,
-    /// The battery, if the shell measures it.
+    /// Reading of the battery, if the shell measures it.
     pub battery: Option<BatteryReading>,
-    /// True if there is something new in the orders: without it they are not copied.
+    /// True if the orders have changed. Unchanged orders are not copied.
     fresh: bool,
 }
 
@@ -24,14 +24,14 @@ impl Default for ControlInputs {
 }
 
 impl ControlInputs {
-    /// Nothing.
+    /// No inputs.
     pub const EMPTY: Self = {
         let given = Queue::new();
         let orders = Orders { target: None, sticks: None, leg: None, heard_us: None, fence: None, safe_m: None, given };
         ControlInputs { inbox: Inbox::EMPTY, orders, battery: None, fresh: false }
     };
 
-    /// Returns the orders, to be changed.
+    /// Returns the orders for changing, and marks them as changed.
     pub fn order(&mut self) -> &mut Orders {
         self.fresh = true;
         &mut self.orders
@@ -58,7 +58,7 @@ impl ControlInputs {
         }
     }
 
-    /// Brings the inputs of the last tick up to date for the next one, and removes what is handed over only once.
+    /// Updates `taken`, the last tick's inputs, for the next tick. Removes inputs that are handed over only once.
     #[inline]
     pub fn take_into(&mut self, taken: &mut ControlInputs) {
         self.inbox.take_into(&mut taken.inbox);
@@ -69,7 +69,7 @@ impl ControlInputs {
         }
     }
 
-    /// Copies what is new, and keeps nothing: the tick has it.
+    /// Moves changed orders into `taken`.
     #[inline(never)]
     fn move_orders(&mut self, taken: &mut Orders) {
         let Orders { target, sticks, leg, heard_us, fence, safe_m, given } = &mut self.orders;
@@ -79,7 +79,7 @@ impl ControlInputs {
         replace(&mut taken.heard_us, heard_us);
         replace(&mut taken.fence, fence);
         replace(&mut taken.safe_m, safe_m);
-        // Those that the tick has not answered yet stay.
+        // Orders that the tick has not answered yet stay in `taken`.
         while let Some(given) = given.pop_front() {
             give(taken, given);
         }
@@ -92,7 +92,7 @@ fn replace<T>(old: &mut Option<T>, new: &mut Option<T>) {
     }
 }
 
-/// Queues an order; dropped if there is no place for it: whoever gives orders keeps count.
+/// Queues an order. Drops the order if the queue is full; the sender must keep count.
 pub fn give(orders: &mut Orders, given: Ticketed<Order>) {
     let _ = orders.given.push_back(given);
 }

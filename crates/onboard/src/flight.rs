@@ -1,4 +1,4 @@
-//! The vehicle with its flight core and motors.
+//! The control tick of a vehicle: estimator, guidance, flight core and motors.
 
 use crate::configuration::Configuration;
 use crate::control_inputs::ControlInputs;
@@ -15,7 +15,7 @@ use afbc_estimator::{Estimator, OutputFilter, VelocityNotch};
 use afbc_flight_core::{FlightCore, FlightCoreMemory, Motor};
 use afbc_types::{Declared, OutOfRange};
 
-/// A vehicle under a law: AFBC with its monitor, unless it is simulated or replayed under another.
+/// A vehicle under a law: AFBC with its monitor, unless it is simulated or replayed under another one.
 #[derive(Clone, Debug)]
 pub struct Flight<const N: usize = 4, C: FlightLaw<N> = Guarded<N>> {
     vehicle: FlightCore<C, N>,
@@ -24,14 +24,14 @@ pub struct Flight<const N: usize = 4, C: FlightLaw<N> = Guarded<N>> {
     motor: Motor,
     guide: Guide,
     timeouts: SensorTimeouts,
-    /// True if the state of the last tick was observed.
+    /// True if the flight core's observer provided the last tick's state.
     observes: bool,
-    /// True if an armed vehicle was to rest on the ground in the last tick.
+    /// True if the guidance let the armed vehicle idle on the ground in the last tick.
     idle_on_ground: bool,
     saturated_ticks: u32,
 }
 
-/// All that follows from a [`Configuration`], so that [`Flight::adopt`] takes a copy's time.
+/// Everything derived from a [`Configuration`], so that [`Flight::adopt`] only has to copy.
 #[derive(Clone, Debug)]
 pub struct Prepared<const N: usize = 4, C: FlightLaw<N> = Guarded<N>> {
     vehicle: FlightCore<C, N>,
@@ -46,8 +46,7 @@ impl<const N: usize> Prepared<N> {
     /// Prepares a flight.
     ///
     /// # Errors
-    /// The first parameter, setting or gain out of range, or the first that leaves the vehicle without a margin to
-    /// hover.
+    /// The first parameter, setting or gain that is out of range or leaves the vehicle without a margin to hover.
     pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
         configuration.imu.validate()?;
         configuration.calibration.validate()?;
@@ -59,14 +58,14 @@ impl<const N: usize, C: FlightLaw<N>> Prepared<N, C> {
     /// Prepares a flight under `controller`, which must be built for this vehicle.
     ///
     /// # Errors
-    /// The first of the other parameters and settings out of range.
+    /// The first of the other parameters and settings that is out of range.
     pub fn under(configuration: &Configuration<N>, controller: C) -> Result<Self, OutOfRange> {
         configuration.imu.validate()?;
         configuration.calibration.validate()?;
         Self::around(configuration, controller)
     }
 
-    /// Puts everything around a controller. Always inline: out of line, its result is on the stack of the firmware's
+    /// Adds everything else to a controller. Always inlined: otherwise its result is on the stack of the firmware's
     /// start-up twice.
     #[inline(always)]
     fn around(configuration: &Configuration<N>, controller: C) -> Result<Self, OutOfRange> {
@@ -85,7 +84,7 @@ impl<const N: usize, C: FlightLaw<N>> Prepared<N, C> {
     }
 }
 
-/// What makes a flight of a configuration, under a law of its choice.
+/// Builds a flight from a configuration, under a law of its choice.
 pub trait Prepare<const N: usize> {
     /// The law.
     type Law: FlightLaw<N>;
@@ -97,7 +96,7 @@ pub trait Prepare<const N: usize> {
     fn prepare(&self, configuration: &Configuration<N>) -> Result<Prepared<N, Self::Law>, OutOfRange>;
 }
 
-/// The firmware's own law.
+/// Prepares flights under the firmware's own law.
 impl<const N: usize> Prepare<N> for () {
     type Law = Guarded<N>;
 
@@ -110,15 +109,15 @@ impl<const N: usize> Flight<N> {
     /// Creates the vehicle, disarmed.
     ///
     /// # Errors
-    /// Those of [`Prepared::new`].
+    /// The errors of [`Prepared::new`].
     pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
         Ok(Self::of(Prepared::new(configuration)?))
     }
 }
 
 impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
-    /// Creates the vehicle, disarmed, from what is prepared.
-    // Always: the firmware's start-up has it on its stack once.
+    /// Creates the vehicle, disarmed, from a prepared flight.
+    // Always inlined, so that the vehicle is on the stack of the firmware's start-up only once.
     #[inline(always)]
     pub fn of(prepared: Prepared<N, C>) -> Self {
         let Prepared { vehicle, estimator, output_filter, corrections, motor, guide } = prepared;
@@ -135,8 +134,8 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
         }
     }
 
-    /// Flies with another configuration from the next tick on; what the estimator knows stays, unless the inertial
-    /// sensor is mounted otherwise, or a sensor is corrected otherwise. False, and without effect, while armed.
+    /// Flies with another configuration from the next tick on. The estimate continues, unless the inertial sensor's
+    /// mounting or a sensor's calibration changes. While armed, this returns false and does nothing.
     #[must_use = "an armed vehicle keeps its configuration"]
     pub fn adopt(&mut self, prepared: &Prepared<N, C>) -> bool {
         let disarmed = !self.memory.mode().armed();
@@ -150,47 +149,47 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
         disarmed
     }
 
-    /// Flies on under another law, from the next tick on, armed or not: it begins afresh, as after arming. `prepared`
-    /// is of the same configuration. For simulators: no image has several laws.
+    /// Changes the law from the next tick on, even while armed. The new law starts as after arming. `prepared` must
+    /// have the same configuration. Only for simulators: no firmware image has several laws.
     pub fn change_law(&mut self, prepared: &Prepared<N, C>) {
         self.vehicle.clone_from(&prepared.vehicle);
         self.memory.forget_law();
     }
 
-    /// Returns the memory of the law in this or the last flight; none before the first.
+    /// Returns the law's memory in the present or last flight, or none before the first flight.
     pub fn law_memory(&self) -> Option<&C::Memory> {
         self.memory.control()
     }
 
-    /// Moves the notch in the velocity that the law gets, from the next tick on, beside the tick; nothing if the
-    /// vehicle has none.
+    /// Moves the notch filter in the law's velocity, from the next tick on. Call it between ticks. Does nothing if the
+    /// vehicle has no notch.
     pub fn move_notch(&mut self, to: &VelocityNotch) {
         self.front_end.move_notch(to);
     }
 
-    /// Returns the notch in the velocity that the law gets, if there is one.
+    /// Returns the notch filter in the law's velocity, if there is one.
     pub fn notch(&self) -> Option<&VelocityNotch> {
         self.front_end.notch()
     }
 
-    /// Records that the clock has failed and another has taken over: the vehicle is not armed again.
+    /// Records that the clock has failed and another has taken over. The vehicle cannot be armed again.
     pub fn distrust_clock(&mut self) {
         self.memory.distrust_clock();
     }
 
-    /// Returns the law's internal signals of the last tick: only inputs while blind, zeros while disarmed.
+    /// Returns the law's internal signals in the last tick: only inputs while blind, zeros while disarmed.
     pub fn trace(&self) -> Trace {
         self.memory.trace::<C, N>()
     }
 
-    /// Returns what logs have of the time before the tick that takes these messages.
+    /// Returns the state before a tick that logs need. `messages` are the inputs that the tick will take.
     pub fn before(&self, messages: &ControlInputs) -> TickBefore {
         let (stands_m, works) = self.front_end.before();
         TickBefore { pose: messages.inbox.pose().copied(), stands_m, works }
     }
 
-    /// Returns what logs have of the last tick beside its report: beside the tick, not in it, and before anything else
-    /// changes. The tick had these inputs; `messages` is what it has left of those.
+    /// Returns the details of the last tick for logs. Call it after the tick, before anything else changes. `inputs`
+    /// are the tick's inputs, and `messages` the state in which the tick left its messages.
     pub fn details(&self, inputs: &TickInputs, before: &TickBefore, messages: &ControlInputs) -> TickDetails {
         let front_end = &self.front_end;
         TickDetails {
@@ -216,17 +215,18 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
         }
     }
 
-    /// Runs one control tick, to be called every millisecond, with what the link brought and the vehicle's own sensors
-    /// read; `now_us` is the time since power-up. Cannot fail.
-    // Always: copying the report out of a call costs a hundred instructions.
+    /// Runs one control tick. Call it every millisecond, with the inputs from messages and the readings of the
+    /// vehicle's own sensors. `now_us` is the time since power-up. Cannot fail.
+    // Always inlined: copying the report out of a call costs a hundred instructions.
     #[inline(always)]
     pub fn tick(&mut self, now_us: u64, inputs: &mut ControlInputs, readings: &Readings) -> Report<N> {
-        // Before the front end, which takes the pose out of the inbox.
+        // Comes before the front end, which removes the pose from the inbox.
         let mut sensors = self.timeouts.tick(now_us, readings, inputs.inbox.pose().is_some());
-        // One that repeats itself has failed, too.
+        // While the observer flies, the inertial sensor counts as failed even if it still sends samples, as a stuck
+        // sensor does.
         sensors.inertial |= self.observes;
         let (mode, airborne, rested) = (self.memory.mode(), self.memory.airborne(), self.memory.rested());
-        // As decided in the last tick: this one's decision needs the estimate first.
+        // Uses the last tick's decision, because this tick's decision needs the estimate first.
         self.front_end.set_on_ground(!mode.armed() || self.idle_on_ground && !airborne);
         let estimate = self.front_end.tick(now_us, readings, &mut inputs.inbox);
         let observed = self.memory.state().filter(|_| self.observes);

@@ -1,5 +1,6 @@
-//! What stands around the filter, on board and in simulation: which readings it gets when, the inertial sensor's
-//! mounting, the ground, the local frame's origin, and what of the estimate reaches the flight core.
+//! Connects the estimator to the vehicle, on board and in simulation. It selects and corrects the filter's
+//! measurements, tracks contact with the ground and the local frame's origin, and passes the valid parts of the
+//! estimate to the flight core.
 
 use crate::imu_lanes::OtherSensors;
 use crate::readings::{AIDS_MAX, Aged, Readings};
@@ -14,28 +15,29 @@ use afbc_flight_core::{Inbox, Refusal};
 use afbc_types::{Mounting, Pose, PoseSigmas, SensorCalibration, State};
 use nalgebra::Vector3;
 
-/// Number of fixes whose mean the local frame's origin is, at rest.
+/// Number of fixes averaged for the local frame's origin while the vehicle is at rest.
 const FIXES: f32 = 10.0;
-/// Fixes so many standard deviations off, of a vehicle at rest, and so many in a row, tell that its origin is wrong.
+/// At rest, five fixes in a row that are 20 standard deviations off mean that the origin is wrong.
 const ELSEWHERE: f32 = 20.0;
 const MISLED: u8 = 5;
-/// How far above or below where it stood a vehicle is clear of the ground \[m\].
+/// Change of height from which a vehicle is clear of the ground \[m\].
 const CLEAR_M: f32 = 0.3;
-/// Ticks after which a vehicle that its motors can carry has left the ground: three seconds.
+/// Ticks with enough thrust to fly after which a vehicle counts as off the ground: three seconds.
 const CARRIED: u16 = 3000;
-/// Standard deviations of a tracker's pose that does not say how good it is: a motion-capture system's \[m, rad\].
+/// Standard deviations of a tracker's pose that states none, typical for motion capture \[m, rad\].
 const TRACKER: (f32, f32) = (0.003, 0.01);
 
-/// What is corrected of a vehicle's own readings.
+/// Corrections of the vehicle's own readings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Corrections {
     imu: ImuCalibration,
-    /// Offset \[uT\], diagonal and off-diagonal of the magnetometer's matrix, if it has errors.
+    /// Offset \[uT\], diagonal and off-diagonal elements of the magnetometer's correction matrix; none if all are
+    /// default.
     field: Option<[Vector3<f32>; 3]>,
 }
 
 impl Corrections {
-    /// What follows from a mounting and a calibration.
+    /// Returns the corrections for a mounting and a calibration.
     pub(crate) fn new(imu: &Mounting, calibration: &SensorCalibration) -> Self {
         let of_field = |of: &SensorCalibration| [of.mag_offset_ut, of.mag_scale, of.mag_off_diagonal];
         let field = of_field(calibration);
@@ -46,15 +48,15 @@ impl Corrections {
     }
 }
 
-/// Whether a vehicle is clear of the ground, on whose feet it turns about these and not about its centre of mass. One
-/// that has never been on the ground is.
+/// Tells whether a vehicle is clear of the ground. On the ground it turns about its feet, not about its centre of mass.
+/// A vehicle that has never been on the ground is clear.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Clearance {
-    /// True while the motors cannot carry it.
+    /// True while the motors cannot carry the vehicle.
     on_ground: bool,
-    /// Height at which it stands or has stood \[m\]; none from when it is clear of that on.
+    /// Height at which the vehicle stood last \[m\]; none once it is clear of the ground.
     stood_m: Option<f32>,
-    /// Ticks for which the motors could carry it, up to [`CARRIED`].
+    /// Number of ticks with enough thrust to fly, up to [`CARRIED`].
     carried: u16,
 }
 
@@ -74,60 +76,61 @@ impl Clearance {
         self.stood_m.is_none()
     }
 
-    /// True if it has left the ground, as far as anybody knows: it may hover below what is clear.
+    /// Returns true if the vehicle has presumably left the ground; it may hover too low to be clear.
     fn has_left(&self) -> bool {
         self.is_clear() || self.carried == CARRIED
     }
 }
 
-/// Estimator and memory of a vehicle. Until its first sample of an inertial sensor, the vehicle flies on the states
-/// that come over the link; from then on their poses, and poses that come alone, are measurements like others. While
-/// the inertial sensor has failed, poses are left to the flight core ([`afbc_flight_core::observer`]).
+/// The estimator with its state, and everything between it and the vehicle. Until the first inertial sample, the
+/// vehicle flies on states from the link. From then on, poses from the link, alone or in states, are measurements for
+/// the estimator. While the inertial sensor has failed, poses go to the flight core's observer instead
+/// ([`afbc_flight_core::observer`]).
 ///
-/// The local frame is that of the tracker's poses. Where there is none, its origin is where the vehicle stands at the
-/// first usable fix of its GNSS receiver: one that comes when the estimator runs, and is good enough for a valid
-/// position. All fixes are told in that frame; with a tracker, so that the first one agrees with the estimate. While
-/// the vehicle is at rest, further fixes tell where the origin is, not where the vehicle is: their error wanders by
-/// metres within minutes, which would be a motion of a vehicle that stands. If the first was wild, the fifth in a row
-/// that is far from it moves the origin to where they are.
+/// With a tracker, the local frame is the tracker's frame. Without one, its origin is the vehicle's position at the
+/// first usable GNSS fix: a fix that comes while the estimator runs and is accurate enough for a valid position. All
+/// fixes are converted to the local frame. With a tracker, the conversion makes the first fix agree with the estimate.
+///
+/// While the vehicle is at rest, further fixes correct the origin, not the position. Otherwise their error, which
+/// wanders by metres within minutes, would appear as motion. If the first fix was far off, the fifth later fix in a row
+/// that is far away moves the origin to match these fixes.
 #[derive(Clone, Debug)]
 pub struct EstimatorFrontEnd {
     estimator: Estimator,
     memory: Memory,
     output_filter: OutputFilter,
     corrections: Corrections,
-    /// What the mounting does not say of the inertial sensor's place, and whether the flight shows it.
+    /// Offset of the inertial sensor from its configured place, estimated in flight.
     lever: LeverFinder,
     clearance: Clearance,
-    /// The last sample as corrected for the mounting.
+    /// The last sample, corrected for the mounting.
     last: Option<ImuSample>,
     vibration: Vibration,
-    /// True if there has been a sample.
+    /// True after the first sample.
     senses: bool,
     /// True if the inertial sensor worked in the last tick.
     works: bool,
-    /// The local frame's origin in the receiver's frame, from the first usable fix on \[m\].
+    /// Local frame's origin in the receiver's frame, from the first usable fix on \[m\].
     origin_m: Option<Vector3<f32>>,
-    /// True if the receiver's frame is the local one, whatever the fixes say.
+    /// True if the receiver's frame is the local frame, independent of the fixes.
     origin_is_known: bool,
-    /// Number of fixes that have told it, up to [`FIXES`].
+    /// Number of fixes averaged in the origin, up to [`FIXES`].
     fixes: f32,
-    /// Number of fixes in a row that are elsewhere, of a vehicle at rest.
+    /// Number of fixes in a row that were far off while the vehicle was at rest.
     elsewhere: u8,
-    /// Estimated position and velocity until then, zero as long as nobody has told a position \[m, m/s\].
+    /// Estimated position and velocity before the first fix; zero as long as no position was measured \[m, m/s\].
     told: [Vector3<f32>; 2],
-    /// Estimated position of a vehicle at rest \[m\].
+    /// Estimated position of a vehicle at rest; none while it moves \[m\].
     stands_m: Option<Vector3<f32>>,
 }
 
 impl EstimatorFrontEnd {
-    /// Creates it with nothing read, for an inertial sensor that is mounted as `imu` says, and other sensors without
-    /// errors.
+    /// Creates the front end, for an inertial sensor with the mounting `imu` and other sensors without errors.
     pub fn new(estimator: Estimator, output_filter: OutputFilter, imu: ImuCalibration) -> Self {
         Self::corrected(estimator, output_filter, Corrections { imu, field: None })
     }
 
-    /// The same with these corrections.
+    /// Creates the front end with these corrections.
     pub(crate) fn corrected(estimator: Estimator, output_filter: OutputFilter, corrections: Corrections) -> Self {
         EstimatorFrontEnd {
             estimator,
@@ -149,18 +152,18 @@ impl EstimatorFrontEnd {
         }
     }
 
-    /// The same in a world whose map is the local frame: fixes are taken as they are.
+    /// Makes the receiver's frame the local frame, as in a simulation with a known map: fixes are not converted.
     #[must_use]
     pub fn with_known_origin(self) -> Self {
         EstimatorFrontEnd { origin_is_known: true, ..self }
     }
 
-    /// Returns what the filter knows, for whoever judges it.
+    /// Returns the filter's state, for evaluation.
     pub fn memory(&self) -> &Memory {
         &self.memory
     }
 
-    /// Returns the estimate after a tick at `now_us`, as that tick had it; none before the first sample. For logs.
+    /// Returns the estimate of the tick at `now_us`, or none before the first sample. For logs.
     #[must_use]
     pub fn estimate(&self, now_us: u64) -> Option<Estimate> {
         self.senses.then(|| self.estimator.estimate(&self.memory, now_us))
@@ -172,14 +175,14 @@ impl EstimatorFrontEnd {
         if self.origin_is_known { Some(Vector3::zeros()) } else { self.origin_m }
     }
 
-    /// Returns the sample of the last tick, which took these inputs, calibrated and at the centre of mass.
+    /// Returns the last tick's sample, calibrated and at the centre of mass. `inputs` are that tick's inputs.
     pub(crate) fn sample(&self, inputs: &TickInputs) -> Option<ImuSample> {
-        // A sensor without mounting and errors leaves no corrected one.
+        // Without a mounting and errors to correct, no corrected sample is stored.
         inputs.readings.sample(inputs.time_us).map(|read| self.last.unwrap_or(read))
     }
 
-    /// Returns the measurements of the last tick, which had these readings, as it took them: corrected and in the local
-    /// frame; none of a fix before a usable one.
+    /// Returns the last tick's measurements as the estimator got them: corrected and in the local frame. Leaves out
+    /// fixes before the first usable one. `readings` are that tick's readings.
     pub(crate) fn local(&self, readings: &Readings, before: &TickBefore) -> [Option<Measurement>; AIDS_MAX] {
         let mut local = readings.aids.map(|aid| aid.map(|aid| aid.value));
         for aid in &mut local {
@@ -196,28 +199,29 @@ impl EstimatorFrontEnd {
         local
     }
 
-    /// Returns where a vehicle at rest stands, by which the next tick takes fixes, and whether the estimator is offered
-    /// what that tick reads once there is a sample.
+    /// Returns the position of a vehicle at rest, to which the next tick sets usable fixes, and true if the inertial
+    /// sensor works.
     pub(crate) fn before(&self) -> (Option<Vector3<f32>>, bool) {
         (self.stands_m, self.works)
     }
 
-    /// True once there was a sample.
+    /// Returns true after the first sample.
     pub(crate) fn senses(&self) -> bool {
         self.senses
     }
 
-    /// True if the motors could not carry the vehicle in the last tick.
+    /// Returns true if the motors could not carry the vehicle in the last tick.
     pub(crate) fn is_on_ground(&self) -> bool {
         self.clearance.on_ground
     }
 
-    /// Returns what the estimate is at the time of the last sample, once there is one.
+    /// Returns the estimate at the time of the last sample, or none before the first.
     pub fn inertial(&self) -> Option<Inertial> {
         self.memory.inertial(self.estimator.settings(), self.corrections.imu.to_body())
     }
 
-    /// Returns what is measured beside the inertial sensor in a tick with these readings, corrected.
+    /// Returns the corrected measurements of the other sensors in these readings, for the check of the inertial
+    /// sensors.
     pub fn other_sensors(&self, readings: &Readings) -> OtherSensors {
         let mut others = OtherSensors::default();
         for Aged { value, age_us } in readings.aids.iter().flatten() {
@@ -235,23 +239,23 @@ impl EstimatorFrontEnd {
         others
     }
 
-    /// True while the accelerometer is shaken more than is acceptable.
+    /// Returns true while vibration of the accelerometer is too high.
     pub fn is_shaken(&self) -> bool {
         self.vibration.is_high()
     }
 
-    /// Returns what the flight has shown of the inertial sensor's place, for whoever judges it.
+    /// Returns the estimated offset of the inertial sensor, for evaluation.
     #[must_use]
     pub fn lever(&self) -> &LeverFinder {
         &self.lever
     }
 
-    /// Moves the output's notch from the next tick on ([`OutputFilter::move_notch`]).
+    /// Moves the notch filter of the output from the next tick on ([`OutputFilter::move_notch`]).
     pub fn move_notch(&mut self, to: &VelocityNotch) {
         self.output_filter.move_notch(to);
     }
 
-    /// Returns the output's notch, if there is one.
+    /// Returns the notch filter of the output, if there is one.
     pub fn notch(&self) -> Option<&VelocityNotch> {
         self.output_filter.notch()
     }
@@ -262,15 +266,15 @@ impl EstimatorFrontEnd {
         self.clearance.on_ground = on_ground;
     }
 
-    /// Tells that the vehicle is in the air, wherever it stood before: a simulation carries it there.
+    /// Declares the vehicle to be in the air: a simulation has placed it there.
     pub fn set_clear_of_ground(&mut self) {
         self.clearance = Clearance::default();
         self.output_filter.unhide();
         self.lever.settle();
     }
 
-    /// Goes on with another estimator. If the inertial sensor is mounted otherwise, or a sensor is corrected otherwise,
-    /// the estimate starts again, from rest.
+    /// Replaces the estimator. If the inertial sensor's mounting or a sensor's calibration changes, the estimate starts
+    /// again, at rest.
     pub(crate) fn adopt(&mut self, estimator: &Estimator, output_filter: &OutputFilter, corrections: &Corrections) {
         (self.estimator, self.output_filter) = (*estimator, *output_filter);
         if self.corrections != *corrections {
@@ -281,8 +285,8 @@ impl EstimatorFrontEnd {
         }
     }
 
-    /// Takes the readings of a tick at `now_us`, puts what the vehicle knows into `inbox`, and returns the estimate;
-    /// none before the first sample.
+    /// Runs the estimator on the readings of a tick at `now_us`, puts the result into `inbox`, and returns the
+    /// estimate, or none before the first sample.
     #[inline(always)]
     pub fn tick(&mut self, now_us: u64, readings: &Readings, inbox: &mut Inbox) -> Option<Estimate> {
         let sample = readings.sample(now_us).map(|sample| {
@@ -324,7 +328,7 @@ impl EstimatorFrontEnd {
         Some(estimate)
     }
 
-    /// Returns a measurement corrected and in the local frame; none for a fix before a usable one.
+    /// Returns a measurement corrected and in the local frame, or none for a fix before the first usable one.
     #[inline(always)]
     fn localized(&mut self, aid: Aged<Measurement>) -> Option<Aged<Measurement>> {
         match (aid.value, &self.corrections.field) {
@@ -342,7 +346,7 @@ impl EstimatorFrontEnd {
         let Measurement::Gnss { position_m, .. } = &mut aid.value else { return Some(aid) };
         if self.origin_m.is_none() {
             let [here_m, velocity_m_s] = self.told;
-            // A fix is of some time ago: it belongs to where the vehicle was then.
+            // A fix is older than the tick: it is compared with the position at its own time.
             let there_m = here_m - velocity_m_s * (aid.age_us as f32 * 1e-6);
             self.origin_m = sigmas_m.map(|_| *position_m - there_m);
         }
@@ -352,11 +356,11 @@ impl EstimatorFrontEnd {
             let off_m = *position_m - stands_m;
             self.elsewhere = if off_m.amax() > ELSEWHERE * sigmas_m.amax() { self.elsewhere + 1 } else { 0 };
             if self.elsewhere == MISLED {
-                // The origin was that of a wild one.
+                // The origin came from a fix that was far off.
                 *origin_m += off_m;
                 (self.fixes, self.elsewhere) = (1.0, 0);
             } else {
-                // A wild one moves it no more than others.
+                // Limits the influence of an outlier to one standard deviation.
                 let by_m = off_m.zip_map(&sigmas_m, |by_m, sigma_m| max(-sigma_m, min(by_m, sigma_m)));
                 self.fixes = (self.fixes + 1.0).min(FIXES);
                 *origin_m += by_m / self.fixes;
@@ -366,7 +370,7 @@ impl EstimatorFrontEnd {
         Some(aid)
     }
 
-    /// Returns the standard deviations of a usable fix \[m\].
+    /// Returns the standard deviations of a usable fix \[m\], or none for an unusable one.
     fn usable(&self, fix: &Measurement) -> Option<Vector3<f32>> {
         let Measurement::Gnss { horizontal_sigma_m, vertical_sigma_m, .. } = *fix else { return None };
         let sigma_max_m = self.estimator.settings().position_sigma_max_m;
@@ -376,7 +380,7 @@ impl EstimatorFrontEnd {
     }
 }
 
-/// Returns the finder for the rotors that the filter's notch is for; without one they are quick.
+/// Returns the finder for rotors at the notch's speed. Without a notch, the rotors count as fast.
 fn lever_finder(output_filter: &OutputFilter) -> LeverFinder {
     LeverFinder::new(output_filter.notch().map_or(f32::MAX, VelocityNotch::centre_rad_s))
 }
@@ -388,7 +392,7 @@ fn corrected(read_ut: &Vector3<f32>, errors: &[Vector3<f32>; 3]) -> Vector3<f32>
     SensorCalibration { mag_offset_ut, mag_scale, mag_off_diagonal, ..SensorCalibration::DEFAULT }.field(read_ut)
 }
 
-/// Leaves a tracker's pose to the flight core.
+/// Passes a tracker's pose to the flight core.
 #[cold]
 #[inline(never)]
 fn leave(timed: &Stamped<Measurement>, inbox: &mut Inbox) {
@@ -397,13 +401,13 @@ fn leave(timed: &Stamped<Measurement>, inbox: &mut Inbox) {
     }
 }
 
-/// Puts the filtered `state` of an `estimate` into `inbox` as far as it is valid. The link's state stands only
-/// while the estimate has no attitude: after the inertial sensor has failed.
+/// Puts the filtered `state` of an `estimate` into `inbox`, as far as it is valid. Without a valid attitude, after a
+/// failure of the inertial sensor, the state from the link remains.
 #[inline(always)]
 fn publish(estimate: &Estimate, state: State, now_us: u64, inbox: &mut Inbox) {
     let stamped = Stamped { value: state, at_us: now_us };
     let validity = &estimate.validity;
-    // The first that is missing is why: without a heading, for one, no position can be held.
+    // The first missing part is the reason: without a heading, for example, no position can be held.
     let missing = match (validity.attitude, validity.heading, validity.velocity && validity.position) {
         (true, true, true) => None,
         (false, ..) => Some(Refusal::AttitudeUnknown),
@@ -416,7 +420,7 @@ fn publish(estimate: &Estimate, state: State, now_us: u64, inbox: &mut Inbox) {
     }
 }
 
-/// Returns the pose that a measurement is, if it is one.
+/// Returns the pose in a measurement, if it is one.
 fn pose(measurement: &Measurement) -> Option<Pose> {
     let Measurement::Pose { position_m, attitude, position_sigma_m, attitude_sigma_rad } = *measurement else {
         return None;
@@ -425,7 +429,7 @@ fn pose(measurement: &Measurement) -> Option<Pose> {
     Some(Pose { position_m, attitude, sigmas })
 }
 
-/// Returns the measurement that the estimator makes of a tracker's pose.
+/// Converts a tracker's pose to a measurement for the estimator.
 #[must_use]
 pub fn tracker_aid(pose: &Pose) -> Measurement {
     let (position_sigma_m, attitude_sigma_rad) = TRACKER;

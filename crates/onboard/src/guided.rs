@@ -1,4 +1,4 @@
-//! The guidance's place in the tick.
+//! Runs the guidance within the control tick.
 
 use crate::configuration::Configuration;
 use crate::control_inputs::ControlInputs;
@@ -8,10 +8,10 @@ use afbc_guidance::net::FailedSensors;
 use afbc_guidance::{Guidance, GuidanceInputs, Guided, Lift};
 use afbc_types::{OutOfRange, State};
 
-/// Ticket of the guidance's own requests, whose answers nobody waits for.
+/// Ticket number of the guidance's own requests, whose answers are ignored.
 const OWN: u8 = u8::MAX;
 
-/// The guidance of a vehicle, and what it knows of it.
+/// The guidance of a vehicle, with the vehicle's data that it needs.
 #[derive(Clone, Debug)]
 pub(crate) struct Guide {
     guidance: Guidance,
@@ -20,19 +20,19 @@ pub(crate) struct Guide {
     last_us: u64,
 }
 
-/// What the guidance sees of the flight core and the sensors.
+/// State of the flight core and the sensors, as input of the guidance.
 pub(crate) struct Core<'a> {
     pub(crate) mode: Mode,
     pub(crate) airborne: bool,
-    /// True if it has been at rest for as long as arming wants it.
+    /// True if the vehicle has been at rest as long as arming requires.
     pub(crate) rested: bool,
     pub(crate) sensors: FailedSensors,
-    /// What is observed of the state in place of an estimate, in the last tick.
+    /// The last tick's state from the observer, which replaces a missing estimate.
     pub(crate) observed: Option<&'a State>,
 }
 
 impl Guide {
-    /// Creates it for a vehicle.
+    /// Creates the guidance of a vehicle.
     ///
     /// # Errors
     /// The first setting out of range.
@@ -48,26 +48,26 @@ impl Guide {
         })
     }
 
-    /// Goes on with the settings of another one for the same number of rotors: mode, mission and home stay.
+    /// Takes over new settings for the same number of rotors. Mode, mission and home stay.
     pub(crate) fn adopt(&mut self, prepared: &Guide) {
-        // Valid: a guidance has been made of them.
+        // Cannot fail: `prepared` was made from these settings.
         let _ = self.guidance.set(*prepared.guidance.settings());
         (self.lift, self.mass_kg) = (prepared.lift, prepared.mass_kg);
     }
 
-    /// Notes the thrust of all rotors that the flight core has commanded.
+    /// Stores the total thrust that the flight core has commanded.
     #[inline]
     pub(crate) fn gave(&mut self, thrust_n: f32) {
         self.lift.given_m_s2 = (thrust_n > 0.0).then_some(thrust_n / self.mass_kg);
     }
 
-    /// Runs a tick: takes the oldest order, and puts setpoint and requests into the flight core's inbox.
+    /// Runs the guidance on the oldest order, and puts its setpoint and requests into the flight core's inbox.
     #[inline(always)]
     pub(crate) fn tick(&mut self, now_us: u64, inputs: &mut ControlInputs, core: &Core<'_>) -> Guided {
         let ControlInputs { inbox, orders, battery, .. } = inputs;
         let fresh = inbox.state().filter(|state| state.age_us(now_us) <= COAST_US);
         let state = fresh.map(|state| &state.value).or(core.observed);
-        // By way of 32 bits, of which the processor makes a float itself; 64 bits take a library call.
+        // The processor converts 32 bits to a float itself; 64 bits would take a library call.
         let gap_us = u32::try_from(now_us.saturating_sub(self.last_us)).unwrap_or(u32::MAX);
         let dt_s = gap_us as f32 * 1e-6;
         self.last_us = now_us;
@@ -91,7 +91,7 @@ impl Guide {
         inbox.command_rates(self.guidance.rates());
         inbox.inhibit(self.guidance.against());
         if let Some(request) = guided.request {
-            // A station's request goes first.
+            // A station's request has priority.
             if inbox.asked().is_none() {
                 inbox.request(Ticketed { value: request, ticket: OWN });
             }

@@ -1,40 +1,41 @@
-//! Which of two inertial sensors that disagree is right, by what else is measured.
+//! Decides which of two disagreeing inertial sensors is right, by other measurements.
 
 use afbc_estimator::Inertial;
 use nalgebra::{Matrix3, Vector3};
 
-/// Distance of the lanes from which on another sensor decides: of a magnetic field its share, and of a velocity
-/// \[m/s\], to which twice its standard deviation along the axis is added. A vehicle's own field and the lanes' common
-/// errors stay below half of these.
+/// Distance between the lanes from which another sensor can decide. For the magnetic field it is a share of the field.
+/// For a velocity it is in m/s, plus twice the standard deviation along the axis. The vehicle's own field and errors
+/// common to both lanes stay below half of these distances.
 const FIELD: f32 = 0.12;
 const SPEED_M_S: f32 = 0.5;
-/// Measurements in a row of each that must say the same.
+/// Number of consecutive field and velocity measurements that must agree.
 const FIELDS: i8 = 15;
 const SPEEDS: i8 = 2;
-/// What counts as much as what in the estimate: a turn \[rad\], and a velocity \[m/s\]. The distance from which on the
-/// estimate tells, and the share of the way that it must have gone: by its fixes alone it wanders by a unit.
+/// Scales of turn \[rad\] and velocity \[m/s\] in the distance between the lanes. Next, the distance from which the
+/// estimate can decide, and the share of this distance that the estimate must have moved. Fixes alone make the estimate
+/// wander by one unit.
 const TURN_RAD: f32 = 0.05;
 const SPEED_LIKE_M_S: f32 = 0.5;
 const FAR: f32 = 3.0;
 const GOES: f32 = 0.5;
-/// Time after which lanes begin anew \[s\].
+/// Time after which the lanes start again \[s\].
 const OLD_S: f32 = 6.0;
-/// What a fix finds of the past: so many entries, so far apart \[us\].
-// Together 0.4 s, more than the 0.25 s by which a measurement may be late.
+/// Stored past velocities, to which a late fix is compared: their number and spacing \[us\].
+// Together 0.4 s, more than the largest delay of a measurement, 0.25 s.
 const PAST: usize = 16;
 const APART_US: u64 = 25_000;
 
-/// What else is measured in a tick.
+/// Measurements of other sensors in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OtherSensors {
     /// Velocity of a GNSS receiver, its standard deviations \[m/s\] and age \[us\].
     pub velocity: Option<([Vector3<f32>; 2], u32)>,
-    /// Corrected magnetic field in the body's axes \[uT\].
+    /// Corrected magnetic field in the body frame \[uT\].
     pub field: Option<Vector3<f32>>,
 }
 
-/// Two lanes from one estimate: what the vehicle does by the sensor that flies, and by the other, both without aids
-/// from the beginning on.
+/// Two lanes that start from one estimate: the motion by the sensor that flies (is in use), and the motion by the other
+/// sensor. Both run without aiding.
 ///
 /// ```text
 /// d theta/dt = R (w_other - w)                                    the other lane, seen from the one that flies
@@ -43,32 +44,33 @@ pub struct OtherSensors {
 /// d u/dt = corrections + R (a_0 - a) + gamma x R f
 /// ```
 ///
-/// with the attitude R, rates w and specific force f of the estimate, and its biases b and a, b_0 and a_0 at the
-/// beginning. Three measurements show how far the vehicle is on the way from the lane that flies, 0, to the other one,
-/// 1, once the lanes are far enough apart:
+/// where R, w and f are the estimate's attitude, rates and specific force, b and a its biases, and b_0 and a_0 the
+/// biases at the start. Once the lanes are far enough apart, three measurements show where the vehicle is between the
+/// lane that flies (0) and the other lane (1):
 ///
-/// * the earth's magnetic field, which stays where it was before the beginning;
+/// * the earth's magnetic field, which keeps its direction from before the start;
 /// * a GNSS receiver's velocity;
-/// * the estimate, which its aids pull to where the vehicle is, a tracker above all. It says nothing by staying: a
-///   filter trusts its gyroscope, and refuses what contradicts it at first.
+/// * the estimate, which aiding pulls towards the true motion, most of all a tracker. An estimate that does not move
+///   proves nothing: the filter trusts its gyroscope, and at first rejects contradictions.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ImuLanes {
     last: Inertial,
     begin_biases: [Vector3<f32>; 2],
-    /// Of the other lane, and of the estimate: turn \[rad\] and velocity \[m/s\] in the earth frame.
+    /// Turn \[rad\] and velocity \[m/s\] in the earth frame, relative to the lane that flies: of the other lane, and of
+    /// the estimate.
     other: [Vector3<f32>; 2],
     estimate: [Vector3<f32>; 2],
-    /// The magnetic field before the beginning, in the earth frame \[uT\].
+    /// Magnetic field in the earth frame before the start \[uT\].
     field: Option<Vector3<f32>>,
-    /// Measurements in a row that speak for the other lane, or, below zero, against it: of the field, and of velocity.
+    /// Consecutive votes of field and velocity: positive for the other lane, negative against it.
     votes: [i8; 2],
     begin_us: u64,
-    /// Times, and velocities by the lane that flies, and from there to the other one.
+    /// Times, with the velocity of the lane that flies and the other lane's velocity relative to it.
     past: [(u64, [Vector3<f32>; 2]); PAST],
 }
 
 impl ImuLanes {
-    /// Begins at an estimate.
+    /// Starts the lanes at an estimate.
     pub(crate) fn new(now: &Inertial, field: Option<Vector3<f32>>) -> Self {
         let zero = [Vector3::zeros(); 2];
         ImuLanes {
@@ -83,7 +85,8 @@ impl ImuLanes {
         }
     }
 
-    /// Goes on to the next estimate, while the other sensor measures so much more in the body's axes \[rad/s, m/s2\].
+    /// Advances to the next estimate. The other sensor's excess over the one that flies is in the body frame \[rad/s,
+    /// m/s2\].
     pub(crate) fn advance(
         &mut self,
         now: &Inertial,
@@ -124,10 +127,10 @@ impl ImuLanes {
         }
     }
 
-    /// Takes the field in the earth frame, by the attitude of the estimate.
+    /// Takes the field in the earth frame, as rotated by the estimate's attitude.
     fn hear_field(&mut self, field: &Vector3<f32>) {
         let ([turn, _], [estimate, _], Some(before)) = (self.other, self.estimate, self.field) else { return };
-        // By the attitudes of either lane.
+        // Rotates the field by the flying lane's attitude. `apart` is how far the other lane would turn it.
         let flying = field - estimate.cross(field);
         let apart = turn.cross(&before);
         if apart.norm_squared() > FIELD * FIELD * before.norm_squared() {
@@ -136,10 +139,10 @@ impl ImuLanes {
         }
     }
 
-    /// Takes a velocity with its standard deviations that was true at `at_us`.
+    /// Takes a velocity with its standard deviations, valid at `at_us`.
     fn hear_velocity(&mut self, [velocity, sigmas]: &[Vector3<f32>; 2], at_us: u64) {
         let nearest = self.past.iter().min_by_key(|(past_us, _)| past_us.abs_diff(at_us));
-        // What was true before the beginning says nothing: both lanes begin there.
+        // A velocity from before the start proves nothing, as both lanes begin there.
         let Some((_, [flying, apart])) = nearest.filter(|_| at_us > self.begin_us) else { return };
         let weights = sigmas.map(|sigma| 1.0 / (SPEED_M_S + 2.0 * sigma));
         let (apart, measured) = (apart.component_mul(&weights), (velocity - flying).component_mul(&weights));
@@ -149,7 +152,8 @@ impl ImuLanes {
         }
     }
 
-    /// True if the vehicle is in the other lane, false if it is in the one that flies.
+    /// Returns true if the other lane is right, false if the lane that flies is right, and none as long as this is
+    /// undecided.
     pub(crate) fn other_is_right(&self) -> Option<bool> {
         let units = [1.0 / TURN_RAD, 1.0 / SPEED_LIKE_M_S];
         let product = |one: &[Vector3<f32>; 2], other: &[Vector3<f32>; 2]| -> f32 {
@@ -167,27 +171,27 @@ impl ImuLanes {
         }
     }
 
-    /// True if nothing has told for so long that it is to begin anew.
+    /// Returns true if the lanes are so old, without a decision, that they must start again.
     pub(crate) fn is_old(&self) -> bool {
         self.last.at_us.saturating_sub(self.begin_us) as f32 * 1e-6 > OLD_S
     }
 
-    /// From the estimate to the other lane, in the earth frame: turn \[rad\] and velocity \[m/s\].
+    /// Returns the way from the estimate to the other lane in the earth frame: turn \[rad\] and velocity \[m/s\].
     pub(crate) fn hidden(&self) -> [Vector3<f32>; 2] {
         let ([turn, speed], [of_turn, of_speed]) = (self.other, self.estimate);
         [turn - of_turn, speed - of_speed]
     }
 
-    /// By how much the biases of gyroscope \[rad/s\] and accelerometer \[m/s2\] have moved since the beginning.
+    /// Returns the change of gyroscope \[rad/s\] and accelerometer \[m/s2\] biases since the start.
     pub(crate) fn moved(&self, now: &Inertial) -> [Vector3<f32>; 2] {
         let [gyro, accel] = self.begin_biases;
         [now.gyro_bias - gyro, now.accel_bias - accel]
     }
 }
 
-/// Counts a measurement that finds the vehicle on this share of the way to the other lane.
+/// Counts a vote. `share` is the vehicle's measured place between the lane that flies (0) and the other (1).
 fn vote(votes: &mut i8, share: f32) {
-    // Only votes in a row count: one for the other side takes the place of all before it.
+    // Only consecutive votes count: a vote for the other side resets the count.
     *votes = if share > 0.5 { votes.saturating_add(1).max(1) } else { votes.saturating_sub(1).min(-1) };
 }
 

@@ -1,89 +1,92 @@
-//! Which of two inertial sensors flies.
+//! Selects one of two inertial sensors to fly on.
 
 use crate::imu_lanes::{ImuLanes, OtherSensors};
 use afbc_control::math::{min, sqrt};
 use afbc_estimator::Inertial;
 use nalgebra::Vector3;
 
-/// Time without a sample after which the other sensor flies \[us\]: less than the estimator bridges without a trace.
+/// Time without a sample after which the other sensor takes over, shorter than a gap that would affect the estimate
+/// \[us\].
 const SILENT_US: u64 = 3_000;
-/// Time without a sample after which a sensor does not work, as stations are told \[us\]: longer than its driver takes
-/// to set it up again.
+/// Time without a sample after which stations are told that a sensor has failed, longer than its driver's restart
+/// \[us\].
 const FAILED_US: u64 = 500_000;
-/// Samples in which the difference of both sensors is averaged, at least.
+/// Largest number of samples in the average difference of both sensors.
 const AVERAGED: f32 = 20_000.0;
-/// Samples from which on the difference is known well enough to tell that it has changed.
+/// Number of samples from which the difference is known well enough to detect a change.
 const KNOWN: f32 = 1_000.0;
 
-/// What no motion changes from one sample to the next \[rad/s, m/s2\]: it takes 2000 rad/s2, or a blow.
+/// Largest change between two samples that motion can cause \[rad/s, m/s2\]. More takes 2000 rad/s2, or a blow.
 const JUMP: [f32; 2] = [2.0, 30.0];
-/// Equal samples of rates or of force in a row, while the other sensor's change, that are a stuck sensor. The noise of
-/// any part is about its last bit, so that all three axes repeat themselves once in ten or more.
+/// Number of equal rates or forces in a row that mean a stuck sensor, if the other sensor's still change. Any sensor's
+/// noise is about its last bit, so all three axes repeat at most about once in ten samples.
 const STUCK: u16 = 15;
 
-/// Share of a sample in the mean disagreement of both sensors: a time constant of 50 ms.
+/// Weight of a sample in the mean disagreement of both sensors: a time constant of 50 ms.
 const SHARE: f32 = 0.02;
-/// Disagreement that is none \[rad/s, m/s2\], and the share of a quantity that two sensors may differ by, as of scale
-/// and alignment.
+/// Disagreement that is always tolerated \[rad/s, m/s2\], and the tolerated share of the measured quantity, for errors
+/// of scale and alignment.
 const APART: [f32; 2] = [0.026, 0.8];
 const APART_SHARE: f32 = 0.03;
-/// Share of a field in its mean: about a second.
+/// Weight of a sample in the mean magnetic field: a time constant of about one second.
 const FIELD_SHARE: f32 = 0.01;
-/// Time constant in which the estimate is brought to where the vehicle is \[s\], and how fast at most \[rad/s, m/s2\].
+/// Time constant in which the estimate is corrected after a change of sensors \[s\], and the fastest correction
+/// \[rad/s, m/s2\].
 const MADE_UP_S: f32 = 0.2;
 const MADE_UP_MAX: [f32; 2] = [1.0, 3.0];
 
-/// Two inertial sensors at a time.
+/// State of the two inertial sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ImuPair {
-    /// True if the second flies.
+    /// True if the second sensor flies (is in use).
     pub second_flies: bool,
-    /// True for each that has read something.
+    /// True for each sensor that has ever sent a sample.
     pub present: [bool; 2],
-    /// True for each that reads, and has not been found wrong.
+    /// True for each sensor that sends samples and has not been found wrong.
     pub works: [bool; 2],
 }
 
-/// A sensor.
+/// One of the two sensors.
 #[derive(Clone, Copy, Debug)]
 struct Imu {
-    /// Time of the newest sample \[us\].
+    /// Time of the newest accepted sample \[us\].
     last_us: Option<u64>,
-    /// Newest sample: rates \[rad/s\] and specific force \[m/s2\].
+    /// Newest accepted sample: rates \[rad/s\] and specific force \[m/s2\].
     newest: [Vector3<f32>; 2],
-    /// The same as it came, whether or not it is one.
+    /// Newest sample as it came, accepted or not.
     came: [Vector3<f32>; 2],
-    /// Equal ones in a row.
+    /// Number of equal rates and of equal forces in a row.
     equals: [u16; 2],
-    /// What its samples are less when they fly.
+    /// Offset subtracted from the samples when the sensor flies.
     offset: [Vector3<f32>; 2],
-    /// True if it has been found wrong.
+    /// True if the sensor has been found wrong.
     wrong: bool,
 }
 
-/// Chooses between two inertial sensors: whichever reads first, usually the first, flies until it is silent, as a
-/// driver makes one whose readings are wrong; then the other does. It stays, since a sensor that failed once may fail
-/// again. So that the estimate does not jump, the samples of the one that does not fly are corrected by its mean
-/// difference from the other while both worked. A sample that jumps and that the other sensor does not confirm, as of a
-/// garbled wire, is none; nor is one whose rates or force have repeated themselves while the other's changed.
+/// Selects the inertial sensor that flies (is in use) from two. The first to send a sample flies, until it falls
+/// silent; a driver silences a sensor with wrong readings. Then the other sensor takes over. There is no return when
+/// the first recovers, since a sensor that failed once may fail again. To avoid a jump of the estimate, the other
+/// sensor's samples are corrected by the mean difference while both worked. A sample is rejected if it jumps and the
+/// other sensor does not confirm it, or if rates or force repeat while the other sensor's change.
 ///
-/// Of two that disagree, [whatever else is measured](OtherSensors) tells which is right. When that is the other one, it
-/// flies from then on; turn and velocity that the wrong one has hidden are made up for as a rate and a force, so that
-/// the estimate goes to where the vehicle is as smoothly as the vehicle can follow.
+/// If the two disagree, [other sensors](OtherSensors) show which is right. If it is the other sensor, it takes over.
+/// The turn and velocity that the wrong sensor missed are then added as a rate and a force, so that the estimate moves
+/// to the true state smoothly enough for the vehicle to follow.
 #[derive(Clone, Debug)]
 pub struct ImuSelector {
     second_flies: bool,
     first: Imu,
     second: Imu,
-    /// Samples of which the offset of the one that does not fly is the mean, and how far it is from that, on average
-    /// and now \[rad/s, m/s2\].
+    /// Number of samples averaged in the offset of the sensor in reserve, and the remaining difference from the sensor
+    /// that flies, averaged and newest \[rad/s, m/s2\].
     averaged: f32,
     apart: [Vector3<f32>; 2],
     apart_now: [Vector3<f32>; 2],
     lanes: Option<ImuLanes>,
-    /// Mean magnetic field while they agree, in the earth frame \[uT\].
+    /// Mean magnetic field in the earth frame while the sensors agree \[uT\].
     field: Option<Vector3<f32>>,
-    /// What is to be made up for, turn \[rad\] and velocity \[m/s\], and the time of the last sample that flew \[us\].
+    /// Turn \[rad\] and velocity \[m/s\] that are still to be corrected, and the time of the last sample that flew
+    /// \[us\].
     owed: [Vector3<f32>; 2],
     flown_us: u64,
 }
@@ -94,15 +97,15 @@ impl Imu {
         Imu { last_us: None, newest: zero, came: zero, equals: [0; 2], offset: zero, wrong: false }
     };
 
-    /// Returns a sample of it as it flies.
+    /// Returns one of its samples, with the offset removed.
     fn corrected(&self, sample: &[Vector3<f32>; 2]) -> [Vector3<f32>; 2] {
         let ([rates, force], [of_rates, of_force]) = (sample, &self.offset);
         [rates - of_rates, force - of_force]
     }
 
-    /// True if rates or force repeat themselves, and those of `other` do not.
+    /// Returns true if this sensor's rates or force repeat and those of `other` do not.
     fn is_stuck(&self, other: &Imu) -> bool {
-        // Both repeat themselves where there is no noise, as at rest in a simulation: that is no fault.
+        // Without noise, as at rest in a simulation, both sensors repeat. That is no fault.
         self.equals.iter().zip(other.equals).any(|(own, others)| *own >= STUCK && others < STUCK / 2)
     }
 
@@ -112,7 +115,7 @@ impl Imu {
 }
 
 impl ImuSelector {
-    /// One that has seen no sample.
+    /// A selector that has seen no sample.
     pub const NEW: Self = {
         let zero = Vector3::new(0.0, 0.0, 0.0);
         ImuSelector {
@@ -129,12 +132,13 @@ impl ImuSelector {
         }
     };
 
-    /// Takes a sample of the first sensor, in the body's axes, and returns what flies.
+    /// Takes a sample of the first sensor, in axes common to both sensors. Returns the sample to fly on, if this sensor
+    /// flies.
     pub fn take_first(&mut self, at_us: u64, sample: [Vector3<f32>; 2]) -> Option<[Vector3<f32>; 2]> {
         self.take(false, at_us, sample)
     }
 
-    /// Takes a sample of the second.
+    /// Takes a sample of the second sensor, in the same axes. Returns the sample to fly on, if this sensor flies.
     pub fn take_second(&mut self, at_us: u64, sample: [Vector3<f32>; 2]) -> Option<[Vector3<f32>; 2]> {
         self.take(true, at_us, sample)
     }
@@ -145,12 +149,13 @@ impl ImuSelector {
         for ((equals, new), old) in this.equals.iter_mut().zip(&sample).zip(&this.came) {
             *equals = if new == old { equals.saturating_add(1) } else { 0 };
         }
-        // By what came, sample or not: of a blow that both feel, the first reading is none, and confirms the second.
+        // Rejected samples count here: when both sensors feel a blow, the first one's rejected sample confirms the
+        // second one's.
         let confirmed = !jumps(&this.corrected(&sample), &other.corrected(&other.came));
         let is_none = jumps(&sample, &this.came) && !confirmed || this.is_stuck(other);
         this.came = sample;
         let other_is_silent = other.is_silent(at_us);
-        // Alone, a sensor flies whatever it reads: there is no other to judge it by.
+        // Without another sensor to compare it with, a sensor flies whatever it reads.
         if is_none && !other_is_silent {
             return None;
         }
@@ -159,7 +164,7 @@ impl ImuSelector {
             return Some(self.fly(is_second, at_us));
         }
         if other_is_silent {
-            // Its offset stays: what it reads is as the other's, as long as both are right.
+            // The offset stays: with it, this sensor's samples match the other sensor's.
             (self.second_flies, self.lanes) = (is_second, None);
             return Some(self.fly(is_second, at_us));
         }
@@ -167,7 +172,7 @@ impl ImuSelector {
         None
     }
 
-    /// Returns the newest sample of the sensor that flies, with what is to be made up for.
+    /// Returns the newest sample of the sensor that flies, with the correction that is still due.
     fn fly(&mut self, is_second: bool, at_us: u64) -> [Vector3<f32>; 2] {
         let imu = if is_second { &self.second } else { &self.first };
         let mut flown = imu.corrected(&imu.newest);
@@ -178,22 +183,22 @@ impl ImuSelector {
             if size > 0.0 {
                 let rate = *owed * min(1.0 / MADE_UP_S, most / size);
                 *quantity += rate;
-                // The decay would not end by itself.
+                // Ends a negligible correction, because an exponential decay never reaches zero.
                 *owed = if size < 3e-4 { Vector3::zeros() } else { *owed - rate * since_s };
             }
         }
         flown
     }
 
-    /// Compares the newest sample of the sensor that does not fly with that of the other.
+    /// Compares the newest sample of the sensor in reserve with the sensor that flies.
     fn compare(&mut self, is_second: bool) {
         let (this, flying) = if is_second { (&mut self.second, &self.first) } else { (&mut self.first, &self.second) };
-        // One that is none confirms nothing.
+        // A rejected sample cannot be compared.
         if flying.newest != flying.came {
             return;
         }
         let flown = flying.corrected(&flying.newest);
-        // While the lanes decide, the difference may be a fault, which is not to become part of the mean.
+        // While the lanes decide, the difference may be a fault and must not enter the mean.
         if self.lanes.is_none() {
             self.averaged = (self.averaged + 1.0).min(AVERAGED);
             for ((mean, own), flown) in this.offset.iter_mut().zip(&this.newest).zip(&flown) {
@@ -205,7 +210,7 @@ impl ImuSelector {
         self.apart.iter_mut().zip(self.apart_now).for_each(|(mean, now)| *mean += (now - *mean) * SHARE);
     }
 
-    /// True if the sensors disagree by more than this share of what is none.
+    /// Returns true if the sensors disagree by more than this share of the tolerance.
     fn disagree(&self, share: f32) -> bool {
         let measured = if self.second_flies { &self.second.newest } else { &self.first.newest };
         self.apart.iter().zip(measured).zip(APART).any(|((apart, measured), none)| {
@@ -214,15 +219,15 @@ impl ImuSelector {
         })
     }
 
-    /// Takes what the estimator has made of the samples that fly and what else has been measured, in every tick that
-    /// has an estimate, and changes to the other sensor if that one is right.
+    /// Checks the two sensors against each other, by the estimate and other measurements. Switches to the other sensor
+    /// if that one is right. Call it in every tick with an estimate.
     pub fn cross_check(&mut self, now: &Inertial, others: &OtherSensors) {
         let works = !self.first.is_silent(now.at_us) && !self.second.is_silent(now.at_us);
         if !works {
             self.lanes = None;
             return;
         }
-        // Ends at half of what begins them, so that noise does not begin and end lanes in turn.
+        // The lanes end at half the disagreement that starts them, so that noise does not toggle them.
         let (begins, ends) = (self.averaged >= KNOWN && self.disagree(1.0), !self.disagree(0.5));
         let Some(lanes) = &mut self.lanes else {
             if begins {
@@ -242,7 +247,7 @@ impl ImuSelector {
         }
     }
 
-    /// Has the other fly, as if it had flown since the lanes began.
+    /// Switches to the other sensor as if it had flown since the lanes began.
     fn change(&mut self, now: &Inertial) {
         let Some(lanes) = self.lanes.take() else { return };
         let to_imu = now.to_body.transpose();
@@ -250,7 +255,8 @@ impl ImuSelector {
             if self.second_flies { (&mut self.second, &mut self.first) } else { (&mut self.first, &mut self.second) };
         (wrong.wrong, right.wrong) = (true, false);
         for (offset, moved) in right.offset.iter_mut().zip(lanes.moved(now)) {
-            // The estimator's biases have moved to fit the wrong sensor: moved with them, the right one fits at once.
+            // The estimator's biases have adapted to the wrong sensor. Shifting the right sensor's offset likewise
+            // makes it fit at once.
             *offset -= to_imu * moved;
         }
         self.owed = lanes.hidden().map(|hidden| to_imu * (now.rotation.transpose() * hidden));
@@ -258,7 +264,7 @@ impl ImuSelector {
         self.begin_again();
     }
 
-    /// Has the one stay that flies: the other is wrong, and its difference a new one.
+    /// Keeps the sensor that flies, and marks the other one as wrong. Their difference is measured anew.
     fn keep(&mut self) {
         self.lanes = None;
         let (right, wrong) =
@@ -267,13 +273,13 @@ impl ImuSelector {
         self.begin_again();
     }
 
-    /// Averages the difference from now on.
+    /// Restarts the average difference.
     fn begin_again(&mut self) {
         let none = [Vector3::zeros(); 2];
         (self.averaged, self.apart, self.apart_now) = (0.0, none, none);
     }
 
-    /// Returns which flies at `now_us`, and which work.
+    /// Returns which sensor flies at `now_us`, and which sensors work.
     pub fn pair(&self, now_us: u64) -> ImuPair {
         let works =
             |imu: &Imu| !imu.wrong && imu.last_us.is_some_and(|last_us| now_us.saturating_sub(last_us) <= FAILED_US);
@@ -286,7 +292,7 @@ impl ImuSelector {
     }
 }
 
-/// True if two samples are further apart than motion makes them.
+/// Returns true if two samples differ by more than motion can explain.
 fn jumps(one: &[Vector3<f32>; 2], other: &[Vector3<f32>; 2]) -> bool {
     let apart =
         |((one, other), most): ((&Vector3<f32>, &Vector3<f32>), f32)| (one - other).norm_squared() > most * most;
@@ -306,7 +312,8 @@ mod tests {
         [Vector3::new((3.0 * t).sin(), (2.0 * t).cos(), 0.5), Vector3::new(0.0, t.sin(), 9.81)]
     }
 
-    /// Whichever sensor fails, and whenever, what flies has no gap over 4 ms and no jump by the sensors' biases.
+    /// Whichever sensor fails, at any time, the selected samples have no gap over 4 ms and no jump by the sensors'
+    /// biases.
     #[test]
     fn a_failure_leaves_no_gap_and_no_jump() {
         let bias = [Vector3::new(0.05, -0.03, 0.02), Vector3::new(0.3, -0.2, 0.4)];
@@ -334,7 +341,8 @@ mod tests {
         }
     }
 
-    /// Random bytes of either sensor neither fly nor enter the mean difference, and the other takes over in 4 ms.
+    /// Random samples of either sensor are not used and do not change the mean difference. The other sensor takes over
+    /// within 4 ms.
     #[test]
     fn garbled_samples_do_not_fly() {
         for garbled in [0, 1] {
@@ -369,7 +377,7 @@ mod tests {
         }
     }
 
-    /// A blow that both feel flies, and one that only one feels costs a sample.
+    /// A blow that both sensors feel is used. A blow that only one feels costs a sample.
     #[test]
     fn a_blow_flies() {
         let mut selector = ImuSelector::NEW;
@@ -383,8 +391,8 @@ mod tests {
         assert_eq!(selector.take_first(5_000, rest), Some(rest), "it stays");
     }
 
-    /// Rates or force that repeat themselves beside a sensor whose own change are none; not so those of both, of a
-    /// vehicle at rest in a simulation without noise, nor an axis alone, at the end of its range.
+    /// Rates or force that repeat while the other sensor's change are not used. Repeats of both sensors, as at rest in
+    /// a simulation without noise, or of a single saturated axis are no fault.
     #[test]
     fn what_repeats_itself_does_not_fly() {
         let still = motion(1_000);

@@ -1,4 +1,4 @@
-//! What a vehicle's LED and buzzer say.
+//! Signals of a vehicle's LED and buzzer.
 
 use crate::tick_record::Report;
 use afbc_flight_core::{Mode, Refusal};
@@ -6,47 +6,47 @@ use afbc_flight_core::{Mode, Refusal};
 /// Length of a step of a pattern \[us\], and number of steps.
 pub const STEP_US: u64 = 125_000;
 const STEPS: u64 = 16;
-/// Time from power-up on in which sensors are set up and nothing is judged \[us\].
+/// Time after power-up for the set-up of sensors, in which no fault is shown \[us\].
 const STARTING_US: u64 = 2_000_000;
 
-/// What is shown.
+/// State of the vehicle that LED and buzzer show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Indication {
-    /// The vehicle starts.
+    /// Starting up.
     #[default]
     Starting,
-    /// Disarmed, and it would not arm: not at rest, no position, and the like.
+    /// Disarmed, and cannot be armed: not at rest, without a position, or the like.
     NotReady,
-    /// Disarmed, and it would arm.
+    /// Disarmed, and can be armed.
     Ready,
     /// Armed.
     Armed,
-    /// Armed, and a failsafe has taken over, or it should land.
+    /// Armed, and either a failsafe has taken over or the vehicle should land.
     Failsafe,
-    /// Disarmed, and something is to be mended: a sensor, the clock, a task.
+    /// Disarmed, with a fault of a sensor, the clock or a task.
     Fault,
 }
 
 /// Steps of a pattern, the first one in the highest bit.
 struct Pattern {
     led: u16,
-    /// Once, from the moment on in which the indication comes up.
+    /// Pattern of the buzzer that is played once, when the indication begins.
     buzzer_once: u16,
-    /// Again and again.
+    /// Repeated pattern of the buzzer.
     buzzer: u16,
 }
 
-/// Whether LED and buzzer are on.
+/// States of LED and buzzer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct IndicatorSignals {
-    /// The LED is lit.
+    /// True if the LED is lit.
     pub led: bool,
-    /// The buzzer sounds.
+    /// True if the buzzer sounds.
     pub buzzer: bool,
 }
 
 impl Indication {
-    /// All of them.
+    /// All indications.
     pub const ALL: [Indication; 6] = [
         Indication::Starting,
         Indication::NotReady,
@@ -56,7 +56,7 @@ impl Indication {
         Indication::Fault,
     ];
 
-    /// Returns what a tick's report comes to.
+    /// Returns the indication for a tick's report.
     pub fn of<const N: usize>(report: &Report<N>) -> Self {
         let clock_failed = report.health.rate.clock_failed;
         if report.mode.armed() {
@@ -72,7 +72,7 @@ impl Indication {
         }
     }
 
-    // No two are alike from whatever moment on somebody looks; a test turns each against all others.
+    // No two LED patterns are alike, even if they are watched from different steps on. A test compares all shifts.
     const fn pattern(self) -> Pattern {
         match self {
             Indication::Starting => Pattern { led: 0b1000_0000_1000_0000, buzzer_once: 0, buzzer: 0 },
@@ -85,16 +85,16 @@ impl Indication {
     }
 }
 
-/// What is shown, and since when.
+/// Plays the pattern of the present indication.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Indicator {
     shown: Indication,
-    /// Time from which on \[us\].
+    /// Start of the present indication \[us\].
     since_us: u64,
 }
 
 impl Indicator {
-    /// Returns the signals at `now_us`, of `indication`.
+    /// Returns the signals for `indication` at `now_us`.
     pub fn signals(&mut self, now_us: u64, indication: Indication) -> IndicatorSignals {
         if indication != self.shown {
             *self = Indicator { shown: indication, since_us: now_us };
@@ -121,7 +121,7 @@ mod tests {
     use std::string::String;
     use std::vec::Vec;
 
-    /// A report of a disarmed vehicle.
+    /// Returns the report of a disarmed vehicle.
     fn report() -> Report {
         let mut flight = Flight::new(&Configuration::default()).expect("valid");
         flight.tick(1_000, &mut ControlInputs::EMPTY.clone(), &Readings::NONE)
@@ -149,7 +149,7 @@ mod tests {
         report.mode = Mode::Flying;
         assert_eq!(Indication::of(&report), Indication::Failsafe);
         report.health.rate.clock_failed = false;
-        // Armed: what speaks against arming does not matter, nor the time.
+        // While armed, neither reasons against arming nor the time matter.
         (report.against, report.time_us) = (Refusal::AlreadyArmed.into(), 1_000);
         assert_eq!(Indication::of(&report), Indication::Armed);
         report.guided.failsafe = Some(Cause::Station);
@@ -161,7 +161,7 @@ mod tests {
         }
     }
 
-    /// Returns LED and buzzer over `steps` steps from the moment on in which an indication comes up.
+    /// Returns LED and buzzer in the first `steps` steps of an indication.
     fn shown(indication: Indication, steps: u64) -> [String; 2] {
         let other = if indication == Indication::Armed { Indication::Ready } else { Indication::Armed };
         let (mut indicator, from_us) = (Indicator::default(), 7_654_321);
@@ -173,7 +173,7 @@ mod tests {
         [line(|signals| signals.led), line(|signals| signals.buzzer)]
     }
 
-    /// The table of docs/firmware.md, in steps of 1/8 s.
+    /// The patterns match the table of docs/firmware.md, in steps of 1/8 s.
     #[test]
     fn patterns_are_as_documented() {
         for (indication, led, once, again) in [
@@ -190,7 +190,7 @@ mod tests {
         }
     }
 
-    /// Whoever looks at the LED for two seconds, from whenever on, knows.
+    /// Two seconds of the LED's pattern, from any step on, identify the indication.
     #[test]
     fn no_two_are_alike_from_any_moment_on() {
         let turned = |indication, by: usize| {

@@ -1,13 +1,14 @@
-//! Which law flies.
+//! Interface to the law of a flight.
 
 use afbc::monitor::Norm;
 use afbc::{Guarded, guarded};
 use afbc_control::FlightController;
 use afbc_types::Axis;
 
-/// A law of a [`Flight`](crate::Flight).
+/// A law that a [`Flight`](crate::Flight) can fly.
 pub trait FlightLaw<const N: usize>: FlightController<N> + Clone {
-    /// Returns the norms of the estimates of one subsystem, all in turn; none for a law without a monitor.
+    /// Returns the norms of one subsystem's estimates, a different subsystem in each tick; none for a law without a
+    /// monitor.
     fn norms(memory: &Self::Memory) -> Option<(Axis, Norm)>;
 }
 

@@ -1,9 +1,9 @@
-//! The control tick of the firmware without its hardware: the vehicle under its law, the estimator's and the guidance's
-//! places in the tick, its configuration and the parameters while it runs.
+//! The firmware's control tick without its hardware: law, estimator and guidance, the vehicle's configuration, and its
+//! parameters at run time.
 //!
-//! A vehicle with an inertial sensor flies on [its own estimate](EstimatorFrontEnd), another on the states that the
-//! link brings. [`Flight`] runs the control tick every millisecond, on [`ControlInputs`] and [`Readings`]; on the board
-//! it interrupts everything else, the services of `afbc_station` for one, which fill the inputs from messages. A host
+//! A vehicle with an inertial sensor flies on [its own estimate](EstimatorFrontEnd); without one, on states from the
+//! link. [`Flight`] runs the control tick every millisecond, on [`ControlInputs`] and [`Readings`]. On the board, the
+//! tick interrupts everything else, including the services of `afbc_station` that fill the inputs from messages. A host
 //! that runs the same ticks with the same inputs and times gets the same bits as the processor.
 //!
 //! ```

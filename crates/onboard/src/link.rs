@@ -1,13 +1,13 @@
-//! Parameters of the link, and of the log.
+//! Parameters of the link and of the log.
 
 use afbc_types::{Choice, parameters};
 
-/// When the black box is written, numbered as PX4 numbers it.
+/// Times at which the black box is written, with PX4's numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LogMode {
-    /// From arming until a second after disarming, each time.
+    /// From arming until one second after disarming, in each flight.
     Armed,
-    /// From power-up until then, and from then on as above.
+    /// From power-up until one second after the first disarming, then as [`Armed`](Self::Armed).
     BootUntilDisarm,
     /// From power-up until power-down.
     Boot,
@@ -18,8 +18,7 @@ impl Choice for LogMode {
     const WORDS: &'static [&'static str] = &["armed", "boot_until_disarm", "boot"];
 }
 
-/// Baud rate of a link, unless a parameter says another: the highest at which no UART of these boards loses a byte
-/// (docs/timing.md).
+/// Default baud rate of a link: the highest at which no UART of these boards loses a byte (docs/timing.md).
 pub const BAUD: u32 = 460_800;
 
 parameters! {

@@ -1,12 +1,12 @@
-//! The wire between the emulated board and the host, which stand still for each other.
+//! Protocol between the emulated board and the host, which wait for each other.
 //!
-//! Two streams of bytes, little-endian. To the firmware: [`Readings`](crate::Readings) of the sensors for the next
-//! control tick, a `u32` length and that many bytes, which reach the link before it. From the firmware, for each of
-//! these: a [`ReplyHead`] and as many bytes as it says.
+//! It has two streams of bytes, little-endian. The host sends the [`Readings`](crate::Readings) for the next control
+//! tick, a `u32` length, and that many bytes, which arrive at the link before the tick. For each of these, the firmware
+//! sends a [`ReplyHead`] and as many bytes as the head states.
 
 use afbc_types::ROTORS_MAX;
 
-/// Head of what the firmware replies after a control tick.
+/// Head of the firmware's reply after a control tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ReplyHead {
     /// Start of the tick, since power-up \[us\].
@@ -15,9 +15,9 @@ pub struct ReplyHead {
     pub cycles: u32,
     /// Largest stack depth so far \[bytes\].
     pub stack_bytes: u32,
-    /// Bytes sent over the link, which follow.
+    /// Number of bytes sent over the link, which follow the head.
     pub length: u32,
-    /// Throttles of the motors: 0, or 48 to 2047; 0 where there is no motor.
+    /// DSHOT throttles of the motors: 0, or 48 to 2047; 0 where there is no motor.
     pub throttles: [u16; ROTORS_MAX],
 }
 
@@ -25,7 +25,7 @@ impl ReplyHead {
     /// Length on the wire \[bytes\].
     pub const LEN: usize = 8 + 3 * 4 + 2 * ROTORS_MAX;
 
-    /// Returns the head as it crosses the wire.
+    /// Returns the head's bytes on the wire.
     pub fn to_bytes(&self) -> [u8; Self::LEN] {
         let ReplyHead { time_us, cycles, stack_bytes, length, throttles } = *self;
         let words = [cycles, stack_bytes, length].into_iter().flat_map(u32::to_le_bytes);

@@ -1,14 +1,14 @@
-//! Uncorrected readings, from the control tick to a calibration.
+//! Averages uncorrected readings for a calibration.
 
 use crate::readings::Readings;
 use afbc_calibration::RawSample;
 use afbc_estimator::Measurement;
 use nalgebra::Vector3;
 
-/// Readings of the inertial sensor in a [`RawSample`]: 20 ms of them.
+/// Number of inertial samples in a [`RawSample`]: 20 ms.
 const READINGS: u16 = 20;
 
-/// Sums of what the sensors have read, added to in each tick while the vehicle is calibrated.
+/// Sums of the sensors' readings, extended in each tick while the vehicle is calibrated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RawReadings {
     newest_us: u64,
@@ -20,7 +20,7 @@ pub struct RawReadings {
 }
 
 impl RawReadings {
-    /// Nothing read.
+    /// No readings.
     pub const NONE: Self = {
         let zero = Vector3::new(0.0, 0.0, 0.0);
         RawReadings {
@@ -50,7 +50,7 @@ impl RawReadings {
         }
     }
 
-    /// Returns the means, once there are readings enough, and begins again.
+    /// Returns the means and starts again, or returns none as long as there are too few readings.
     pub fn take(&mut self) -> Option<RawSample> {
         if self.readings < READINGS {
             return None;
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
     use crate::readings::Aged;
 
-    /// Means of what was read, with the newest time; a sample lasts twenty readings, and begins from nothing.
+    /// A sample has the means of twenty readings and the newest time. The next one starts from zero.
     #[test]
     fn readings_are_averaged() {
         let mut raw = RawReadings::NONE;
@@ -90,7 +90,7 @@ mod tests {
             let mean = 10.5 + 100.0 * f32::from(round);
             assert_eq!(sample.at_us, 19_900);
             assert_eq!((sample.rates_rad_s.x, sample.specific_force_m_s2.z), (mean, -mean));
-            // The tenth and the twentieth.
+            // The tenth and the twentieth reading.
             let field = (round != 2).then(|| Vector3::repeat(mean + 4.5));
             assert_eq!(sample.field_ut, field);
         }

@@ -1,18 +1,18 @@
-//! What a vehicle's own sensors have read since the last tick.
+//! Readings of the vehicle's own sensors since the last tick.
 
 use afbc_estimator::{ImuSample, Measurement, Stamped};
 use nalgebra::Vector3;
 
-/// Most measurements of aiding sensors that a tick takes; further ones wait for the next.
+/// Most aiding measurements in one tick. Further ones wait for the next tick.
 pub const AIDS_MAX: usize = 2;
 
-/// A value that was true some time before the tick that takes it.
+/// A value with its age.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Aged<T> {
     /// The value.
     pub value: T,
-    /// Its age when the tick begins \[us\].
+    /// Age of the value when the tick begins \[us\].
     pub age_us: u32,
 }
 
@@ -23,22 +23,22 @@ impl<T> Aged<T> {
     }
 }
 
-/// Readings for one tick. The default is that of a vehicle without sensors.
+/// Readings for one tick. By default there are none, as of a vehicle without sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Readings {
-    /// Rates \[rad/s\] and specific force \[m/s2\] in the sensor's axes ([`Mounting`](afbc_types::Mounting)), if there
-    /// is a new sample.
+    /// New inertial sample, if any: rates \[rad/s\] and specific force \[m/s2\] in the sensor's axes
+    /// ([`Mounting`](afbc_types::Mounting)).
     pub imu: Option<Aged<[Vector3<f32>; 2]>>,
-    /// Measurements, in the order of their arrival, without gaps.
+    /// Aiding measurements in the order of arrival, without gaps.
     pub aids: [Option<Aged<Measurement>>; AIDS_MAX],
 }
 
-/// Numbers of a measurement on the wire.
+/// Number of values in a measurement on the wire.
 const NUMBERS: usize = Measurement::NUMBERS;
-/// Bytes of a measurement on the wire: kind, age, numbers.
+/// Bytes of a measurement on the wire: kind, age, values.
 const AID_LEN: usize = 1 + 4 + 4 * NUMBERS;
-/// Bytes of a sample: whether there is one, age, six numbers.
+/// Bytes of an inertial sample on the wire: flag, age, six values.
 const IMU_LEN: usize = 1 + 4 + 4 * 6;
 
 impl Readings {
@@ -47,7 +47,7 @@ impl Readings {
     /// Length on the [wire](crate::ReplyHead) \[bytes\].
     pub const LEN: usize = IMU_LEN + AIDS_MAX * AID_LEN;
 
-    /// Forgets all readings.
+    /// Removes all readings.
     pub fn clear(&mut self) {
         self.imu = None;
         for aid in &mut self.aids {
@@ -55,13 +55,13 @@ impl Readings {
         }
     }
 
-    /// Returns the sample, in the sensor's axes, with its time, for a tick at `now_us`.
+    /// Returns the inertial sample in the sensor's axes, with its time, for a tick at `now_us`.
     pub(crate) fn sample(&self, now_us: u64) -> Option<ImuSample> {
         let Stamped { value: [rates_rad_s, specific_force_m_s2], at_us } = self.imu?.timed(now_us);
         Some(ImuSample { at_us, rates_rad_s, specific_force_m_s2 })
     }
 
-    /// Returns the readings as they cross the wire.
+    /// Returns the readings' bytes on the wire.
     pub fn to_bytes(&self) -> [u8; Self::LEN] {
         let imu = self.imu.map_or([0; IMU_LEN], |Aged { value: [rates, force], age_us }| {
             record(1, age_us, rates.iter().chain(&force).copied())
@@ -72,7 +72,7 @@ impl Readings {
         bytes
     }
 
-    /// Reads what [`to_bytes`](Self::to_bytes) wrote. Unknown kinds are left out.
+    /// Reads the bytes of [`to_bytes`](Self::to_bytes). Leaves out unknown kinds of measurements.
     pub fn from_bytes(bytes: &[u8; Self::LEN]) -> Self {
         let mut rest = bytes.iter().copied();
         let (has_imu, age_us, [p, q, r, x, y, z]) = fields(&mut rest);
@@ -89,7 +89,7 @@ impl Readings {
     }
 }
 
-/// Returns kind, age and numbers as bytes, with zeros up to the end.
+/// Returns kind, age and values as bytes, padded with zeros.
 fn record<const L: usize>(kind: u8, age_us: u32, numbers: impl Iterator<Item = f32>) -> [u8; L] {
     let mut bytes = [0; L];
     let all = [kind].into_iter().chain(age_us.to_le_bytes()).chain(numbers.flat_map(f32::to_le_bytes));
@@ -97,7 +97,7 @@ fn record<const L: usize>(kind: u8, age_us: u32, numbers: impl Iterator<Item = f
     bytes
 }
 
-/// Reads kind, age and numbers.
+/// Reads kind, age and values.
 fn fields<const N: usize>(rest: &mut impl Iterator<Item = u8>) -> (u8, u32, [f32; N]) {
     let kind = rest.next().unwrap_or_default();
     let mut word = || [(); 4].map(|()| rest.next().unwrap_or_default());
@@ -139,7 +139,7 @@ mod tests {
         ]
     }
 
-    /// Every pair of measurements, with and without a sample, crosses the wire.
+    /// Every pair of measurements is read as it was written, with and without an inertial sample.
     #[test]
     fn what_is_read_crosses_the_wire() {
         let imu = Aged { value: [Vector3::new(0.5, -1.5, 2.5), Vector3::new(9.0, 8.0, -7.0)], age_us: 0x0102_0304 };
@@ -158,7 +158,7 @@ mod tests {
         }
     }
 
-    /// An unknown kind is left out, and what follows moves up.
+    /// An unknown kind is left out, and the next measurement moves up.
     #[test]
     fn unknown_kinds_leave_no_gap() {
         let height = Some(Aged { value: Measurement::Height { height_m: 3.0, sigma_m: 7.0 }, age_us: 5 });
@@ -169,7 +169,7 @@ mod tests {
         }
     }
 
-    /// The time of a reading is that of the tick less its age, and never before power-up.
+    /// A reading's time is the tick's time minus its age, but never before power-up.
     #[test]
     fn ages_become_times() {
         let sample = |age_us, now_us| {

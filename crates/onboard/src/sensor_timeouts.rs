@@ -1,14 +1,14 @@
-//! Sensors that have fallen silent.
+//! Detects sensors that have fallen silent.
 
 use crate::readings::Readings;
 use afbc_estimator::Measurement;
 use afbc_guidance::FailedSensors;
 
-/// Silence after which an inertial sensor, and any other one, counts as failed \[us\].
+/// Silence after which a sensor counts as failed: the inertial sensor, and any other one \[us\].
 const INERTIAL_US: u64 = 100_000;
 const OTHER_US: u64 = 1_000_000;
 
-/// Time of the last reading of each sensor; none before the first \[us\].
+/// Time of each sensor's last reading; none before the first \[us\].
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct SensorTimeouts {
     inertial: Option<u64>,
@@ -19,8 +19,8 @@ pub(crate) struct SensorTimeouts {
 }
 
 impl SensorTimeouts {
-    /// Notes what was read for the tick at `now_us`, and whether a pose came over the link; returns the sensors that
-    /// have read something before and are silent now.
+    /// Takes the readings of the tick at `now_us`, and whether a pose came over the link. Returns the sensors that have
+    /// read something before and are silent now.
     #[inline]
     pub(crate) fn tick(&mut self, now_us: u64, readings: &Readings, pose: bool) -> FailedSensors {
         if readings.imu.is_some() {
@@ -65,7 +65,7 @@ mod tests {
         Readings { aids: [None, Some(Aged { value, age_us: 0 })], ..NOTHING }
     }
 
-    /// Each sensor is silent by itself, once it was heard, after its own time, and until it is heard again.
+    /// Each sensor is silent independently: after its first reading and its own time-out, until its next reading.
     #[test]
     fn each_sensor_is_silent_after_its_time() {
         type Which = fn(&FailedSensors) -> bool;

@@ -1,51 +1,51 @@
-//! What drivers read, as the estimator takes it.
+//! Converts the drivers' readings to measurements for the estimator.
 
 use afbc_drivers::{FixReading, MagneticReading, PressureReading};
 use afbc_estimator::{Measurement, Origin};
 use nalgebra::{Matrix3, Vector3};
 
-/// Standard deviation of a barometer's height, without its drift: noise, and the wind's pressure \[m\].
+/// Standard deviation of a barometer's height, from noise and wind pressure but without drift \[m\].
 const HEIGHT_SIGMA_M: f32 = 0.3;
-/// Standard deviation of a magnetometer's field beside motors' currents \[uT\].
+/// Standard deviation of a magnetometer's field near the motors' currents \[uT\].
 const FIELD_SIGMA_UT: f32 = 1.0;
 
-/// Returns the height in the standard atmosphere, h = T0/L (1 - (p/p0)^(R L/g)) (ICAO Doc 7488) \[m\]: differences of
-/// it are right within 1 % for each 3 degrees by which the air is warmer or colder.
+/// Returns the height in the standard atmosphere, h = T0/L (1 - (p/p0)^(R L/g)) (ICAO Doc 7488) \[m\]. Height
+/// differences are off by 1 % for every 3 degrees by which the air is warmer or colder than standard.
 #[must_use]
 pub fn height(reading: &PressureReading) -> Measurement {
     let height_m = 44_330.77 * (1.0 - libm::powf(reading.pressure_pa / 101_325.0, 0.190_263_2));
     Measurement::Height { height_m, sigma_m: HEIGHT_SIGMA_M }
 }
 
-/// Returns the field in the body frame \[uT\], for a sensor whose axes `to_body` turns into the body's.
+/// Returns the field in the body frame \[uT\]. `to_body` rotates the sensor's axes into the body frame.
 #[must_use]
 pub fn field(reading: &MagneticReading, to_body: &Matrix3<f32>) -> Measurement {
     Measurement::MagneticField { field: to_body * reading.field_ut, sigma: FIELD_SIGMA_UT }
 }
 
-/// Fixes in a row, near one another, that are believed: a single one may be on another continent.
+/// Number of consecutive near fixes that are believed: a single fix may be on another continent.
 const BELIEVED: u8 = 5;
-/// How near the one before \[m\].
+/// Largest distance between consecutive near fixes \[m\].
 const NEAR_M: f32 = 200.0;
 
-/// The frame in which a receiver's fixes are told: that of the first that is believed.
+/// Local frame of a receiver's fixes. Its origin is the first believed fix.
 #[derive(Clone, Copy, Debug)]
 pub struct FixFrame {
-    /// Where the last fix was, and how many in a row were near; once they are believed, the frame's origin.
+    /// Last fix, and number of consecutive near fixes. Once fixes are believed, the frame's origin.
     near: Option<(Origin, u8)>,
 }
 
 impl FixFrame {
-    /// Before the first fix.
+    /// No fix yet.
     pub const NEW: Self = FixFrame { near: None };
 
-    /// Returns the place of the frame, once fixes are believed.
+    /// Returns the frame's origin, once fixes are believed.
     pub fn origin(&self) -> Option<Origin> {
         self.near.filter(|(_, count)| *count >= BELIEVED).map(|(origin, _)| origin)
     }
 
-    /// Returns a fix as the estimator takes it, and whether it is the first; none for an impossible one, and until
-    /// five in a row are each within 200 m of the one before.
+    /// Converts a fix to a measurement, with true for the first one. Returns none for impossible coordinates, and until
+    /// five fixes in a row are each within 200 m of the previous one.
     pub fn measure(&mut self, fix: &FixReading) -> Option<(Measurement, bool)> {
         let FixReading { latitude_deg, longitude_deg, altitude_m, .. } = *fix;
         let here = Origin::new(latitude_deg, longitude_deg, altitude_m)?;
@@ -81,7 +81,7 @@ mod tests {
 
     #[test]
     fn the_standard_atmosphere() {
-        // ICAO Doc 7488: altitude and pressure.
+        // Altitude and pressure from ICAO Doc 7488.
         for (height_m, pressure_pa) in [(-500.0, 107_478.0), (0.0, 101_325.0), (1000.0, 89_874.6), (5000.0, 54_019.9)] {
             let Measurement::Height { height_m: read_m, .. } =
                 height(&PressureReading { pressure_pa, temperature_c: 15.0 })
@@ -108,7 +108,7 @@ mod tests {
         };
         let mut frame = FixFrame::NEW;
         assert_eq!(frame.measure(&FixReading { latitude_deg: 91.0, ..first }), None);
-        // A wild one before them, or among them, has no say.
+        // Fixes that are far away, before or among the others, are ignored.
         let wild = FixReading { latitude_deg: -20.0, longitude_deg: 100.0, ..first };
         for fix in [wild, first, first, wild, first, first, first, first] {
             assert_eq!(frame.measure(&fix), None);

@@ -1,5 +1,5 @@
-//! A control tick, written down once: what it took, what it gave, and what it decided on the way. Telemetry, logs,
-//! reports and hosts look at it and derive none of it anew.
+//! Record of a control tick: its inputs, its outputs and its decisions. Telemetry, logs, reports and hosts read them
+//! here and never compute them again.
 
 use crate::readings::{AIDS_MAX, Readings};
 use afbc::monitor::Norm;
@@ -11,40 +11,40 @@ use afbc_types::{Axis, Pose, ROTORS_MAX, RotorSpeeds, Stamped, State};
 use core::array;
 use nalgebra::Vector3;
 
-/// What a tick gave.
+/// Outputs of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report<const N: usize = 4> {
     /// Start of the tick, since power-up \[us\].
     pub time_us: u64,
-    /// Flight mode.
+    /// Flight core's mode.
     pub mode: Mode,
-    /// Rotor speeds for the motors: zero if disarmed.
+    /// Commanded rotor speeds \[rad/s\]; zero while disarmed.
     pub motors: RotorSpeeds<N>,
-    /// Throttles for the motors: 0 if disarmed, otherwise 48 to 2047.
+    /// DSHOT throttles of the motors: 0 while disarmed, otherwise 48 to 2047.
     pub throttles: [u16; N],
-    /// The vehicle's own estimate of its state, or that of the pose observer after the inertial sensor has failed
+    /// Estimated state, or the pose observer's state after the inertial sensor has failed
     /// ([`TickHealth::observed`](afbc_flight_core::TickHealth::observed)); none without an inertial sensor.
     pub estimate: Option<State>,
     /// Health of the flight core.
     pub health: TickHealth,
-    /// Ticks since power-up in which a rotor was commanded a force outside its limits.
+    /// Number of ticks since power-up in which a rotor's commanded force was beyond its limits.
     pub saturated_ticks: u32,
-    /// Norms of the estimates of one subsystem, all reported in turn; none before the first flight.
+    /// Norms of one subsystem's estimates, a different subsystem in each tick; none before the first flight.
     pub norms: Option<(Axis, Norm)>,
-    /// True in the air while the accelerometer is [shaken](crate::vibration) more than is acceptable.
+    /// True in the air while [vibration](crate::vibration) of the accelerometer is too high.
     pub shaken: bool,
     /// Answer to a request.
     pub answer: Option<RequestAnswer>,
-    /// Why the flight ended, if it did in this tick.
+    /// Reason for the flight's end, if it ended in this tick.
     pub ended: Option<EndReason>,
-    /// What spoke against arming in this tick, by which a request to arm was or would have been answered.
+    /// Reasons against arming in this tick; the answer to a request to arm uses them.
     pub against: Reasons,
-    /// What the guidance decided.
+    /// The guidance's decisions.
     pub guided: Guided,
 }
 
 impl<const N: usize> Report<N> {
-    /// Returns the report extended with zeros to the largest number of rotors.
+    /// Returns the report padded with zeros to the largest number of rotors.
     #[must_use]
     pub fn padded(&self) -> Report<ROTORS_MAX> {
         let Report { time_us, mode, motors, throttles, estimate, health, saturated_ticks, norms, answer, .. } = *self;
@@ -69,72 +69,72 @@ impl<const N: usize> Report<N> {
     }
 }
 
-/// What a tick takes, beside what messages bring.
+/// Inputs of a tick, apart from messages.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TickInputs {
     /// Number of the tick since power-up.
     pub number: u32,
-    /// When it begins, since power-up \[us\].
+    /// Start of the tick, since power-up \[us\].
     pub time_us: u64,
     /// True if the clock is not trusted.
     pub clock_failed: bool,
-    /// What the sensors have read.
+    /// Readings of the sensors.
     pub readings: Readings,
-    /// The battery, if it is measured.
+    /// Reading of the battery, if it is measured.
     pub battery: Option<BatteryReading>,
-    /// Number of the configuration that is flown from this tick on, if it is another.
+    /// Number of the configuration flown from this tick on, if it has changed.
     pub adopted: Option<u16>,
-    /// Rotor speed at which the notch stands from this tick on, if it has moved \[rad/s\].
+    /// Rotor speed of the notch filter from this tick on, if the notch has moved \[rad/s\].
     pub notch_rad_s: Option<f32>,
 }
 
-/// What logs have of the time before a tick, which changes it ([`Flight::before`](crate::Flight::before)).
+/// State before a tick, which the tick changes and logs need ([`Flight::before`](crate::Flight::before)).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TickBefore {
-    /// A tracker's pose that messages had brought: the tick hands it over.
+    /// A tracker's pose from messages, which the tick removes.
     pub(crate) pose: Option<Stamped<Pose>>,
-    /// Where a vehicle at rest stood, which is where usable fixes are taken to be \[m\].
+    /// Position of a vehicle at rest, to which usable fixes are set \[m\].
     pub(crate) stands_m: Option<Vector3<f32>>,
     /// True if the inertial sensor worked.
     pub(crate) works: bool,
 }
 
-/// What logs have of a tick beside its report ([`Flight::details`](crate::Flight::details)), made only if one is
-/// written.
+/// Details of a tick that only logs need ([`Flight::details`](crate::Flight::details)). They are computed only if a log
+/// is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TickDetails {
-    /// What it took.
+    /// Inputs of the tick.
     pub inputs: TickInputs,
-    /// A tracker's pose that messages had brought.
+    /// A tracker's pose from messages.
     pub pose: Option<Stamped<Pose>>,
     /// The pilot's sticks.
     pub sticks: Option<Stamped<Sticks>>,
-    /// The inertial sensor's sample, calibrated and at the centre of mass.
+    /// Inertial sample, calibrated and at the centre of mass.
     pub sample: Option<ImuSample>,
-    /// The aids among the readings, corrected and in the local frame; none of a fix before a usable one.
+    /// Aiding measurements, corrected and in the local frame, without fixes before the first usable one.
     pub local: [Option<Measurement>; AIDS_MAX],
-    /// True if the estimator was offered these and the pose; false without an inertial sensor that works.
+    /// True if the estimator was offered `local` and `pose`; false if no inertial sensor works.
     pub offers: bool,
     /// True if the motors could not carry the vehicle.
     pub on_ground: bool,
     /// The law's internal signals: only inputs while blind, zeros while disarmed.
     pub trace: Trace,
-    /// The estimate with its uncertainty and validity; none without an inertial sensor.
+    /// Estimate with its uncertainty and validity; none without an inertial sensor.
     pub estimate: Option<Estimate>,
-    /// What the estimator makes of each kind of measurement.
+    /// The estimator's statistics for each kind of measurement.
     pub aids: Aids,
-    /// The local frame's origin in the frame of the GNSS receiver, from the first usable fix on \[m\].
+    /// Local frame's origin in the GNSS receiver's frame, from the first usable fix on \[m\].
     pub origin_m: Option<Vector3<f32>>,
-    /// The newest state that the flight core believes.
+    /// Newest state that the flight core trusts.
     pub state: Option<State>,
 }
 
-/// A tick. In two parts, for of most ticks nobody wants the details.
+/// Record of a tick. It has two parts, because the details of most ticks are not needed.
 #[derive(Clone, Copy, Debug)]
 pub struct TickRecord<'a, const N: usize = 4> {
-    /// What it gave.
+    /// Outputs of the tick.
     pub report: &'a Report<N>,
-    /// What it took and decided.
+    /// Inputs and decisions of the tick.
     pub details: &'a TickDetails,
 }

@@ -1,19 +1,19 @@
-//! How much the accelerometer is shaken, by PX4's measure, so that its figures hold.
+//! Measures the accelerometer's vibration as PX4 does, so that PX4's limits apply.
 
 use nalgebra::Vector3;
 
-/// Number of samples whose mean counts as one: those of 5 ms.
+/// Number of samples in one mean: 5 ms.
 const SAMPLES: u8 = 5;
-/// Share of a new change in the mean.
+/// Weight of the newest change in the vibration level.
 const SHARE: f32 = 0.01;
-/// Level above which vibration is no longer acceptable, the end of the green in PX4's Flight Review, and below which it
-/// is again \[m/s2\].
+/// Level above which vibration is too high, the end of the green range in PX4's Flight Review, and level below which it
+/// is acceptable again \[m/s2\].
 pub const HIGH_M_S2: f32 = 4.905;
 const FINE_M_S2: f32 = 4.0;
-/// Means of 5 ms for which it must be above: a landing shakes, too.
+/// Number of 5 ms means for which the level must be too high. A landing also shakes the vehicle, but only briefly.
 const LASTS: u8 = 200;
 
-/// Vibration: the mean length of the change between two means of 5 ms, as PX4's `accel_vibration_metric`.
+/// Vibration level: mean length of the change between two 5 ms means, like PX4's `accel_vibration_metric`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Vibration {
     sum_m_s2: Vector3<f32>,
@@ -25,7 +25,7 @@ pub(crate) struct Vibration {
 }
 
 impl Vibration {
-    /// Takes a sample of the specific force, one each millisecond.
+    /// Takes a sample of the specific force, one per millisecond.
     #[inline]
     pub(crate) fn take(&mut self, force_m_s2: &Vector3<f32>) {
         self.sum_m_s2 += force_m_s2;
@@ -46,7 +46,7 @@ impl Vibration {
         self.high = self.above == LASTS || self.high && self.level_m_s2 > FINE_M_S2;
     }
 
-    /// True while it is higher than acceptable.
+    /// Returns true while vibration is too high.
     pub(crate) fn is_high(&self) -> bool {
         self.high
     }
@@ -59,7 +59,7 @@ mod tests {
     use super::{FINE_M_S2, HIGH_M_S2, Vibration};
     use nalgebra::Vector3;
 
-    /// Lets it shake for so long with an amplitude and a frequency along one axis; returns the level.
+    /// Applies a vibration of this amplitude and frequency along one axis for `ms` milliseconds. Returns the level.
     fn shaken(vibration: &mut Vibration, amplitude_m_s2: f32, hz: f32, ms: usize) -> f32 {
         for tick in 0..ms {
             let x = amplitude_m_s2 * (core::f32::consts::TAU * hz * 1e-3 * tick as f32).sin();
@@ -68,7 +68,7 @@ mod tests {
         vibration.level_m_s2
     }
 
-    /// Mean of |2 sin(pi f T) sinc(f T) A sin|, T = 5 ms.
+    /// The level is the mean of |2 sin(pi f T) sinc(f T) A sin|, T = 5 ms.
     #[test]
     fn the_level_is_px4s() {
         for hz in [7.0_f32, 33.0, 61.0] {

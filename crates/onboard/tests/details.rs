@@ -1,11 +1,11 @@
-//! What a tick's details say that it has decided.
+//! Tests the details of a tick.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
 use afbc_estimator::Measurement;
 use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Readings, TickDetails, TickInputs};
 use nalgebra::Vector3;
 
-/// A vehicle that stands; each tick reads this aid, if any.
+/// A vehicle that stands still.
 struct Standing {
     flight: Flight,
     time_us: u64,
@@ -40,8 +40,8 @@ fn fix(position_m: Vector3<f32>, horizontal_sigma_m: f32) -> Measurement {
     }
 }
 
-/// A fix is told in the local frame, whose origin a usable one sets; while the vehicle is at rest, a usable one is
-/// where it stands, and one that is not usable is what it says.
+/// A fix is reported in the local frame, whose origin the first usable fix sets. At rest, a usable fix is set to the
+/// vehicle's position, and an unusable fix stays as it is.
 #[test]
 fn a_fix_at_rest_is_where_the_vehicle_stands() {
     let configuration = Configuration::<4>::default();
@@ -68,7 +68,7 @@ fn a_fix_at_rest_is_where_the_vehicle_stands() {
     let good = vehicle.tick(Some(fix(first_m + Vector3::new(1.0, 2.0, 3.0), most_m)));
     assert_eq!(good.local, [Some(fix(stands_m, most_m)), None]);
     assert!((stands_m - estimate.state.position_m).norm() < 0.1);
-    // As it was read.
+    // The inputs keep the original reading.
     let read = good.inputs.readings.aids[0].unwrap().value;
     assert_eq!(read, fix(first_m + Vector3::new(1.0, 2.0, 3.0), most_m));
 }

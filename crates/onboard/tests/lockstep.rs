@@ -1,4 +1,4 @@
-//! The head of a reply and the readings of sensors cross the wire.
+//! Tests that a reply's head and the sensors' readings are read as they were written.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use afbc_estimator::Measurement;
@@ -14,7 +14,7 @@ proptest! {
     }
 }
 
-/// Byte for byte, as another program would read it.
+/// The bytes are as another program would read them.
 #[test]
 fn fields_are_little_endian_and_in_order() {
     let throttles = [0x0102, 0, 0, 0, 0, 0, 0, 0x0304];
@@ -25,7 +25,7 @@ fn fields_are_little_endian_and_in_order() {
 }
 
 fn number() -> impl Strategy<Value = f32> {
-    // Bits matter, also of numbers that no sensor gives.
+    // Any bits, including numbers that no sensor gives.
     any::<f32>().prop_filter("a NaN equals nothing", |x| !x.is_nan())
 }
 
@@ -79,7 +79,7 @@ proptest! {
         let readings = Readings::from_bytes(&bytes);
         let present = readings.aids.map(|aid| aid.is_some());
         prop_assert!(present.is_sorted_by_key(|present| !present), "a gap: {present:?}");
-        // What was understood crosses again, in every bit, also of a NaN.
+        // Measurements that were understood are written again with the same bits, even NaN.
         let again = readings.to_bytes();
         prop_assert_eq!(Readings::from_bytes(&again).to_bytes(), again);
     }

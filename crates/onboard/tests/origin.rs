@@ -1,4 +1,4 @@
-//! The local frame of a vehicle with a GNSS receiver.
+//! Tests the local frame of a vehicle with a GNSS receiver.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc_estimator::{Estimator, ImuCalibration, Measurement, OutputFilter, Settings};
@@ -8,10 +8,10 @@ use afbc_types::{Pose, PoseSigmas, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-/// Noise of a fix, per coordinate, at most \[m\].
+/// Largest noise of a fix per coordinate \[m\].
 const NOISE_M: f32 = 0.05;
 
-/// Pseudo-random numbers in -1..1, different for each time.
+/// Returns pseudo-random numbers in -1..1, different for each time.
 fn noise(ms: u64) -> Vector3<f32> {
     let number = |k: u64| ((ms * 3 + k).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) as f32 / (1 << 23) as f32 - 1.0;
     Vector3::new(number(0), number(1), number(2))
@@ -32,7 +32,7 @@ fn fix(position_m: Vector3<f32>, velocity_m_s: Vector3<f32>, sigma_m: f32) -> Me
 struct Bench {
     front_end: EstimatorFrontEnd,
     inbox: Inbox,
-    /// What the estimate misses for flight.
+    /// Part of the estimate that is missing for flight.
     missing: Option<Refusal>,
     ms: u64,
 }
@@ -45,7 +45,7 @@ impl Bench {
         Bench { front_end, inbox: Inbox::default(), missing: None, ms: 0 }
     }
 
-    /// Runs a tick with this acceleration, and a fix that is true now.
+    /// Runs a tick with this acceleration and fix.
     fn tick(&mut self, acceleration_m_s2: Vector3<f32>, fix: Option<Measurement>, age_us: u32) -> State {
         self.ms += 1;
         let force = acceleration_m_s2 + Vector3::new(0.0, 0.0, 9.81) + noise(self.ms) * 0.02;
@@ -71,7 +71,7 @@ impl Bench {
         state
     }
 
-    /// Tells a tracker's pose at `place_m` in the local frame.
+    /// Sends a tracker's pose at `place_m` in the local frame.
     fn pose(&mut self, place_m: Vector3<f32>) {
         let position_m = place_m + noise(self.ms + 9_000_000) * 1e-4;
         let pose = Pose { position_m, attitude: [1.0, 0.0, 0.0, 0.0], sigmas: PoseSigmas::UNKNOWN };
@@ -86,8 +86,8 @@ fn place() -> impl Strategy<Value = Vector3<f32>> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
-    /// Wherever the receiver's frame has its origin, and wherever the vehicle was carried before the first fix, it
-    /// stands at zero, and what it moves by, moves it.
+    /// Wherever the receiver's frame has its origin, and wherever the vehicle moved before the first fix, it then
+    /// stands at zero. Later motion is measured correctly.
     #[test]
     fn it_stands_at_zero(place_m in place(), [x, y, z] in [-8.0_f32..8.0, -8.0_f32..8.0, 0.0_f32..8.0]) {
         let by_m = Vector3::new(x, y, z);
@@ -97,9 +97,9 @@ proptest! {
             bench.tick(if ms < 2000 { Vector3::zeros() } else { push(ms - 2000) }, None, 0);
         }
         let state = bench.stand(4000, place_m, 0.5);
-        // The noise of the first fix, and rounding: 2 mm at 20 km.
+        // Noise of the first fix, and rounding: 2 mm at 20 km.
         prop_assert!(state.position_m.amax() < 2.0 * NOISE_M + 0.01, "{}", state.position_m);
-        // From rest to rest in two seconds.
+        // Moves from rest to rest in two seconds.
         let (mut velocity, mut moved) = (Vector3::zeros(), Vector3::zeros());
         let mut state = State::default();
         for ms in 0..2000 {
@@ -112,7 +112,7 @@ proptest! {
         prop_assert!((state.position_m - by_m).amax() < 0.15, "{}, not {by_m}", state.position_m);
     }
 
-    /// A first fix from anywhere, and single ones among the others, do not mislead it.
+    /// A first fix from anywhere, and single outliers later, do no harm.
     #[test]
     fn a_wild_fix_does_no_harm(place_m in place(), wild_m in place(), later in 100_u64..3000, x in -8.0_f32..8.0) {
         prop_assume!((place_m - wild_m).norm() > 200.0);
@@ -136,8 +136,8 @@ proptest! {
         prop_assert!((state.position_m - push).amax() < 0.25, "{}, not {push}", state.position_m);
     }
 
-    /// With a tracker the local frame is the tracker's, wherever the receiver's is; also if the vehicle moves when the
-    /// first fix comes, late.
+    /// With a tracker the local frame is the tracker's, wherever the receiver's is, even if the first fix comes late
+    /// and in motion.
     #[test]
     fn the_trackers_frame_stays(place_m in place(), local_m in place(), speed in -3.0_f32..3.0) {
         const LATE_MS: u32 = 200;
@@ -152,7 +152,7 @@ proptest! {
         let mut velocity = Vector3::zeros();
         let mut worst_m: f32 = 0.0;
         for ms in 0..6000 {
-            // Accelerates for a second; then the first fix comes, and then the tracker is lost.
+            // Accelerates for one second. Later the first fix comes, and then the tracker is lost.
             let acceleration = Vector3::new(if ms < 1000 { speed } else { 0.0 }, 0.0, 0.0);
             velocity += acceleration * 1e-3;
             local_m += velocity * 1e-3;
@@ -169,8 +169,7 @@ proptest! {
         prop_assert!(worst_m < 0.15, "{worst_m} m");
     }
 
-    /// A fix before the start, one that is not finite, and one that is too poor for a valid position do not set the
-    /// origin.
+    /// An unusable fix does not set the origin: before the start, not finite, or too inaccurate for a valid position.
     #[test]
     fn only_a_usable_fix_sets_it(place_m in place(), other_m in place()) {
         let mut bench = Bench::new();

@@ -1,4 +1,4 @@
-//! A vehicle that stands outdoors stays where it is, whatever its receiver's error does.
+//! Tests that a vehicle at rest outdoors keeps its estimated position, whatever its receiver's error does.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 
 use afbc_estimator::{Estimator, ImuCalibration, Measurement, OutputFilter, Settings};
@@ -8,18 +8,18 @@ use afbc_types::{Mounting, State};
 use nalgebra::{Rotation3, Vector3};
 use proptest::prelude::*;
 
-/// Time without and with fixes \[ms\].
+/// Time without fixes, then with fixes \[ms\].
 const SILENT_MS: u64 = 8_000;
 const STANDS_MS: u64 = 60_000;
 
-/// Pseudo-random numbers in -1..1, different for each time.
+/// Returns pseudo-random numbers in -1..1, different for each time.
 fn noise(ms: u64) -> Vector3<f32> {
     let number = |k: u64| ((ms * 3 + k).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) as f32 / (1 << 23) as f32 - 1.0;
     Vector3::new(number(0), number(1), number(2))
 }
 
-/// What the sensors of a vehicle that stands read: fixes at 10 Hz, a barometer and a magnetometer at 50 Hz. `wander_m`
-/// is how far the receiver's error swings within minutes, `hand_m_s2` what accelerates the vehicle.
+/// Returns the readings of a vehicle: fixes at 10 Hz, barometer and magnetometer at 50 Hz. `wander_m` is the amplitude
+/// of the receiver's slow error. `hand` is the true acceleration, velocity and displacement.
 fn readings(ms: u64, place_m: Vector3<f32>, wander_m: Vector3<f32>, hand: [Vector3<f32>; 3]) -> Readings {
     let [acceleration, velocity_m_s, moved_m] = hand;
     let t = 1e-3 * ms as f32;
@@ -48,7 +48,7 @@ fn readings(ms: u64, place_m: Vector3<f32>, wander_m: Vector3<f32>, hand: [Vecto
 
 const STILL: [Vector3<f32>; 3] = [Vector3::new(0.0, 0.0, 0.0); 3];
 
-/// Largest distance from where it stood, and largest speed, of what `tick` tells after the first second of fixes.
+/// Returns the largest displacement and speed of the state from `tick` after the first two seconds.
 fn stands(
     place_m: Vector3<f32>,
     wander_m: Vector3<f32>,
@@ -75,7 +75,8 @@ fn navigation() -> EstimatorFrontEnd {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(6))]
 
-    /// By metres, in any direction, the receiver wanders, and the barometer by some: the vehicle does not.
+    /// The receiver wanders by metres in any direction, and the barometer by some tenths, but the vehicle's estimate
+    /// does not.
     #[test]
     fn it_stays_where_it_stands(
         place_m in [-5000.0_f32..5000.0, -5000.0_f32..5000.0, -100.0_f32..3000.0].prop_map(Vector3::from),
@@ -90,7 +91,7 @@ proptest! {
     }
 }
 
-/// So does a vehicle whose flight core knows that it is disarmed.
+/// A disarmed vehicle in a whole flight also keeps its position.
 #[test]
 fn a_disarmed_vehicle_stays_where_it_stands() {
     let mut flight: Flight = Flight::new(&Configuration::default()).expect("valid");
@@ -101,8 +102,8 @@ fn a_disarmed_vehicle_stays_where_it_stands() {
     assert!(away_m < 0.15 && speed_m_s < 0.1, "{away_m} m, {speed_m_s} m/s");
 }
 
-/// A station corrects the mounting of a sensor that is turned: the estimate starts again in the new axes, at once
-/// right, instead of taking the change for a motion.
+/// A station corrects the mounting of a rotated sensor. The estimate starts again in the new axes and is right at once,
+/// instead of taking the change for a motion.
 #[test]
 fn another_mounting_starts_the_estimate_again() {
     let turned = Vector3::new(0.0, 0.2, 1.0);
@@ -137,8 +138,8 @@ fn another_mounting_starts_the_estimate_again() {
     }
 }
 
-/// Disarmed, but lifted onto a table by 1 m and pushed aside by 2 m, within two seconds: it is followed, stands there,
-/// and the receiver that has wandered meanwhile says the same.
+/// A disarmed vehicle is lifted by 1 m and pushed by 2 m within two seconds. The estimate follows, and stays there,
+/// although the receiver's error has wandered meanwhile.
 #[test]
 fn a_hand_moves_it() {
     let (mut navigation, mut inbox) = (navigation(), Inbox::default());

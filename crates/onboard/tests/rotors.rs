@@ -1,4 +1,4 @@
-//! Rotors that do not turn as commanded, and the notch that follows those that do.
+//! Tests rotors that do not turn as commanded, and the notch that follows the rotors.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_estimator::VelocityNotch;
@@ -9,13 +9,13 @@ use proptest::prelude::*;
 
 const TICK_US: u64 = 1_000;
 
-/// Four rotors that follow their commands, measured in turn every 3 ms, a millisecond late.
+/// Four rotors that follow their commands, one measured every 3 ms in turn, with one millisecond delay.
 struct Bench {
     monitor: RotorMonitor,
     speeds: [f32; 4],
     late: [f32; 4],
     tau_s: f32,
-    /// Share of the commanded speed that they reach.
+    /// Share of the commanded speed that the rotors reach.
     sag: f32,
     stopped: Option<usize>,
     now_us: u64,
@@ -49,8 +49,8 @@ impl Bench {
 }
 
 proptest! {
-    /// Rotors half or twice as slow as the vehicle's file says, at three quarters of the voltage, raise no alarm,
-    /// whatever is commanded; one that stops is told within 100 ms of being commanded more than its idle speed.
+    /// Rotors with half to twice the configured time constant, down to three quarters of the voltage, raise no alarm
+    /// for any commands. A rotor that stops is reported within 100 ms while it is commanded more than its idle speed.
     #[test]
     fn only_stopped_rotors_are_told(
         steps in proptest::collection::vec((1..150_u64, prop::array::uniform4(0.0..900.0_f32)), 40),
@@ -67,19 +67,19 @@ proptest! {
         let from_us = bench.now_us;
         (0..400).for_each(|_| bench.tick(true, [400.0; 4]));
         let (at_us, rotor, _) = bench.news[0];
-        // From full to half speed it takes 0.7 of 0.03 s, twice that if it is slow.
+        // From full to half speed a rotor takes 0.7 time constants of 0.03 s, and twice that if it is slow.
         prop_assert!(at_us - from_us <= 100_000, "{} us", at_us - from_us);
         prop_assert_eq!(usize::from(rotor), stopped);
         prop_assert_eq!(bench.news.last().unwrap().2, Some(RotorFailure::Stopped));
         prop_assert!(bench.news.iter().all(|(_, rotor, _)| usize::from(*rotor) == stopped));
-        // It turns again.
+        // The rotor turns again.
         bench.stopped = None;
         (0..1_000).for_each(|_| bench.tick(true, [400.0; 4]));
         prop_assert_eq!(bench.news.last().unwrap().2, None);
         prop_assert!(!bench.monitor.has_failed());
     }
 
-    /// The notch stands where the rotors are, within its bounds, and at home when it is not known where they are.
+    /// The notch follows the rotors within its bounds, and stays at the configured speed if their speed is unknown.
     #[test]
     fn the_notch_is_where_the_rotors_are(
         home in 70.0..300.0_f32, speeds in prop::array::uniform4(0.0..900.0_f32), age_us in 0..200_000_u64,
@@ -98,7 +98,8 @@ proptest! {
         prop_assert_eq!(moved.is_some(), known && !stays, "{:?} {}", moved, wanted);
         if let Some(moved) = moved {
             prop_assert!((moved - wanted).abs() < 1e-3 * wanted);
-            // Not more often than a hundred times a second, and back home when they fall silent.
+            // The notch moves at most a hundred times per second, and returns to the configured speed when the rotors
+            // fall silent.
             prop_assert_eq!(follower.look(now_us + 9_000, true, [None; 4]), None);
             prop_assert_eq!(follower.look(now_us + 10_000, true, [None; 4]), home_notch);
             prop_assert_eq!(follower.look(now_us + 30_000, true, [None; 4]), None);
@@ -106,7 +107,7 @@ proptest! {
     }
 }
 
-/// A rotor that its controller turns too fast, or at a third of its speed, is out of step; a short glitch is nothing.
+/// A rotor that turns too fast, or at a third of its speed, is desynchronised. A single wrong reading is ignored.
 #[test]
 fn one_out_of_step_is_told() {
     for wrong in [150.0, 900.0] {
@@ -126,7 +127,7 @@ fn one_out_of_step_is_told() {
     }
 }
 
-/// A rotor that never starts is told once it should have; on the ground, disarmed, nothing is.
+/// A rotor that never starts is reported once its starting time is over. Nothing is reported while disarmed.
 #[test]
 fn one_that_never_starts_is_told() {
     let mut bench = Bench::new(0.03, 1.0);
@@ -137,7 +138,7 @@ fn one_that_never_starts_is_told() {
     let (at_us, rotor, failure) = bench.news[0];
     assert_eq!((rotor, failure), (1, Some(RotorFailure::Stopped)));
     assert!((3_500_000..3_600_000).contains(&at_us), "{at_us}");
-    // Disarming ends it.
+    // Disarming ends the failure.
     bench.tick(false, [0.0; 4]);
     assert_eq!(bench.monitor.failures(), [None; 8]);
 }

@@ -1,12 +1,14 @@
-//! Values on the wire: four bytes and a type.
+//! Encodes parameter values on the link: four bytes and a type.
 //!
-//! Numbers cross as REAL32, which has one encoding. Switches and whole numbers cross as INT32, of which there are two:
-//! *bytewise*, the integer's own four bytes, which this vehicle sends, and which PX4, QGroundControl and MAVSDK use;
-//! and the *C cast*, the number as a float, of ArduPilot. Both are understood: the float of a whole number other than
-//! zero has bits that are, as an integer, beyond 1,065,000,000 either way, where no parameter is; and the bytes of an
-//! integer up to 8,388,607 either way are, as a float, no whole number but 0, which is the same in both.
+//! Numbers are sent as REAL32, which has one encoding. Switches and whole numbers are sent as INT32, which has two
+//! encodings. *Bytewise*, the four bytes are the integer itself; this vehicle sends it, and PX4, QGroundControl and
+//! MAVSDK use it. In the *C cast* of ArduPilot, they are the number as a float.
+//!
+//! Both are understood, because they never clash. The float bits of a whole number other than zero, read as an integer,
+//! are beyond +-1,065,000,000, where no parameter is. The bytes of an integer within +-8,388,607, read as a float, are
+//! no whole number other than 0, and 0 is the same in both.
 
-/// Type of a parameter on the link: MAV_PARAM_TYPE.
+/// Type of a parameter on the link (MAV_PARAM_TYPE).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A number.
@@ -17,9 +19,9 @@ pub enum Kind {
 
 /// MAV_PARAM_TYPE_REAL32.
 const REAL32: u8 = 9;
-/// Widths of MAV_PARAM_TYPE_UINT8 (1) to MAV_PARAM_TYPE_INT32 (6) \[bytes\]; odd ones have no sign.
+/// Widths of MAV_PARAM_TYPE_UINT8 (1) to MAV_PARAM_TYPE_INT32 (6) \[bytes\]. Odd types are unsigned.
 const WIDTHS: [u32; 6] = [1, 1, 2, 2, 4, 4];
-/// Whole numbers up to here are the same in `f32` and in every encoding.
+/// Largest whole number that is the same in `f32` and in both encodings.
 const WHOLE_MAX: f32 = 8_388_607.0;
 
 impl Kind {
@@ -31,7 +33,7 @@ impl Kind {
         }
     }
 
-    /// Returns a value as it crosses the wire, little-endian.
+    /// Returns the value's four bytes on the link, little-endian.
     pub fn encode(self, value: f32) -> [u8; 4] {
         match self {
             Kind::Real32 => value.to_le_bytes(),
@@ -40,8 +42,8 @@ impl Kind {
     }
 }
 
-/// Returns the value that `bytes` are, sent as the MAV_PARAM_TYPE `kind`; none for a type of more than four bytes, or
-/// an integer beyond 8,388,607.
+/// Returns the value that `bytes` of the MAV_PARAM_TYPE `kind` represent. Returns none for a type of more than four
+/// bytes, and for an integer beyond +-8,388,607.
 pub fn decode(kind: u8, bytes: [u8; 4]) -> Option<f32> {
     let as_float = f32::from_le_bytes(bytes);
     if kind == REAL32 {
@@ -52,11 +54,11 @@ pub fn decode(kind: u8, bytes: [u8; 4]) -> Option<f32> {
     if is_whole(as_float) && as_float.abs() <= WHOLE_MAX {
         return Some(as_float);
     }
-    // The first bytes, whatever the others hold.
+    // Uses only the type's own bytes, whatever the others hold.
     let unused = 32 - 8 * width;
     let shifted = u32::from_le_bytes(bytes) << unused;
     let is_signed = kind.is_multiple_of(2);
-    // Shifting back an i32 brings the sign along.
+    // Shifting an i32 back extends the sign.
     let value = if is_signed { f64::from((shifted as i32) >> unused) } else { f64::from(shifted >> unused) };
     (value.abs() <= f64::from(WHOLE_MAX)).then_some(value as f32)
 }
@@ -66,7 +68,7 @@ pub fn decode(kind: u8, bytes: [u8; 4]) -> Option<f32> {
 mod tests {
     use super::*;
 
-    /// Types 1 to 6, in both encodings.
+    /// Types 1 to 6 are decoded in both encodings.
     #[test]
     fn both_encodings_of_every_integer_are_distinguished() {
         let step = 997;
@@ -80,7 +82,7 @@ mod tests {
                     let bytewise = core::array::from_fn(|i| if i < width { low[i] } else { 0 });
                     assert_eq!(decode(kind, bytewise), Some(value), "type {kind}, bytewise");
                     assert_eq!(decode(kind, value.to_le_bytes()), Some(value), "type {kind}, C cast");
-                    // pymavlink and MAVSDK sign-extend or not: what is behind the number does not count.
+                    // pymavlink and MAVSDK may sign-extend or not: bytes beyond the number are ignored.
                     if kind.is_multiple_of(2) {
                         assert_eq!(decode(kind, low), Some(value), "type {kind}, sign-extended");
                     }

@@ -1,4 +1,4 @@
-//! The groups of parameters: the one list of what a station sees.
+//! Lists the groups of parameters that a station sees.
 
 use super::encoding::Kind;
 use super::reason::Reason;
@@ -12,37 +12,37 @@ use core::convert::Infallible;
 pub struct Parameter {
     /// Name, as in `docs/parameters.md`.
     pub name: RecordName,
-    /// Place in the list.
+    /// Index in the list.
     pub place: u16,
     /// Type on the link.
     pub kind: Kind,
-    /// Value: of a switch, 0 or 1.
+    /// Value; 0 or 1 for a switch.
     pub value: f32,
     /// Accepted range.
     pub range: Range,
 }
 
-/// Which parameter is looked for.
+/// Name or index of the parameter to find.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Key {
     Name(RecordName),
     Place(u16),
 }
 
-/// A walk over the list to one parameter.
+/// Searches the list for one parameter.
 ///
-/// Not a visitor: a function for each of its uses, with every parameter in it, would take 100 KB of flash.
+/// Not a generic visitor: one function per use, with every parameter in it, would take 100 kB of flash.
 struct Walk {
     key: Key,
-    /// Number of parameters passed.
+    /// Number of parameters passed so far.
     passed: u16,
     found: Option<Parameter>,
 }
 
-/// The parameter has been found.
+/// Ends a walk: the parameter has been found.
 struct Found;
 
-/// Shows every group, in the order of the list, with its prefix.
+/// Shows every group with its prefix, in the order of the list.
 macro_rules! each_group {
     ($configuration:expr, |$prefix:pat_param, $group:ident| $show:expr) => {{
         let Configuration {
@@ -75,8 +75,8 @@ macro_rules! each_group {
 }
 
 impl<const N: usize> Configuration<N> {
-    /// Walks over every parameter, in the order of the list and of the declarations. Places may change with the image,
-    /// names do not.
+    /// Walks over all parameters, in the order of the list and of the declarations. An index may change with the
+    /// firmware image; a name does not.
     #[inline(never)]
     fn walk(&self, walk: &mut Walk) -> Result<(), Found> {
         each_group!(self, |prefix, group| group
@@ -86,7 +86,7 @@ impl<const N: usize> Configuration<N> {
 
     /// Returns the number of parameters.
     pub(crate) fn parameters(&self) -> u16 {
-        // A place that no parameter has: all are passed.
+        // No parameter has this index, so the walk counts all of them.
         let mut walk = Walk { key: Key::Place(u16::MAX), passed: 0, found: None };
         let _ = self.walk(&mut walk);
         walk.passed
@@ -100,7 +100,7 @@ impl<const N: usize> Configuration<N> {
         walk.found
     }
 
-    /// Sets a parameter, if the value is in its range; returns what it is then.
+    /// Sets a parameter if the value is in its range. Returns the parameter with its new value.
     pub(crate) fn put(&mut self, name: RecordName, value: f32) -> Result<Parameter, Reason> {
         let parameter = self.parameter(Key::Name(name)).ok_or_else(|| Reason::on(name, "no such parameter"))?;
         parameter.range.check(value).map_err(|error| Reason::range(name, &error))?;
@@ -108,11 +108,11 @@ impl<const N: usize> Configuration<N> {
             return Err(Reason::on(name, "must be a whole number"));
         }
         let _ = self.write(parameter.place, value, parameter.range.min as f32);
-        // An f64 has the nearest value, and a whole number no -0.
+        // Read back: an f64 is rounded to the nearest f32, and a whole number has no -0.
         self.parameter(Key::Place(parameter.place)).ok_or_else(|| Reason::on(name, "no such parameter"))
     }
 
-    /// Writes the number at `place`; that of a choice counts from `first` on.
+    /// Writes the number at `place`. The number of a choice counts from `first` on.
     #[inline(never)]
     fn write(&mut self, place: u16, value: f32, first: f32) -> Result<(), Found> {
         let mut left = usize::from(place);
@@ -144,8 +144,8 @@ impl<const N: usize> Configuration<N> {
 }
 
 impl<const N: usize> Configuration<N> {
-    /// Shows the declaration of every parameter, in the order of the list, with the words of a choice: of a vector
-    /// three times. For whoever describes them to a station; no image needs it.
+    /// Shows the declaration of every parameter in the order of the list, with the words of a choice. A vector's
+    /// declaration is shown three times. Used to describe parameters to stations; no firmware image needs it.
     pub(crate) fn show_declarations(&self, show: &mut dyn FnMut(&Declaration, &'static [&'static str])) {
         let mut visit = |declaration: &Declaration, value: Value<'_>| {
             let (length, words): (_, &'static [&'static str]) = match value {
@@ -167,7 +167,7 @@ impl<const N: usize> Configuration<N> {
 }
 
 impl Walk {
-    /// Passes one number or the three of a vector.
+    /// Passes one number, or the three numbers of a vector.
     #[inline(never)]
     fn value(&mut self, prefix: &'static str, declaration: &Declaration, value: Value<'_>) -> Result<(), Found> {
         let length = match value {
@@ -175,7 +175,8 @@ impl Walk {
             Value::Double(numbers) => numbers.len(),
             Value::Whole(_) | Value::Switch(_) | Value::Choice(..) => 1,
         };
-        // No names of those before a place: they would take half a millisecond of a board for every parameter.
+        // Skips parameters before the wanted index without building their names, which would take half a millisecond
+        // per parameter on a board.
         let behind = self.passed.saturating_add(length as u16);
         if matches!(self.key, Key::Place(place) if place >= behind) {
             self.passed = behind;
@@ -183,7 +184,8 @@ impl Walk {
         }
         for (index, coordinate) in (0..length).zip(['X', 'Y', 'Z']) {
             let coordinate = (length > 1).then_some(coordinate);
-            // Names fit: tests/tests/parameters.rs. One that did not would be left out of the list.
+            // All names fit, as tests/tests/parameters.rs checks. A name that did not fit would be left out of the
+            // list.
             let Some(name) = RecordName::of(declaration.name(prefix, coordinate).chars()) else { continue };
             let place = self.passed;
             self.passed += 1;
@@ -191,7 +193,7 @@ impl Walk {
                 let (kind, value) = match value {
                     Value::Single(numbers) => (Kind::Real32, numbers.get(index).copied().unwrap_or_default()),
                     Value::Double(numbers) => (Kind::Real32, numbers.get(index).copied().unwrap_or_default() as f32),
-                    // Below 2^24, all of them.
+                    // All whole numbers are below 2^24 and exact as `f32`.
                     Value::Whole(number) => (Kind::Int32, number as f32),
                     Value::Switch(switch) => (Kind::Int32, f32::from(u8::from(switch))),
                     Value::Choice(index, _) => (Kind::Int32, declaration.range.min as f32 + index as f32),

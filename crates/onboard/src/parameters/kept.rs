@@ -1,49 +1,49 @@
-//! What of the parameters is in a store: the values that differ from the image's, over images to come.
+//! Stores the parameters that differ from the firmware image, and reads them back in later images.
 
 use super::reason::Reason;
 use super::table::ParameterTable;
 use afbc_store::{Error, RecordName, Store};
 use embedded_storage::nor_flash::NorFlash;
 
-/// What is to be written after a change of the table.
+/// A change of the parameter table that is to be stored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RecordChange {
-    /// This parameter has this value now; none: that of the image.
+    /// A parameter and its new value; none if it has the image's value again.
     Set(RecordName, Option<f32>),
-    /// All parameters are as in the image.
+    /// All parameters have the image's values again.
     Restored,
 }
 
-/// Rounds over the store in which values that need one another are set.
+/// Most passes over the store to set values that depend on each other.
 const ROUNDS_MAX: u32 = 100;
 
-/// How to read what earlier images have written.
+/// Tells how to read values that earlier images have stored.
 ///
-/// A name is used once: a parameter whose meaning or unit changes keeps its name, and gets a line in `changed`; one
-/// that gets a new name, a line in `renamed`. A range that changes needs neither, since each value is checked when it
-/// is read.
+/// A name is never reused. A parameter whose meaning or unit changes keeps its name and gets an entry in `changed`. A
+/// parameter that is renamed gets an entry in `renamed`. A changed range needs no entry, since each value is checked
+/// when it is read.
 #[derive(Clone, Copy, Debug)]
 pub struct Kept {
-    /// Number of the present meanings, at least the largest of `changed`.
+    /// Number of the present meanings, at least the largest in `changed`.
     pub edition: u16,
-    /// Former and present name.
+    /// Former and present name of each renamed parameter.
     pub renamed: &'static [(&'static str, &'static str)],
-    /// Present name of a parameter, and the edition since which its value means what it means now.
+    /// Present name of a parameter, and the edition in which it got its present meaning.
     pub changed: &'static [(&'static str, u16)],
 }
 
 impl Kept {
-    /// As this image writes and reads.
+    /// Format of the present firmware image.
     pub const NOW: Self = Kept { edition: 0, renamed: &[], changed: &[] };
 
-    /// Sets the parameters of `table`, which is as in the image, to what is in `store`. Calls `notice` with a line on
-    /// each value that is not used; its parameter is as in the image then. Writes nothing.
+    /// Sets the parameters in `table`, which must have the image's values, to the stored values. Calls `notice` with a
+    /// line for each stored value that is not used; its parameter keeps the image's value. Does not write to the store.
     ///
-    /// All values are taken together. If the vehicle could not fly with them, as those of an image with other gains,
-    /// they are taken one by one as far as it could.
+    /// All values are set together. If the vehicle could not fly with them, for example because the image has other
+    /// gains, they are set one by one as far as possible.
     ///
     /// # Errors
-    /// Of the flash: then every parameter is as in the image.
+    /// A failure of the flash. Then all parameters have the image's values.
     pub fn load<F: NorFlash, const N: usize>(
         &self,
         table: &mut ParameterTable<N>,
@@ -67,12 +67,12 @@ impl Kept {
         if read.is_ok() && table.check().is_ok() {
             return Ok(());
         }
-        // Not what was read so far: half of the values would be a vehicle that nobody has set.
+        // Drops the values read so far: half of them would make a vehicle that nobody has configured.
         table.restore();
         read.and_then(|()| self.load_singly(table, store, notice))
     }
 
-    /// Sets what can be set, until nothing more can; calls `notice` with a line on each of the rest.
+    /// Sets values one by one until no more can be set. Calls `notice` with a line for each of the rest.
     fn load_singly<F: NorFlash, const N: usize>(
         &self,
         table: &mut ParameterTable<N>,
@@ -80,14 +80,14 @@ impl Kept {
         mut notice: impl FnMut(Reason),
     ) -> Result<(), Error<F::Error>> {
         let mut more = true;
-        // In rounds: a value may be possible only beside another that comes later in the store. Bounded, since a former
-        // and a present name of one parameter may stand there after a cut of power, and set it in turns.
+        // Repeats, as a value may only be possible after a later one in the store. The number of passes is limited:
+        // after a power cut, a parameter's former and present name may both be stored, and set it in turns.
         for round in 1..=ROUNDS_MAX {
             let last = !more || round == ROUNDS_MAX;
             more = false;
             store.visit(|name, edition, bits| {
                 let Ok((name, value)) = self.read(name, edition, bits) else { return };
-                // What is unknown, or out of its own range, has been reported.
+                // Unknown names and values out of range have been reported already.
                 let known = table.get(name).filter(|parameter| parameter.range.check(value).is_ok());
                 if known.is_some_and(|parameter| parameter.value != value) {
                     match table.set(name, value) {
@@ -104,19 +104,19 @@ impl Kept {
         Ok(())
     }
 
-    /// Writes a change.
+    /// Stores a change.
     ///
     /// # Errors
-    /// If it was not written, or in part: values of other names are not affected.
+    /// If the change was not stored, or only in part. Values of other names are not affected.
     pub fn keep<F: NorFlash>(&self, store: &mut Store<F>, change: RecordChange) -> Result<(), Error<F::Error>> {
         match change {
             RecordChange::Restored => store.reset(),
             RecordChange::Set(name, Some(value)) => {
-                // The new value first: a cut of power between the two leaves at least one of them.
+                // Writes the new value first: a power cut before the second write leaves at least one value.
                 store.set(name, self.edition, Some(value.to_bits()))?;
                 self.forget(store, name)
             }
-            // Former names first: at no point does one of them count again.
+            // Deletes former names first, so that none of their values becomes valid again.
             RecordChange::Set(name, None) => {
                 self.forget(store, name)?;
                 store.set(name, self.edition, None)
@@ -124,7 +124,7 @@ impl Kept {
         }
     }
 
-    /// Takes back what stands under former names of `name`.
+    /// Deletes the values stored under former names of `name`.
     fn forget<F: NorFlash>(&self, store: &mut Store<F>, name: RecordName) -> Result<(), Error<F::Error>> {
         let former = self.renamed.iter().filter(|(_, now)| *now == name.as_str());
         former
@@ -132,7 +132,7 @@ impl Kept {
             .try_for_each(|former| store.set(former, self.edition, None))
     }
 
-    /// Returns the present name and value of what is stored.
+    /// Returns the present name and the value of a stored entry.
     fn read(&self, name: RecordName, edition: u16, bits: u32) -> Result<(RecordName, f32), Reason> {
         let renamed = self.renamed.iter().find(|(former, _)| *former == name.as_str());
         let now = renamed.and_then(|(_, now)| RecordName::new(now)).unwrap_or(name);

@@ -1,10 +1,10 @@
-//! Parameters of the vehicle while it runs: what stations read and set, and what is kept in flash.
+//! Parameters of the running vehicle: stations read and set them, and flash stores them.
 //!
-//! * [`ParameterTable`]: the parameters of a [`Configuration`](crate::Configuration) by name and by place, each change
-//!   checked.
-//! * [`Kept`]: what of it is in a [`Store`](afbc_store::Store), over new images and other vehicles.
+//! * [`ParameterTable`]: the parameters of a [`Configuration`](crate::Configuration) by name and by index; each change
+//!   is checked.
+//! * [`Kept`]: stores changed parameters in a [`Store`](afbc_store::Store), and reads them in later images.
 //!
-//! Names are those of `docs/parameters.md`. A new group is a line in `groups.rs`.
+//! Names are those of `docs/parameters.md`. A new group is one line in `groups.rs`.
 
 mod encoding;
 mod groups;

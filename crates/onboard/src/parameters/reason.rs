@@ -1,11 +1,11 @@
-//! Why a parameter is not what was asked for, in one line.
+//! One-line reasons why a parameter was not set as requested.
 
 use afbc_store::RecordName;
 use afbc_types::OutOfRange;
 use core::fmt;
 use heapless::String;
 
-/// Length of STATUSTEXT.
+/// Length of the text in a STATUSTEXT message.
 pub const REASON_MAX: usize = 50;
 
 /// One line of at most 50 characters.
@@ -14,19 +14,19 @@ pub const REASON_MAX: usize = 50;
 pub struct Reason(String<REASON_MAX>);
 
 impl Reason {
-    /// Makes a line: `subject: text`; what is longer is cut.
+    /// Creates the line `subject: text`, cut to the length that fits.
     pub fn new(subject: &str, text: &str) -> Self {
         let mut line = Line::default();
         [subject, ": ", text].into_iter().for_each(|part| line.text(part));
         Reason(line.text)
     }
 
-    /// Makes the line on a parameter.
+    /// Creates a line about a parameter.
     pub fn on(name: RecordName, text: &str) -> Self {
         Reason::new(name.as_str(), text)
     }
 
-    /// Makes the line on a value outside the range of its own.
+    /// Creates a line about a value out of its own range.
     pub(crate) fn range(name: RecordName, error: &OutOfRange) -> Self {
         let mut line = Line::default();
         [name.as_str(), ": must be "].into_iter().for_each(|part| line.text(part));
@@ -36,7 +36,8 @@ impl Reason {
         Reason(line.text)
     }
 
-    /// Makes the line on a value with which another one leaves its range; without the limit if that is too long.
+    /// Creates a line about a value that puts another quantity out of range. Leaves out the limit if the line gets too
+    /// long.
     pub(crate) fn together(name: RecordName, error: &OutOfRange) -> Self {
         let OutOfRange { value, range } = error;
         let (side, limit) = if *value > range.max { (" above", range.max) } else { (" below", range.min) };
@@ -60,7 +61,7 @@ impl fmt::Display for Reason {
     }
 }
 
-/// A line that takes what fits.
+/// A line that drops the characters that do not fit.
 #[derive(Default)]
 struct Line {
     text: String<REASON_MAX>,
@@ -76,7 +77,7 @@ impl Line {
         self.is_cut |= self.text.push(c).is_err();
     }
 
-    /// Adds a number to four digits, or to one if it is very small or large.
+    /// Appends a number with four digits, or with one if it is very small or large.
     fn number(&mut self, number: f64) {
         if number < 0.0 {
             self.char('-');
@@ -101,10 +102,10 @@ impl Line {
         }
     }
 
-    /// Adds a number as a digit and a power of ten.
+    /// Appends a number as one digit and a power of ten.
     fn power(&mut self, mut size: f64) {
         let mut exponent = 0_i32;
-        // To where it rounds to a single digit. Exponents of f64 end at 308: the bound is for infinity.
+        // Scales the number until it rounds to a single digit. Exponents of f64 end at 308; the limit is for infinity.
         while size >= 9.5 && exponent < 400 {
             (size, exponent) = (size / 10.0, exponent + 1);
         }
@@ -148,8 +149,8 @@ mod tests {
     }
 
     proptest! {
-        /// What is written is the number, to four digits; to one where it is very small or large. It is as short as it
-        /// can be: no zeros at the end of a fraction, and none before the number.
+        /// A number is written with four digits, or with one if it is very small or large. There are no needless zeros
+        /// before it, or at the end of a fraction.
         #[test]
         fn numbers_are_written_as_they_are(mantissa in 1.0..10.0_f64, exponent in -12..13_i32, negative: bool) {
             let size = mantissa * 10.0_f64.powi(exponent);

@@ -1,4 +1,4 @@
-//! The parameters by name and by place.
+//! The table of parameters, by name and by index.
 
 use super::groups::{Key, Parameter};
 use super::reason::Reason;
@@ -7,10 +7,10 @@ use crate::flight::Prepared;
 use afbc_store::RecordName;
 use afbc_types::{Declaration, OutOfRange};
 
-/// The parameters of a vehicle: as its image has them, and as they are now.
+/// Parameters of a vehicle, with the firmware image's values and the present values.
 ///
-/// A value is an `f32`. Parameters of the configuration that are `f32` are what was set, to the bit; one in `f64` is
-/// the exact value of the `f32`, and read as the nearest; a switch is 0 or 1.
+/// A value is an `f32`. An `f32` in the configuration keeps every bit of the value that was set. An `f64` gets exactly
+/// this value, and is read as the nearest `f32`. A switch is 0 or 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterTable<const N: usize = 4> {
     image: Configuration<N>,
@@ -19,12 +19,12 @@ pub struct ParameterTable<const N: usize = 4> {
 }
 
 impl<const N: usize> ParameterTable<N> {
-    /// Makes a table in which every parameter is as in the image.
+    /// Creates a table with the image's values.
     pub fn new(image: Configuration<N>) -> Self {
         ParameterTable { count: image.parameters(), now: image.clone(), image }
     }
 
-    /// Returns the configuration to be flown, which makes a [`Flight`](crate::Flight) if the image's does.
+    /// Returns the configuration to fly. A [`Flight`](crate::Flight) accepts it if it accepts the image's.
     pub fn configuration(&self) -> &Configuration<N> {
         &self.now
     }
@@ -34,7 +34,7 @@ impl<const N: usize> ParameterTable<N> {
         self.count
     }
 
-    /// Returns every parameter, in order.
+    /// Returns all parameters, in order.
     pub fn iter(&self) -> impl Iterator<Item = Parameter> {
         (0..self.count).filter_map(|place| self.at(place))
     }
@@ -44,32 +44,32 @@ impl<const N: usize> ParameterTable<N> {
         self.now.parameter(Key::Name(name))
     }
 
-    /// Returns the parameter at `place`.
+    /// Returns the parameter at index `place`.
     pub fn at(&self, place: u16) -> Option<Parameter> {
         self.now.parameter(Key::Place(place))
     }
 
-    /// Returns the parameter called `name` as the image has it.
+    /// Returns the parameter called `name` with the image's value.
     pub fn default_of(&self, name: RecordName) -> Option<Parameter> {
         self.image.parameter(Key::Name(name))
     }
 
-    /// Returns the parameter at `place` as the image has it.
+    /// Returns the parameter at index `place` with the image's value.
     pub fn default_at(&self, place: u16) -> Option<Parameter> {
         self.image.parameter(Key::Place(place))
     }
 
-    /// Shows the declaration of every parameter, in the order of [`iter`](Self::iter), with the words of a choice or a
-    /// switch, from the smallest number of its range on.
+    /// Shows the declaration of every parameter, in the order of [`iter`](Self::iter). A choice or a switch comes with
+    /// its words, from the smallest number of its range on.
     pub fn show_declarations(&self, mut show: impl FnMut(&Declaration, &'static [&'static str])) {
         self.image.show_declarations(&mut show);
     }
 
-    /// Changes a parameter; returns it as it is then.
+    /// Changes a parameter. Returns the parameter with its new value.
     ///
     /// # Errors
-    /// The reason, and nothing has changed: no such parameter, a value out of its range, or one with which the vehicle
-    /// could not fly ([`Prepared::new`]).
+    /// The reason, with nothing changed: the parameter is unknown, the value is out of range, or the vehicle could not
+    /// fly with it ([`Prepared::new`]).
     pub fn set(&mut self, name: RecordName, value: f32) -> Result<Parameter, Reason> {
         let mut candidate = self.now.clone();
         let parameter = candidate.put(name, value)?;
@@ -78,10 +78,11 @@ impl<const N: usize> ParameterTable<N> {
         Ok(parameter)
     }
 
-    /// Changes one of several values, whatever the others are; to be followed by [`ParameterTable::check`].
+    /// Changes one of several parameters, without regard to the others. Call [`ParameterTable::check`] after the last
+    /// one.
     ///
     /// # Errors
-    /// The reason, and nothing has changed: no such parameter, or a value out of its range.
+    /// The reason, with nothing changed: the parameter is unknown, or the value is out of range.
     pub fn put(&mut self, name: RecordName, value: f32) -> Result<Parameter, Reason> {
         self.now.put(name, value)
     }
@@ -89,12 +90,12 @@ impl<const N: usize> ParameterTable<N> {
     /// Checks that the vehicle could fly.
     ///
     /// # Errors
-    /// Those of [`Prepared::new`].
+    /// The errors of [`Prepared::new`].
     pub fn check(&self) -> Result<(), OutOfRange> {
         Prepared::new(&self.now).map(drop)
     }
 
-    /// Makes every parameter as in the image.
+    /// Resets all parameters to the image's values.
     pub fn restore(&mut self) {
         self.now.clone_from(&self.image);
     }
