@@ -1,4 +1,4 @@
-//! The half of a host that decides: a vehicle with any number of rotors, its law and its parameters.
+//! The flying part of a host: a vehicle with any number of rotors, its law and its parameters.
 
 use crate::host_black_box::{HostBlackBox, Sink};
 use crate::metadata::MetadataFiles;
@@ -16,13 +16,13 @@ use afbc_station::{Calibrator, Comms, EscAction, EscReports, EscsHeard, RadioCon
 use afbc_store::RecordName;
 use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX};
 
-/// Makes the exact log, and what takes its bytes.
+/// The writer of the exact log, and the receiver of its bytes.
 pub(crate) struct ExactLog {
     pub(crate) recorder: Recorder,
     pub(crate) write: Sink,
 }
 
-/// A vehicle with any number of rotors.
+/// Interface to a vehicle with any number of rotors.
 pub(crate) trait Core {
     fn tick(
         &mut self,
@@ -34,7 +34,7 @@ pub(crate) trait Core {
 
     fn cross_check(&self, selector: &mut ImuSelector, readings: &Readings);
 
-    /// Goes on with a calibration, and shows stations what the sensors read.
+    /// Advances a calibration, and sends stations the sensors' readings.
     fn calibrate(
         &mut self,
         comms: &mut Comms,
@@ -43,29 +43,29 @@ pub(crate) trait Core {
         send: &mut dyn FnMut(&[u8]),
     );
 
-    /// Takes bytes of a radio receiver; returns what the pilot wants.
+    /// Takes bytes from a radio receiver. Returns the pilot's inputs.
     fn pilot(&mut self, comms: &mut Comms, radio: &mut RadioControl, bytes: &[u8]) -> Option<ControlInputs>;
 
-    /// Does what stations want of the parameters, and flies what has changed.
+    /// Executes the stations' parameter requests, and flies with a changed parameter.
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange>;
 
     /// Begins the black box's log.
     fn black_box(&self, start: &LogStart<'_>) -> BlackBox;
 
-    /// Returns the metadata of the vehicle called so.
+    /// Returns the metadata of the vehicle with this name.
     fn metadata(&self, vehicle: &str) -> MetadataFiles;
     /// Returns name and value of every parameter.
     fn parameter_values(&self) -> Vec<(RecordName, f32)>;
-    /// Returns what logs have of the time before a tick ([`Flight::before`]).
+    /// Returns the state before a tick that logs need ([`Flight::before`]).
     fn before(&self, messages: &ControlInputs) -> TickBefore;
-    /// Returns what logs have of the last tick ([`Flight::details`]).
+    /// Returns the details of the last tick for logs ([`Flight::details`]).
     fn details(&self, inputs: &TickInputs, before: &TickBefore, messages: &ControlInputs) -> TickDetails;
-    /// Returns AFBC's estimates, if it flies.
+    /// Returns AFBC's estimates, if AFBC flies.
     fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>>;
-    /// Flies on under this law, or the image's.
+    /// Changes to this law, or to the firmware's own.
     fn change_law(&mut self, law: FlownLaw) -> Result<(), OutOfRange>;
 
-    /// Logs the last tick, and a change of the parameters after it.
+    /// Logs the last tick, and a parameter change after it.
     fn log(
         &self,
         black_box: &mut HostBlackBox,
@@ -74,25 +74,25 @@ pub(crate) trait Core {
         change: Option<RecordChange>,
     );
 
-    /// Records the start, or a change, and returns the number of the configuration that it makes.
+    /// Records the start, or a parameter change. Returns the number of the new configuration.
     fn record(&self, log: &mut ExactLog, names: &[String; 2], change: Option<RecordChange>) -> Option<u16>;
 }
 
-/// A vehicle under a law, its parameters, and what makes it of them.
+/// A vehicle with its law and parameters.
 pub(crate) struct Aircraft<const N: usize> {
     pub(crate) flight: Flight<N, AnyController<N>>,
     pub(crate) table: ParameterTable<N>,
     pub(crate) law: FlownLaw,
-    /// The motor controllers' line.
+    /// Telemetry from the motor controllers' line.
     pub(crate) escs: EscReports,
 }
 
-/// What a tick that took so long exchanges with stations and motor controllers.
+/// Connections of a tick to stations and motor controllers, and the tick's duration.
 pub(crate) struct Exchange<'a> {
     pub(crate) comms: &'a mut Comms,
     pub(crate) tick_us: f32,
     pub(crate) send: &'a mut dyn FnMut(&[u8]),
-    /// What the motor controllers have told.
+    /// Data received from the motor controllers.
     pub(crate) escs: EscsHeard<'a>,
 }
 
@@ -107,7 +107,7 @@ impl<const N: usize> Core for Aircraft<N> {
         let report = self.flight.tick(now_us, inputs, readings);
         exchange.comms.report(&report, exchange.tick_us, exchange.send);
         let action = exchange.comms.escs(&mut self.escs, &exchange.escs, &report);
-        // Between two ticks, as on the board: the next one is the first to fly it.
+        // Applied between two ticks, as on the board: the next tick is the first with the new notch.
         action.notch.iter().for_each(|notch| self.flight.move_notch(notch));
         (report.padded(), action)
     }
@@ -134,7 +134,7 @@ impl<const N: usize> Core for Aircraft<N> {
         let Aircraft { flight, table, law, escs } = self;
         let change = comms.parameters(table, send)?;
         escs.adopt(table.configuration());
-        // Disarmed, and each change has been checked.
+        // Adopted at once, because the vehicle is disarmed and each change has been checked.
         let adopted = law.prepare(table.configuration()).is_ok_and(|prepared| flight.adopt(&prepared));
         debug_assert!(adopted, "a change that is not flown");
         Some(change)
@@ -201,14 +201,14 @@ impl<const N: usize> Core for Aircraft<N> {
 }
 
 impl<const N: usize> Aircraft<N> {
-    /// Returns the parameters beside those of an image, whose link has its declared defaults.
+    /// Returns the parameters relative to a firmware image whose link has the declared defaults.
     fn as_built(&self) -> ParameterTable<N> {
         let mut image = self.table.clone();
         image.restore();
         let image = Configuration { link: Link::DEFAULT, ..image.configuration().clone() };
         let mut table = ParameterTable::new(image);
         for parameter in self.table.iter() {
-            // They are in their ranges already.
+            // Accepted, because the values are in their ranges already.
             let _ = table.put(parameter.name, parameter.value);
         }
         table

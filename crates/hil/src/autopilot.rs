@@ -4,22 +4,23 @@ use super::Error;
 use afbc_onboard::Readings;
 use afbc_plant::Plant;
 
-/// Receives the link's bytes and answers with bytes.
+/// An autopilot, which exchanges bytes over the link.
 pub trait Autopilot {
-    /// Sets what the vehicle's own sensors read for the next [`exchange`](Self::exchange). False if these readings
-    /// cannot reach it.
+    /// Sets the vehicle's own sensor readings for the next [`exchange`](Self::exchange). Returns false if the readings
+    /// cannot reach the autopilot.
     fn sense(&mut self, _readings: &Readings) -> bool {
         false
     }
 
-    /// Lets the motor controllers of `plant` answer before the next [`exchange`](Self::exchange), if they reach it.
+    /// Lets the motor controllers of `plant` answer before the next [`exchange`](Self::exchange), if they are
+    /// connected.
     fn turn_rotors(&mut self, _plant: &Plant) {}
 
-    /// Runs one millisecond of the loop: sends `uplink`, and passes the bytes received to `hear`, in pieces of any
+    /// Runs one millisecond of the loop. Sends `uplink`, and passes the received bytes to `hear`, in pieces of any
     /// size.
     ///
     /// In lockstep this is one control tick, and `hear` gets its output. In real time it waits until the millisecond is
-    /// over, and `hear` gets what has arrived.
+    /// over, and `hear` gets the bytes received so far.
     ///
     /// # Errors
     /// If the autopilot has failed.

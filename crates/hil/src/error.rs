@@ -3,27 +3,27 @@
 use afbc_types::OutOfRange;
 use std::fmt;
 
-/// Why a flight did not start or was aborted; displayed as one line.
+/// Reasons why a flight did not start or was aborted. Each is displayed as one line.
 #[derive(Debug)]
 pub enum Error {
     /// The scenario needs a setting that the firmware does not have.
     Mismatch(&'static str),
-    /// The scenario has instruments, whose readings do not reach the vehicle.
+    /// The scenario has instruments whose readings cannot reach the vehicle.
     Unread,
-    /// The baud rate is too low for states that are fresh enough.
+    /// The baud rate is too low for sufficiently fresh states.
     Baud {
         /// Baud rate given \[baud\].
         given: u32,
-        /// Smallest baud rate possible \[baud\].
+        /// Smallest possible baud rate \[baud\].
         least: u32,
     },
-    /// No message from the vehicle can be read.
+    /// The vehicle sends no message that can be read.
     Silent,
-    /// The vehicle answers, but does not arm, with this reason.
+    /// The vehicle answers but does not arm, for this reason.
     NotArmed(String),
-    /// A parameter out of range.
+    /// A parameter is out of range.
     OutOfRange(OutOfRange),
-    /// The autopilot has failed, with this error.
+    /// The autopilot has failed with this error.
     Autopilot(Box<dyn std::error::Error + Send + Sync>),
     /// The log could not be written.
     Log(csv::Error),

@@ -18,22 +18,22 @@ impl Extremes {
         self.sum += value;
     }
 
-    /// Returns how many were added.
+    /// Returns the number of numbers added.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// Returns the minimum; 0 without numbers.
+    /// Returns the minimum, or 0 without any numbers.
     pub fn min(&self) -> f64 {
         self.min
     }
 
-    /// Returns the mean; 0 without numbers.
+    /// Returns the mean, or 0 without any numbers.
     pub fn mean(&self) -> f64 {
         self.sum / self.count.max(1) as f64
     }
 
-    /// Returns the maximum; 0 without numbers.
+    /// Returns the maximum, or 0 without any numbers.
     pub fn max(&self) -> f64 {
         self.max
     }

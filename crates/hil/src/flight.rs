@@ -1,4 +1,4 @@
-//! The closed loop over the link.
+//! Flies a scenario in a closed loop over the link.
 
 use super::{Autopilot, Error, MessagePeriods, ReceivedMessages, Station};
 use afbc::Profile;
@@ -12,44 +12,44 @@ use afbc_types::{Inputs, Parameters, Rotor, RotorForces, Setpoint};
 use core::ops::ControlFlow;
 use nalgebra::Vector3;
 
-/// Time between control ticks, and one step of the plant \[s\].
+/// Time between control ticks, which is also the plant's step \[s\].
 const STEP_S: f64 = 0.001;
-/// Interval of repeated requests to arm or disarm, until they are answered \[ms\].
+/// Interval at which arming or disarming is requested again, until there is an answer \[ms\].
 const ASK_EVERY_MS: u64 = 200;
-/// Longest time for arming \[ms\]. The vehicle first measures its tick rate for a second, and ignores for three seconds
-/// a sender whose clock was set back, as happens when this program is restarted.
+/// Longest time for arming \[ms\]. The vehicle first measures its tick rate for a second. For three seconds it ignores
+/// a sender whose clock was set back, as after a restart of this program.
 const ARM_WITHIN_MS: u64 = 6_000;
 /// Longest time for disarming \[ms\].
 const DISARM_WITHIN_MS: u64 = 1_000;
-/// Time without a rotor command after which the vehicle counts as gone \[ms\].
+/// Time without a rotor command after which the vehicle counts as silent \[ms\].
 const SILENT_MS: u64 = 500;
 
-/// End of a flight.
+/// Result of a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoopEnd {
-    /// When and why the vehicle was lost, if it was.
+    /// Time and reason of the vehicle's loss, if it was lost.
     pub lost: Option<Lost>,
-    /// True if the observer ended it.
+    /// True if the observer ended the flight.
     pub interrupted: bool,
     /// True if the vehicle has confirmed that its motors are off.
     pub disarmed: bool,
 }
 
-/// Returns the firmware's contender: AFBC in the profile `flight` for the vehicle of `scenario`, under its monitor.
+/// Returns the firmware's contender: AFBC with its monitor, in the profile `flight`, for the vehicle of `scenario`.
 ///
 /// # Errors
-/// One line on what is wrong with the gains in the vehicle's file.
+/// One line about a wrong gain in the vehicle's file.
 pub fn firmware(scenario: &Scenario) -> Result<Contender, FileError> {
     let afbc =
         Contender { name: "firmware".into(), ..Contender::of(ControllerKind::Afbc, Profile::Flight).monitored() };
     scenario.vehicle_file.as_ref().map_or(Ok(afbc.clone()), |vehicle| afbc.clone().on(vehicle, Profile::Flight))
 }
 
-/// Checks whether the firmware can fly `scenario`. The [`firmware`] has its own profile, which also replaces that of a
-/// scenario with unmodified gains and settings.
+/// Checks whether the firmware can fly `scenario`. The [`firmware`] has its own profile, which also replaces the
+/// profile of a scenario with unmodified gains and settings.
 ///
 /// # Errors
-/// [`Error::Mismatch`] names what differs in the firmware.
+/// [`Error::Mismatch`] names the difference from the firmware.
 pub fn check(scenario: &Scenario) -> Result<(), Error> {
     let afbc = scenario.contender(ControllerKind::Afbc);
     let any = |same: &dyn Fn(&Contender, Profile) -> bool| {
@@ -72,12 +72,12 @@ pub fn check(scenario: &Scenario) -> Result<(), Error> {
 
 /// Flies `scenario`, and passes every step from t = 0 to the end to `observe`.
 ///
-/// The vehicle is held at its start until it is armed, at t = 0. A step's [`Sample::action`] has only rotor speeds and
-/// forces, and the estimates are unknown. A vehicle that disarms in flight is lost. It is disarmed at the end in any
-/// case; after an error, the autopilot has to do so itself.
+/// The vehicle is held at its start until it is armed, at t = 0. A step's [`Sample::action`] only has rotor speeds and
+/// forces, and the law's estimates are unknown. A vehicle that disarms in flight is lost. At the end the vehicle is
+/// always disarmed; after an error, the autopilot itself has to disarm it.
 ///
-/// A vehicle with instruments and no tracker has a local frame of its own, and flies the reference from where it says
-/// that it stands. What is observed, motion and reference, is in the scenario's frame.
+/// A vehicle with instruments and no tracker has its own local frame. The reference is shifted to begin at the position
+/// that the vehicle reports. `observe` gets motion and reference in the scenario's frame.
 ///
 /// # Errors
 /// If the firmware cannot fly the scenario, the vehicle does not arm, or the autopilot fails.
@@ -107,7 +107,7 @@ pub fn fly(
     Ok(LoopEnd { lost: flight.lost, interrupted: flight.interrupted, disarmed })
 }
 
-/// A station connected to an autopilot, advanced by milliseconds.
+/// A station connected to an autopilot, advanced in milliseconds.
 struct Line<'a, A> {
     station: &'a mut Station,
     autopilot: &'a mut A,
@@ -115,19 +115,19 @@ struct Line<'a, A> {
     rotors: Vec<Rotor>,
     thrust_factor_n_s2: f32,
     now_ms: u64,
-    /// Time since the last rotor command.
+    /// Time since the last rotor command \[ms\].
     silent_ms: u64,
     has_armed: bool,
-    /// True if a tracker gives the vehicle its place in the scenario's frame.
+    /// True if the vehicle's local frame is the scenario's frame.
     is_placed: bool,
-    /// What the setpoints are shifted by \[m\].
+    /// Shift of the setpoints into the vehicle's local frame \[m\].
     shift_m: Vector3<f32>,
 }
 
 impl<A: Autopilot> Pilot for Line<'_, A> {
     type Error = Error;
 
-    /// The first step is the tick that arms the vehicle.
+    /// Runs one step. The first step is the tick that arms the vehicle.
     fn step(&mut self, world: &mut World) -> Result<Sample, Error> {
         let view = if self.has_armed { self.turn(world)? } else { self.arm(world)? };
         let speeds = self.station.heard().speeds;
@@ -142,7 +142,7 @@ impl<A: Autopilot> Pilot for Line<'_, A> {
 }
 
 impl<A: Autopilot> Line<'_, A> {
-    /// Runs one millisecond: sends what is due, and receives.
+    /// Runs one millisecond: sends the messages that are due, and receives.
     fn turn(&mut self, world: &mut World) -> Result<View, Error> {
         let Line { station, autopilot, pace, now_ms, silent_ms, has_armed, is_placed, shift_m, .. } = self;
         let view = world.look();
@@ -153,7 +153,7 @@ impl<A: Autopilot> Line<'_, A> {
         } else if let Some(state) = view.state.filter(|_| now_ms.is_multiple_of(pace.state_ms)) {
             station.track(*now_ms * 1000, state);
         }
-        // In a frame of its own it starts where it says that it stands, as for a pilot who reads its position.
+        // In its own local frame the vehicle starts at the position that it reports, just as a pilot would read it.
         if let Some(position_m) = station.heard().position_m.filter(|_| !*is_placed && !*has_armed) {
             *shift_m = position_m - view.motion.position_m.cast::<f32>();
         }
@@ -161,7 +161,7 @@ impl<A: Autopilot> Line<'_, A> {
             let setpoint = view.reference.setpoint();
             station.lead(Setpoint { position_m: setpoint.position_m + *shift_m, ..setpoint });
         }
-        // Its answer, or the question, may be lost.
+        // The request or its answer may be lost.
         if *silent_ms > 0 && silent_ms.is_multiple_of(ASK_EVERY_MS) {
             station.ask_for_rotors();
         }
@@ -177,7 +177,7 @@ impl<A: Autopilot> Line<'_, A> {
         if *silent_ms > SILENT_MS { Err(Error::Silent) } else { Ok(view) }
     }
 
-    /// Repeats `command` until it is `done` or `within_ms` is over; returns the view at the time when it was done.
+    /// Repeats `command` until it is `done` or `within_ms` have passed. Returns the view of the world when it was done.
     fn ask(
         &mut self,
         command: Command,
@@ -188,7 +188,7 @@ impl<A: Autopilot> Line<'_, A> {
         for waited_ms in 0..within_ms {
             if waited_ms.is_multiple_of(ASK_EVERY_MS) {
                 if command == Command::Arm {
-                    // It follows the setpoints as soon as it is armed.
+                    // The vehicle must follow setpoints as soon as it is armed.
                     self.station.follow();
                 }
                 self.station.command(command);
@@ -201,13 +201,13 @@ impl<A: Autopilot> Line<'_, A> {
         Ok(None)
     }
 
-    /// Arms a vehicle that is held, or that a previous run has left armed.
+    /// Arms the vehicle while it is held. First disarms it, if a previous run has left it armed.
     fn arm(&mut self, world: &mut World) -> Result<View, Error> {
         let is_silent = self.disarm(world)?;
         while world.stands() {
             self.turn(world)?;
         }
-        // Its own sensors stand still from t = 0 until it flies.
+        // Own sensors leave 5 ms: their time does not advance from t = 0 until the vehicle flies.
         let within_ms = if world.readings().is_some() { 5 } else { ARM_WITHIN_MS };
         if is_silent && let Some(view) = self.ask(Command::Arm, world, within_ms, |heard| heard.armed)? {
             self.has_armed = true;
@@ -217,10 +217,10 @@ impl<A: Autopilot> Line<'_, A> {
         Err(Error::NotArmed(reason.into()))
     }
 
-    /// True if the vehicle confirms that it has disarmed.
+    /// Disarms the vehicle. Returns true if the vehicle confirms it.
     fn disarm(&mut self, world: &mut World) -> Result<bool, Error> {
         let done = |heard: &ReceivedMessages| heard.answer == Some(Answer::Accepted) && !heard.armed;
-        // By force, since a plain disarm is refused in the air.
+        // Uses the kill command, since a plain disarm is refused in the air.
         Ok(self.ask(Command::Kill, world, DISARM_WITHIN_MS, done)?.is_some())
     }
 }

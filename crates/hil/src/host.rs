@@ -1,4 +1,4 @@
-//! The firmware's code in this process.
+//! Runs the firmware's code in this process.
 
 use super::{Autopilot, Error};
 use crate::aircraft::{Aircraft, Core, ExactLog, Exchange};
@@ -34,31 +34,31 @@ pub struct Host {
     setup: Setup,
     comms: Comms,
     inputs: ControlInputs,
-    /// What the last tick took of it, and what was before that tick.
+    /// Inputs that the last tick took from messages, and the state before that tick, for logs.
     taken: ControlInputs,
     before: TickBefore,
-    /// What the last tick took beside.
+    /// Other inputs of the last tick.
     took: TickInputs,
     readings: Readings,
     radio: Box<RadioControl>,
-    /// What has come over the motor controllers' line since the last tick.
+    /// Bytes from the motor controllers' line since the last tick.
     escs: Vec<u8>,
-    /// Rotor whose motor controller the last tick has asked.
+    /// Rotor whose motor controller the last tick has asked for telemetry.
     asks_esc: Option<u8>,
-    /// Electrical speeds that the motor controllers have answered \[rev/min\].
+    /// Electrical speeds in the motor controllers' answers \[rev/min\].
     answers_rev_min: [Option<u32>; ROTORS_MAX],
     simulated_escs: SimulatedEscs,
     calibrator: Box<Calibrator>,
-    /// What the sensors have read while somebody wants to know.
+    /// Sums of the sensors' readings, while a calibration needs them.
     raw: RawReadings,
-    /// What the next tick takes that is known before: its number, and what has changed since the last one.
+    /// Known inputs of the next tick: its number, and changes since the last tick.
     next: TickInputs,
-    /// The exact log of it all, if it is kept.
+    /// The exact log, if it is kept.
     log: Option<ExactLog>,
     black_box: Option<HostBlackBox>,
-    /// Where fixes of a GNSS receiver are measured from, for logs.
+    /// Geographic origin of the GNSS fixes, for logs.
     origin: Option<Origin>,
-    /// What it serves of files, if it does.
+    /// File transfers and the served files, if files are served.
     files: Option<Box<(Transfers<OpenFile>, ServedFiles)>>,
     /// Names of vehicle and law.
     names: [String; 2],
@@ -77,11 +77,11 @@ pub struct HostTick {
     pub report: Report<ROTORS_MAX>,
     /// Bytes sent over the link.
     pub bytes: Vec<u8>,
-    /// A parameter that has changed, to be kept.
+    /// A parameter change, to be stored.
     pub change: Option<RecordChange>,
-    /// What of the link's signatures is to be kept.
+    /// State of message signing, to be stored.
     pub signing: Option<SigningRecord>,
-    /// Rotor, from 0, whose motor controller is asked for its telemetry with this tick's frames.
+    /// Rotor, from 0, whose motor controller is asked for telemetry with this tick's frames.
     pub asks_esc: Option<u8>,
 }
 
@@ -94,18 +94,18 @@ impl Host {
         Self::linked(None, Link::DEFAULT)
     }
 
-    /// The firmware of this vehicle, powered up, disarmed.
+    /// Creates the firmware of this vehicle, powered up and disarmed.
     ///
     /// # Errors
-    /// The first parameter out of range; none in fact, for a vehicle is checked when its file is read.
+    /// The first parameter out of range. Does not occur, for a vehicle is checked when its file is read.
     pub fn for_vehicle(vehicle: &Vehicle) -> Result<Self, OutOfRange> {
         Self::linked(Some(vehicle), Link::DEFAULT)
     }
 
-    /// The firmware of this vehicle, or of the paper's, powered up, with these defaults of the link's parameters.
+    /// Creates the firmware of this vehicle, or of the paper's, with these defaults of the link's parameters.
     ///
     /// # Errors
-    /// As of [`for_vehicle`](Self::for_vehicle).
+    /// The same as for [`for_vehicle`](Self::for_vehicle).
     pub fn linked(vehicle: Option<&Vehicle>, link: Link) -> Result<Self, OutOfRange> {
         let Some(vehicle) = vehicle else {
             return Self::image(ParameterTable::new(Configuration { link, ..Configuration::default() }), PAPER);
@@ -115,7 +115,8 @@ impl Host {
         })
     }
 
-    /// The firmware of this vehicle under another law, without a monitor: no image has it, but it is the same code.
+    /// Creates the firmware of this vehicle under another law, without a monitor. No firmware image has this law, but
+    /// the other code is the same.
     ///
     /// # Errors
     /// The first parameter or gain out of range.
@@ -126,11 +127,11 @@ impl Host {
         })
     }
 
-    /// The same with the parameters and the key of signatures that are in `store`; `notice` is called with a line on
-    /// each that is not used. Without a store that can be read, they are at their defaults.
+    /// Creates the firmware as [`linked`](Self::linked) does, with the parameters and the signing key from `store`.
+    /// Calls `notice` with a line for each value that is not used. If the store cannot be read, defaults are used.
     ///
     /// # Errors
-    /// As of [`for_vehicle`](Self::for_vehicle).
+    /// The same as for [`for_vehicle`](Self::for_vehicle).
     pub fn stored(
         vehicle: Option<&Vehicle>,
         link: Link,
@@ -149,7 +150,7 @@ impl Host {
         Ok(host)
     }
 
-    /// Creates what an image is.
+    /// Creates a host that corresponds to a firmware image.
     fn image<const N: usize>(table: ParameterTable<N>, vehicle: &str) -> Result<Self, OutOfRange> {
         Self::of(table, FlownLaw(None), [vehicle, ControllerKind::Afbc.name()])
     }
@@ -183,12 +184,12 @@ impl Host {
         })
     }
 
-    /// Returns how its link is set up: at first, by the parameters.
+    /// Returns the setup of the link, at first as the parameters set it.
     pub fn setup(&self) -> Setup {
         self.setup
     }
 
-    /// The same firmware, freshly powered up, with this setup of its link.
+    /// Changes the link's setup, as if the firmware had just been powered up.
     #[must_use]
     pub fn with(self, setup: Setup) -> Self {
         let mut comms = Comms::with(setup);
@@ -196,36 +197,36 @@ impl Host {
         Host { setup, comms, ..self }
     }
 
-    /// True if frames need a signature.
+    /// Returns true if messages need a signature.
     pub fn needs_signatures(&self) -> bool {
         self.comms.signing().is_on()
     }
 
-    /// Returns the half that communicates.
+    /// Returns the communication services.
     pub fn comms(&mut self) -> &mut Comms {
         &mut self.comms
     }
 
-    /// Returns the items of the mission and of the geofence, as stations have uploaded them.
+    /// Returns the items of the mission and of the geofence that stations have uploaded.
     pub fn plan(&self) -> [&[MissionItem]; 2] {
         self.comms.plan()
     }
 
-    /// Returns what logs have of the last tick.
+    /// Returns the details of the last tick for logs.
     pub fn details(&self) -> TickDetails {
         self.flight.details(&self.took, &self.before, &self.taken)
     }
 
-    /// Returns AFBC's estimates in this or the last flight, if it flies.
+    /// Returns AFBC's estimates in the present or last flight, if AFBC flies.
     pub fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>> {
         self.flight.estimates()
     }
 
-    /// Flies on under this law, or under the image's own with its monitor, from the next tick on, armed or not: it
-    /// begins afresh, as after arming. An exact log does not know of it.
+    /// Changes to this law from the next tick on, even while armed. None means the firmware's own law with its monitor.
+    /// The new law starts as after arming. An exact log does not record the change.
     ///
     /// # Errors
-    /// The first gain out of range; nothing has changed then.
+    /// The first gain out of range. Then nothing has changed.
     pub fn change_law(&mut self, law: Option<Law>) -> Result<(), OutOfRange> {
         self.flight.change_law(FlownLaw(law))?;
         let [_, name] = &mut self.names;
@@ -238,21 +239,21 @@ impl Host {
         self.flight.parameter_values()
     }
 
-    /// Returns the metadata of its parameters, as stations download it.
+    /// Returns the parameters' metadata files, as stations download them.
     pub fn metadata(&self) -> MetadataFiles {
         let [vehicle, _] = &self.names;
         self.flight.metadata(vehicle)
     }
 
-    /// Keeps an exact log ([`afbc_log::exact`]) from now on, before the first tick; `write` takes its bytes.
+    /// Starts an exact log ([`afbc_log::exact`]). Call it before the first tick. `write` gets the log's bytes.
     pub fn record(&mut self, write: impl FnMut(&[u8]) + 'static) {
         let mut log = ExactLog { recorder: Recorder::default(), write: Box::new(write) };
         self.flight.record(&mut log, &self.names, None);
         self.log = Some(log);
     }
 
-    /// Keeps a black box's log ([`afbc_log::ulog`]) from now on, before the first tick; `write` takes its bytes. Fixes
-    /// of a GNSS receiver are measured from `origin`, if that is known.
+    /// Starts a black box ([`afbc_log::ulog`]). Call it before the first tick. `write` gets the log's bytes. `origin`
+    /// is the geographic origin of GNSS fixes, if it is known.
     pub fn log(&mut self, origin: Option<Origin>, write: impl FnMut(&[u8]) + 'static) {
         self.origin = origin;
         self.black_box = Some(self.new_black_box(Some(Box::new(write))));
@@ -262,8 +263,8 @@ impl Host {
         new_black_box(&*self.flight, &self.names, self.origin, write)
     }
 
-    /// Serves its metadata, these logs, and the log of a black box while it is made, to stations, from now on. Fixes
-    /// are measured from `origin`, as for [`log`](Self::log).
+    /// Starts to serve files to stations: the metadata, these logs, and a black box streamed as it is written. `origin`
+    /// is as for [`log`](Self::log).
     pub fn serve_files(&mut self, origin: Option<Origin>, logs: Option<StoredLogs>) {
         self.origin = origin;
         let [vehicle, _] = &self.names;
@@ -271,7 +272,7 @@ impl Host {
         self.files = Some(Box::new((Transfers::new(Some(general)), ServedFiles::new(logs, files))));
     }
 
-    /// Takes what messages have brought.
+    /// Merges inputs from messages, and records them.
     fn merge(&mut self, news: &ControlInputs) {
         self.inputs.merge(news);
         if let Some(ExactLog { recorder, write }) = &mut self.log {
@@ -279,7 +280,7 @@ impl Host {
         }
     }
 
-    /// Receives, for the next tick, the next bytes of one of several streams, each with a decoder of its own.
+    /// Receives bytes for the next tick from one of several streams. Each stream has its own decoder.
     pub fn hear(&mut self, decoder: &mut Decoder<Uplink>, bytes: &[u8]) {
         self.comms.exchange(decoder);
         let news = self.receive(bytes);
@@ -294,21 +295,21 @@ impl Host {
         }
     }
 
-    /// Receives, for the next tick, the next bytes of a radio receiver.
+    /// Receives bytes from a radio receiver for the next tick.
     pub fn hear_radio(&mut self, bytes: &[u8]) {
         if let Some(news) = self.flight.pilot(&mut self.comms, &mut self.radio, bytes) {
             self.merge(&news);
         }
     }
 
-    /// Receives, for the next tick, the next bytes of the motor controllers' line ([`HostTick::asks_esc`]); they count
-    /// while `DSHOT_TEL_CFG` is set.
+    /// Receives bytes from the motor controllers' line for the next tick ([`HostTick::asks_esc`]). They are ignored
+    /// unless `DSHOT_TEL_CFG` is set.
     pub fn hear_escs(&mut self, bytes: &[u8]) {
         self.escs.extend_from_slice(bytes);
     }
 
-    /// Lets simulated motor controllers answer the question of the last tick, which the rotors of `plant` have turned
-    /// for, and its frame, by bidirectional DSHOT; in place of [`hear_escs`](Self::hear_escs).
+    /// Lets simulated motor controllers answer the last tick's telemetry request, and its frames by bidirectional
+    /// DSHOT, with the rotor speeds of `plant`. Replaces [`hear_escs`](Self::hear_escs).
     pub fn hear_simulated_escs(&mut self, plant: &Plant) {
         if let Some(answer) = self.simulated_escs.step(self.asks_esc.take(), plant) {
             self.hear_escs(&answer);
@@ -316,7 +317,7 @@ impl Host {
         self.answers_rev_min = self.simulated_escs.answers_rev_min(plant);
     }
 
-    /// Sets what the vehicle's own sensors read for the next tick alone.
+    /// Sets the readings of the vehicle's own sensors for the next tick only.
     pub fn sense(&mut self, readings: &Readings) {
         self.readings = *readings;
     }
@@ -326,7 +327,7 @@ impl Host {
         self.flight.cross_check(selector, readings);
     }
 
-    /// Runs one control tick at `time_us` since power-up, after `uplink` has reached the link. The tick reports a
+    /// Runs one control tick at `time_us` since power-up, after the link has received `uplink`. The tick reports a
     /// duration of `tick_us`.
     pub fn tick(&mut self, uplink: &[u8], time_us: u64, tick_us: f32) -> HostTick {
         let news = self.receive(uplink);
@@ -341,12 +342,12 @@ impl Host {
         let heard = EscsHeard { bytes: &escs, speeds_rev_min: core::mem::take(&mut self.answers_rev_min) };
         let exchange = Exchange { comms: &mut self.comms, tick_us, send: &mut send, escs: heard };
         let (report, action) = self.flight.tick(time_us, &mut self.taken, &readings, exchange);
-        // Before anything changes that it would show.
+        // Taken before anything changes that the details contain.
         let details = (self.black_box.is_some() || self.files.is_some()).then(|| self.details());
         if let Some(ExactLog { recorder, write }) = &mut self.log {
             recorder.tick(&self.took, &report, write);
         }
-        // What this tick has moved counts from the next one on.
+        // The next tick is the first with the moved notch.
         let notch_rad_s = action.notch.map(|notch| notch.centre_rad_s());
         self.next = TickInputs { number: self.next.number, notch_rad_s, ..TickInputs::default() };
         if self.comms.takes_samples() {
@@ -374,18 +375,18 @@ impl Host {
             self.flight.log(stream, tick, self.comms.esc_telemetry(), change);
             stream.sent(time_us, &bytes);
         }
-        // Before what follows is merged, which is of the next tick.
+        // Incremented before the following inputs are merged, which belong to the next tick.
         self.next.number = self.next.number.wrapping_add(1);
         if let Some(news) = &action.inputs {
             self.merge(news);
         }
-        // Notices that there are none.
+        // Lets the radio services notice a silent receiver.
         self.hear_radio(&[]);
         self.asks_esc = action.ask;
         HostTick { report, bytes, change, signing: self.comms.signing_record(), asks_esc: action.ask }
     }
 
-    /// Runs the tick a millisecond after the previous one, with a duration of zero.
+    /// Runs the tick one millisecond after the previous one, with a reported duration of zero.
     pub fn next_tick(&mut self, uplink: &[u8]) -> HostTick {
         self.tick(uplink, self.took.time_us + PERIOD_US, 0.0)
     }
@@ -397,7 +398,7 @@ fn new_black_box(flight: &dyn Core, names: &[String; 2], origin: Option<Origin>,
     HostBlackBox::new(log, origin, write)
 }
 
-/// Returns the parameters with what is in `store`.
+/// Returns the parameters with the values in `store`.
 fn loaded<const N: usize>(
     image: Configuration<N>,
     store: &mut Store<Flash>,

@@ -1,4 +1,4 @@
-//! The black box of a host: its ring, emptied after every tick, or by whoever streams it.
+//! The black box of a host. Its ring is emptied after every tick, or by the stream to a station.
 
 use afbc_estimator::Origin;
 use afbc_link::{Address, Decoder, Downlink};
@@ -7,23 +7,23 @@ use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{EscTelemetry, TickRecord};
 use afbc_types::ROTORS_MAX;
 
-/// Bytes that wait for the end of a tick, at most: more than a log's beginning and a tick.
+/// Size of the ring: more than a log's beginning and one tick.
 const RING: usize = 1 << 16;
-/// Who reads the vehicle's texts: a listener that sends nothing.
+/// Address of the decoder for the vehicle's texts, which never sends anything.
 const LISTENER: Address = Address { system: 255, component: 190 };
 
-/// What takes the bytes of a log.
+/// Receiver of a log's bytes.
 pub(crate) type Sink = Box<dyn FnMut(&[u8])>;
 
-/// Makes the log of a host, and hands its bytes over, or keeps them for a station that gets them as a stream.
+/// Writes the log of a host. Hands its bytes over, or keeps them for a station that gets them as a stream.
 pub(crate) struct HostBlackBox {
     log: BlackBox,
     ring: Box<LogRing<RING>>,
-    /// None: they stay in the ring.
+    /// Receiver of the bytes; none if they stay in the ring.
     write: Option<Sink>,
-    /// Where fixes of a GNSS receiver are measured from.
+    /// Geographic origin of the GNSS fixes.
     origin: Option<Origin>,
-    /// Reads the texts that the vehicle sends.
+    /// Decodes the texts that the vehicle sends.
     decoder: Decoder<Downlink>,
 }
 
@@ -43,17 +43,17 @@ impl HostBlackBox {
         self.log.tick(tick, &beside, table, &mut self.ring);
     }
 
-    /// Logs a change of the parameters.
+    /// Logs a parameter change.
     pub(crate) fn change<const N: usize>(&mut self, table: &ParameterTable<N>, change: RecordChange) {
         self.log.change(table, change, &mut self.ring);
     }
 
-    /// Logs the texts among what was sent after a tick, and hands over all that waits.
+    /// Logs the texts among the bytes sent after a tick, and hands over all waiting bytes.
     pub(crate) fn sent(&mut self, now_us: u64, bytes: &[u8]) {
         let Self { log, ring, write, decoder, .. } = self;
         decoder.feed_accepted(
             bytes,
-            // Signed ones, too: they are the vehicle's own.
+            // Accepts signed messages, too: they are the vehicle's own.
             |_| true,
             |_, message| {
                 if let Downlink::Text { severity, text } = message {
@@ -62,7 +62,7 @@ impl HostBlackBox {
             },
         );
         let Some(write) = write else { return };
-        // In two pieces, where the bytes go round the end of the ring.
+        // Takes two passes if the bytes wrap around the end of the ring.
         while !ring.is_empty() {
             let front = ring.front();
             write(front);
@@ -71,7 +71,7 @@ impl HostBlackBox {
         }
     }
 
-    /// Returns bytes that wait, and removes so many of them.
+    /// Returns waiting bytes. Remove them by [`consume`](Self::consume).
     pub(crate) fn waiting(&self) -> &[u8] {
         self.ring.front()
     }

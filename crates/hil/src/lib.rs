@@ -1,16 +1,16 @@
-//! Flights with the firmware, or a replacement for it, as autopilot: the plant here, the law there, connected by the
-//! bytes of [`afbc_link`] only.
+//! Flies scenarios with the firmware, or a replacement for it, as autopilot. The plant is on this side and the law on
+//! the other. Only the bytes of [`afbc_link`] connect them.
 //!
 //! # Reading order
 //!
 //! 1. [`Autopilot`]: receives and sends bytes once per millisecond.
 //! 2. [`Host`]: the firmware's code in this process. Other implementations are an emulated processor, and a board on a
-//!    serial port.
+//!   serial port.
 //! 3. [`Station`]: tracker, commander and ground station, at the other end of the link.
 //! 4. [`fly()`]: arms, releases the vehicle, flies a scenario, disarms. [`MessagePeriods`] sets the message rates.
 //!
-//! The firmware has the paper's vehicle and its own law ([`firmware`]); a scenario with others is refused ([`check`]).
-//! Plant, gusts, true parameters, start and trajectory are the scenario's.
+//! The firmware has the paper's vehicle and its own law ([`firmware`]). A scenario with another vehicle or law is
+//! refused ([`check`]). Plant, gusts, true parameters, start and trajectory come from the scenario.
 #![forbid(unsafe_code)]
 
 mod aircraft;

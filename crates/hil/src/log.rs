@@ -1,4 +1,4 @@
-//! CSV log of a flight in the loop.
+//! Writes the CSV log of a flight in the loop.
 
 use super::Error;
 use afbc_files::BackgroundWriter;

@@ -7,14 +7,14 @@ use std::io;
 use std::rc::Rc;
 use std::time::Duration;
 
-/// Bytes after which the file has all that was logged: about a second.
+/// Number of bytes gathered before they go to the file: about a second of a log.
 const FLUSH_BYTES: usize = 1 << 16;
 /// Most bytes that wait for a slow disk: some minutes of a flight in real time.
 const ROOM: usize = 1 << 23;
-/// Time in which a live log must be on the disk after its end.
+/// Longest time for writing the rest of a live log at its end.
 const END_MAX: Duration = Duration::from_secs(10);
 
-/// A file with the log of one host after another: of a vehicle that may be restarted. After a failure nothing more is
+/// A file with the logs of consecutive hosts, as of a vehicle that is restarted. After a failure, nothing more is
 /// written.
 #[derive(Clone, Debug)]
 pub struct LogFile(Rc<RefCell<Open>>);
@@ -22,43 +22,44 @@ pub struct LogFile(Rc<RefCell<Open>>);
 #[derive(Debug)]
 struct Open {
     out: BackgroundWriter,
-    /// Bytes that are yet to be handed over.
+    /// Bytes not yet handed to the writer.
     gathered: Vec<u8>,
-    /// True if the log ends rather than wait for the disk.
+    /// True if a slow disk ends the log, instead of delaying the flight.
     is_live: bool,
     /// True once the disk was too slow.
     is_overrun: bool,
-    /// True once there is nothing more to write, and nobody has to be told.
+    /// True once the failure was reported, or the log was finished.
     is_told: bool,
 }
 
 impl LogFile {
-    /// Creates the file, where there must be none.
+    /// Creates the file. The file must not exist yet.
     ///
     /// # Errors
-    /// If it cannot be created, or is there.
+    /// If the file exists or cannot be created.
     pub fn create(output: &Output) -> Result<Self, Error> {
         Self::to(output.create()?).map_err(|error| output.unwritten(&error))
     }
 
-    /// Writes to a file that is open.
+    /// Writes to an open file.
     ///
     /// # Errors
-    /// If the system has no thread for it.
+    /// If the system cannot start a thread for it.
     pub fn to(file: File) -> io::Result<Self> {
         let out = BackgroundWriter::new(file, ROOM)?;
         let open = Open { out, gathered: Vec::new(), is_live: false, is_overrun: false, is_told: false };
         Ok(LogFile(Rc::new(RefCell::new(open))))
     }
 
-    /// The same of a flight that goes on by itself: it waits for no disk, and the log ends where one is too slow.
+    /// Makes the log live, for a flight in real time: it never waits for the disk, and ends if the disk is too slow.
     #[must_use]
     pub fn live(self) -> Self {
         self.0.borrow_mut().is_live = true;
         self
     }
 
-    /// Returns what takes the bytes of a host ([`Host::record`](crate::Host::record), [`Host::log`](crate::Host::log)).
+    /// Returns a receiver for a host's log bytes ([`Host::record`](crate::Host::record),
+    /// [`Host::log`](crate::Host::log)).
     pub fn sink(&self) -> impl FnMut(&[u8]) + 'static {
         let open = Rc::clone(&self.0);
         move |bytes| {
@@ -70,7 +71,7 @@ impl LogFile {
         }
     }
 
-    /// Returns why the log has ended early, once.
+    /// Returns the reason why the log ended early. Reports it only once.
     pub fn take_failure(&self) -> Option<String> {
         let mut open = self.0.borrow_mut();
         let failure = open.failure().filter(|_| !open.is_told);
@@ -78,22 +79,22 @@ impl LogFile {
         failure.map(|error| error.to_string())
     }
 
-    /// Lets what is left be written, without waiting for it.
+    /// Hands the rest to the writer, without waiting for it.
     pub(crate) fn close(&self) {
         let mut open = self.0.borrow_mut();
         open.hand_over();
         open.out.close();
     }
 
-    /// True once nothing is left to be written of a log that was [closed](Self::close).
+    /// Returns true once a [closed](Self::close) log is written completely.
     pub(crate) fn is_over(&self) -> bool {
         self.0.borrow().out.is_over()
     }
 
-    /// Writes what is left.
+    /// Writes the rest.
     ///
     /// # Errors
-    /// If that, or anything before it, could not be written.
+    /// If the rest, or anything before, could not be written.
     pub fn finish(&self) -> io::Result<()> {
         let mut open = self.0.borrow_mut();
         open.hand_over();
@@ -111,7 +112,7 @@ impl Drop for Open {
 
 impl Open {
     fn hand_over(&mut self) {
-        // After a gap nothing more: what follows could not be read.
+        // Writes nothing after a gap: it could not be read.
         if !self.is_overrun && !self.gathered.is_empty() {
             if !self.is_live {
                 self.out.wait_for_room(self.gathered.len());

@@ -1,6 +1,6 @@
-//! What a vehicle tells stations of itself: MAVLink's component metadata, as files.
+//! Describes a vehicle to stations: files of MAVLink's component metadata.
 //!
-//! <https://mavlink.io/en/services/component_information.html>; QGroundControl reads version 1 of both files.
+//! See <https://mavlink.io/en/services/component_information.html>. QGroundControl reads version 1 of both files.
 
 use afbc_link::ComponentMetadata;
 use afbc_onboard::parameters::{Kind, Parameter, ParameterTable};
@@ -8,24 +8,24 @@ use afbc_station::services::ftp::crc32;
 use afbc_types::Declaration;
 use serde_json::{Map, Value, json};
 
-/// The files of a vehicle's metadata.
+/// The metadata files of a vehicle.
 #[derive(Clone, Debug)]
 pub struct MetadataFiles {
-    /// Name and contents of each.
+    /// Name and content of each file.
     pub files: Vec<(String, Vec<u8>)>,
-    /// Where the first of them is.
+    /// Location and checksum of the first file, for stations.
     pub general: ComponentMetadata,
 }
 
 const GENERAL: &str = "general.json";
 const PARAMETERS: &str = "parameters.json";
-/// `COMP_METADATA_TYPE_PARAMETER`.
+/// MAVLink's `COMP_METADATA_TYPE_PARAMETER`.
 const PARAMETER_TYPE: u8 = 1;
-/// Digits of a default value that are shown.
+/// Number of significant digits in a shown default value.
 const DIGITS: i32 = 4;
 
 impl MetadataFiles {
-    /// The metadata of a vehicle called so with these parameters.
+    /// Returns the metadata of a vehicle with this name and these parameters.
     pub fn new<const N: usize>(vehicle: &str, table: &ParameterTable<N>) -> Self {
         let parameters = parameters(table).to_string().into_bytes();
         let general = json!({
@@ -62,7 +62,7 @@ fn described(parameter: &Parameter, declaration: &Declaration, words: &[&str]) -
     let mut described = Map::new();
     let mut put = |key: &str, value: Value| described.insert(key.into(), value);
     let is_whole = parameter.kind == Kind::Int32;
-    // As short as the f32 is written; a whole number without a fraction.
+    // Uses the shortest digits of the f32; a whole number has no fraction.
     let default = parameter.value.to_string().parse::<f64>().unwrap_or_default();
     let number = |number: f64| if is_whole { json!(number as i64) } else { json!(number) };
     put("name", json!(name));
@@ -79,11 +79,11 @@ fn described(parameter: &Parameter, declaration: &Declaration, words: &[&str]) -
     if !["", "1", "number"].contains(unit) {
         put("units", json!(unit));
     }
-    // The digits of zero cannot be counted: those of the range are.
+    // For a default of zero, derives the decimals from the range instead.
     if !is_whole {
         put("decimalPlaces", json!(decimals(if default == 0.0 { range.max.min(1.0) } else { default })));
     }
-    // A declaration says so in words alone.
+    // A declaration says only in its text that a change needs a restart.
     if meaning.contains("from the next start on") {
         put("rebootRequired", json!(true));
     }
@@ -94,7 +94,7 @@ fn described(parameter: &Parameter, declaration: &Declaration, words: &[&str]) -
     Value::Object(described)
 }
 
-/// Returns the decimal places with which a number has [`DIGITS`] digits, two at least.
+/// Returns the number of decimals that shows [`DIGITS`] significant digits, at least two.
 fn decimals(number: f64) -> i32 {
     let exponent = number.abs().log10().floor();
     (DIGITS - 1 - exponent as i32).clamp(2, 15)

@@ -2,17 +2,17 @@
 
 use super::Error;
 
-/// Sizes of the frames of a state, a setpoint and a question \[bytes\].
+/// Frame lengths of a state, a setpoint and a ping \[bytes\].
 const STATE_BYTES: u64 = 242;
 const SETPOINT_BYTES: u64 = 65;
 const PING_BYTES: u64 = 45;
 /// Start bit, eight data bits, stop bit.
 const BITS_PER_BYTE: u64 = 10;
-/// Share of the line that is used; the rest lets a backlog drain \[%\].
+/// Share of the line's capacity that is used; the rest lets a backlog drain \[%\].
 const LINE_USE_PERCENT: u64 = 90;
-/// Longest time between states \[ms\]: half of the age at which they are stale.
+/// Longest time between states \[ms\]: half of the age at which a state counts as stale.
 const STATE_PERIOD_MAX_MS: u64 = 10;
-/// Time between setpoints, and between questions, on a serial line \[ms\].
+/// Time between setpoints, and between pings, on a serial line \[ms\].
 const SETPOINT_PERIOD_MS: u64 = 10;
 const PING_PERIOD_MS: u64 = 100;
 
@@ -23,15 +23,15 @@ pub struct MessagePeriods {
     pub state_ms: u64,
     /// Period of setpoints.
     pub setpoint_ms: u64,
-    /// Period of questions that measure the round trip, if any.
+    /// Period of pings that measure the round trip, if any.
     pub ping_ms: Option<u64>,
 }
 
 impl MessagePeriods {
-    /// Both in every control tick, as without a link.
+    /// State and setpoint in every control tick, as without a link.
     pub const LOCKSTEP: MessagePeriods = MessagePeriods { state_ms: 1, setpoint_ms: 1, ping_ms: None };
 
-    /// Returns the rates for a serial line of `baud`: as many states as possible, with a period in whole milliseconds.
+    /// Returns the periods for a serial line of `baud`: states as often as possible, at a period of whole milliseconds.
     ///
     /// # Errors
     /// [`Error::Baud`] if the period of states would exceed 10 ms.
@@ -55,7 +55,7 @@ impl MessagePeriods {
     }
 }
 
-/// Returns the bytes per second of setpoints and questions.
+/// Returns the bytes per second of setpoints and pings.
 const fn other_bytes_per_s() -> u64 {
     SETPOINT_BYTES * 1000 / SETPOINT_PERIOD_MS + PING_BYTES * 1000 / PING_PERIOD_MS
 }

@@ -1,11 +1,10 @@
-//! Where on the earth a simulated flight is.
+//! Geographic position of a simulated flight.
 
 use afbc_estimator::Origin;
 use afbc_scenario::Scenario;
 use afbc_station::services::origin::{EarthOrigin, Global};
 
-/// Returns the place that fixes of a scenario's GNSS receiver are measured from; none without a receiver: indoors
-/// nobody knows.
+/// Returns the geographic origin of a scenario's GNSS fixes, or none for a scenario without a GNSS receiver.
 #[must_use]
 pub fn place(scenario: &Scenario) -> Option<Origin> {
     let Global { latitude_deg, longitude_deg, altitude_m } = EarthOrigin::SIMULATED;

@@ -1,4 +1,4 @@
-//! Tracking errors for the terminal.
+//! Prints tracking errors on the terminal.
 
 use afbc_sim::metrics::{Metrics, SETTLED_S};
 use nalgebra::Vector4;

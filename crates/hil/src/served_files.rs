@@ -1,4 +1,4 @@
-//! What a host serves of files: the component's metadata in `/etc`, its logs in `/log`, and the log that is streamed.
+//! Files that a host serves to stations: metadata in `/etc`, logs in `/log`, and a streamed log.
 
 use crate::host_black_box::HostBlackBox;
 use crate::stored_logs::StoredLogs;
@@ -12,48 +12,49 @@ use std::rc::Rc;
 use std::task::Poll;
 use std::time::UNIX_EPOCH;
 
-/// Directory of the metadata, and of the logs.
+/// Directories of the metadata and of the logs.
 const ETC: &str = "etc";
 const LOG: &str = "log";
-/// Most logs that are erased at a time.
+/// Most logs erased in one call.
 const ERASED_MAX: usize = 16;
 
-/// The files of a host. Nothing of them can be written; logs can be removed, except the one that is being written.
+/// The files of a host. None can be written. Logs can be removed, except the one being written.
 #[derive(Default)]
 pub struct ServedFiles {
-    /// Files in `/etc`: name, contents.
+    /// Files in `/etc`: name and content.
     etc: Vec<(String, Vec<u8>)>,
     logs: Option<StoredLogs>,
     open: Vec<Option<Opened>>,
-    /// The logs as they were listed and counted last, and the one that is read.
+    /// The logs in the last listing and in the last count, and the open log.
     listed: Rc<Vec<String>>,
     counted: Rc<Vec<String>>,
     reading: Option<(u16, File)>,
-    /// The logs that are yet to be erased, and whether one of them could not be.
+    /// Logs still to be erased, and true if an erasure has failed.
     erasing: Option<(Vec<String>, bool)>,
-    /// True while a log is to be streamed; the black box that makes it, once there is one.
+    /// True while a log is to be streamed, and the black box that writes it.
     streams: bool,
     stream: Option<HostBlackBox>,
 }
 
 #[derive(Debug)]
 enum Opened {
-    /// The file at this place in `/etc`.
+    /// Index of the file in `/etc`.
     Etc(usize),
     Log(File),
 }
 
-/// An open file.
+/// Handle of an open file.
 #[derive(Clone, Copy, Debug)]
 pub struct OpenFile(usize);
 
 impl ServedFiles {
-    /// The logs, or none, and files in `/etc` by name.
+    /// Creates the served files: `logs`, and the files in `/etc` by name and content.
     pub fn new(logs: Option<StoredLogs>, etc: Vec<(String, Vec<u8>)>) -> Self {
         ServedFiles { etc, logs, ..ServedFiles::default() }
     }
 
-    /// Returns the black box of the log that is streamed, made by `begin` if it is a new one.
+    /// Returns the black box of the streamed log, if a log is to be streamed. A new stream's black box is made by
+    /// `begin`.
     pub(crate) fn streamed(&mut self, begin: impl FnOnce() -> HostBlackBox) -> Option<&mut HostBlackBox> {
         self.streams.then(|| self.stream.get_or_insert_with(begin))
     }
@@ -66,7 +67,7 @@ impl ServedFiles {
         self.etc.iter().position(|(own, _)| own == name).ok_or(FtpError::FILE_NOT_FOUND)
     }
 
-    /// Opens the log called so; returns its size, too.
+    /// Opens the log with this name. Returns it with its size.
     fn open_log(&self, name: &str) -> Result<(File, u32), FtpError> {
         let logs = self.logs.as_ref().ok_or(FtpError::FILE_NOT_FOUND)?;
         let file = logs.open(name).map_err(|error| refusal(&error))?;
@@ -125,7 +126,7 @@ impl FileStore for ServedFiles {
             "" => [ETC, LOG].get(at).and_then(|name| entry(name, None)),
             ETC => self.etc.get(at).and_then(|(name, bytes)| entry(name, Some(size(bytes.len() as u64)))),
             LOG => {
-                // Kept from part to part of a listing: a log that comes or goes meanwhile must not shift the places.
+                // The list is kept during a listing, so that new or removed logs do not shift the places.
                 if at == 0 {
                     self.listed = self.names();
                 }
@@ -155,7 +156,7 @@ impl FileStore for ServedFiles {
 impl LogStore for ServedFiles {
     fn count_logs(&mut self) -> Poll<u16> {
         (self.counted, self.reading) = (self.names(), None);
-        // LOG_ENTRY has 16 bits for their number.
+        // MAVLink's LOG_ENTRY has 16 bits for the number of logs.
         Poll::Ready(u16::try_from(self.counted.len()).unwrap_or(u16::MAX))
     }
 
@@ -171,7 +172,7 @@ impl LogStore for ServedFiles {
 
     fn read_log(&mut self, place: u16, offset: u32, into: &mut [u8]) -> Poll<usize> {
         if self.counted.is_empty() {
-            // Whoever has not asked for the list knows it from an earlier time.
+            // A station may read a log without asking for the list. Then the present list counts.
             let _ = self.count_logs();
         }
         if !matches!(&self.reading, Some((open, _)) if *open == place) {
@@ -187,7 +188,7 @@ impl LogStore for ServedFiles {
         let old = || (logs.names().iter().filter(|name| !logs.is_current(name)).cloned().collect(), false);
         let (names, failed) = self.erasing.get_or_insert_with(old);
         for name in names.drain(names.len().saturating_sub(ERASED_MAX)..) {
-            // One that a station has removed meanwhile is erased, too.
+            // A log that a station has removed meanwhile counts as erased.
             *failed |= logs.remove(&name).is_err_and(|error| error.kind() != ErrorKind::NotFound);
         }
         if !names.is_empty() {
@@ -218,12 +219,12 @@ impl LogSource for ServedFiles {
     }
 }
 
-/// Returns the size of a file as stations know it; of what is beyond 4 GB, the end is not served.
+/// Returns the size of a file for stations. The part of a file beyond 4 GiB is not served.
 fn size(bytes: u64) -> u32 {
     u32::try_from(bytes).unwrap_or(u32::MAX)
 }
 
-/// Reads as much as there is and fits.
+/// Reads until the buffer is full or the file ends.
 fn read(file: &mut File, offset: u32, into: &mut [u8]) -> std::io::Result<usize> {
     file.seek(SeekFrom::Start(offset.into()))?;
     let mut count = 0;

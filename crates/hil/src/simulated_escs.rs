@@ -1,40 +1,41 @@
-//! The motor controllers of a simulated vehicle.
+//! Simulates the motor controllers (ESCs) of a vehicle.
 
 use afbc_drivers::esc_telemetry::{ANSWER_LEN, EscReading};
 use afbc_flight_core::dshot_reply::DshotReply;
 use afbc_plant::Plant;
 use afbc_types::ROTORS_MAX;
 
-/// Steps from a question to the measurement, and to the end of the answer \[ms\]: the frame takes the first, ten bytes
-/// at 115,200 baud most of another.
+/// Time from a request to the measurement, and to the end of the answer \[ms\]. The frame takes the first millisecond,
+/// and ten bytes at 115,200 baud most of the second.
 const MEASURES_MS: u32 = 1;
 const ANSWERS_MS: u32 = 2;
-/// Temperature in the shade, and warming by a hovering rotor's square \[deg C\].
+/// Temperature of the air, and warming of a hovering rotor's controller \[deg C\]. The warming is proportional to the
+/// squared speed.
 const AIR_C: f32 = 20.0;
 const WARMS_C: f32 = 25.0;
 
-/// Motor controllers that answer over one line, as real ones do: what the plant's rotors do a millisecond after the
-/// question, rounded down to 100 electrical revolutions per minute, and heard another millisecond later. Without a
-/// battery in the plant they measure no voltage.
+/// Motor controllers that share one telemetry line, like real ones. They measure the plant's rotor speed one
+/// millisecond after the request, round it down to 100 electrical revolutions per minute, and finish the answer another
+/// millisecond later. If the plant has no battery, they report no voltage.
 #[derive(Clone, Debug)]
 pub struct SimulatedEscs {
     poles: u32,
-    /// The one that has been asked, and how long ago \[ms\].
+    /// Rotor whose controller was asked, and the time since then \[ms\].
     asked: Option<(usize, u32)>,
     measured: Option<EscReading>,
-    /// Charge that each has drawn \[mA h\].
+    /// Charge that each controller has drawn \[mA h\].
     drawn_mah: [f64; ROTORS_MAX],
 }
 
 impl SimulatedEscs {
-    /// Creates those of motors with so many magnetic poles.
+    /// Creates the controllers of motors with this number of magnetic poles.
     #[must_use]
     pub fn new(poles: u32) -> Self {
         SimulatedEscs { poles, asked: None, measured: None, drawn_mah: [0.0; ROTORS_MAX] }
     }
 
-    /// Returns the electrical speeds with which they answer a frame by bidirectional DSHOT \[rev/min\]: what the
-    /// plant's rotors do, as an answer has room for it.
+    /// Returns the electrical speeds in the controllers' answers to a frame of bidirectional DSHOT \[rev/min\]: the
+    /// plant's rotor speeds, rounded as the answer encodes them.
     #[must_use]
     pub fn answers_rev_min(&self, plant: &Plant) -> [Option<u32>; ROTORS_MAX] {
         let mut answers = [None; ROTORS_MAX];
@@ -46,8 +47,8 @@ impl SimulatedEscs {
         answers
     }
 
-    /// Advances them by a millisecond, at whose beginning a rotor's is asked ([`HostTick::asks_esc`]), and during which
-    /// the plant has come to where it is; returns what comes over the line by its end.
+    /// Advances the controllers by a millisecond that has led to the plant's present state. `asked` is the rotor whose
+    /// controller was asked at its beginning ([`HostTick::asks_esc`]). Returns the answer that is complete at its end.
     ///
     /// [`HostTick::asks_esc`]: crate::HostTick::asks_esc
     pub fn step(&mut self, asked: Option<u8>, plant: &Plant) -> Option<[u8; ANSWER_LEN]> {
@@ -55,12 +56,12 @@ impl SimulatedEscs {
         let speeds = truth.rotor_speeds_rad_s;
         let battery = plant.telemetry().and_then(|telemetry| telemetry.battery);
         let (current_a, voltage_v) = battery.map_or((0.0, 0.0), |battery| (battery.current_a, battery.voltage_v));
-        // Power goes with the cube of the speed.
+        // Power is proportional to the cube of the speed.
         let power: f64 = speeds.iter().map(|speed| speed.powi(3)).sum();
-        // At rest the sum is zero: no share then, rather than no number.
+        // At rest the sum is zero; the limit avoids a division by zero.
         let share = |rotor: usize| speeds.get(rotor).map_or(0.0, |speed| speed.powi(3)) / power.max(1.0);
         for (rotor, drawn_mah) in self.drawn_mah.iter_mut().enumerate() {
-            // An ampere for a millisecond is the 3,600th part of a milliampere hour.
+            // One ampere for a millisecond is 1/3,600 mA h.
             *drawn_mah += current_a * share(rotor) / 3_600.0;
         }
         if let Some(rotor) = asked {

@@ -11,7 +11,7 @@ use afbc_types::{PoseSigmas, ROTORS_MAX, RotorSpeeds, Setpoint, State};
 use nalgebra::Vector3;
 use std::time::Instant;
 
-/// HIL_ACTUATOR_CONTROLS, and the time between two, which is that of a tick.
+/// Requests HIL_ACTUATOR_CONTROLS at an interval of one tick.
 const ROTORS: Command = Command::SetInterval { message: 93, interval_us: 1_000 };
 
 /// Tracker, commander and ground station.
@@ -28,17 +28,17 @@ pub struct Station {
 pub struct ReceivedMessages {
     /// Last commanded rotor speeds.
     pub speeds: RotorSpeeds<ROTORS_MAX>,
-    /// True if the motors may turn, from the last rotor command.
+    /// True if the motors may turn, by the last rotor command.
     pub armed: bool,
     /// Number of rotor commands.
     pub rotor_commands: u64,
-    /// Last position, in the vehicle's local frame \[m\].
+    /// Last position in the vehicle's local frame \[m\].
     pub position_m: Option<Vector3<f32>>,
     /// Last health message.
     pub health: Option<HealthArray>,
-    /// Largest age of the state that it has reported while armed \[us\].
+    /// Largest age of the state that the vehicle has reported while armed \[us\].
     pub state_age_max_us: f32,
-    /// The answer to the last request to arm or disarm.
+    /// Answer to the last request to arm or disarm.
     pub answer: Option<Answer>,
 }
 
@@ -49,7 +49,7 @@ impl Default for Station {
 }
 
 impl Station {
-    /// Creates a station that has received nothing, and asks for rotor commands.
+    /// Creates a station that has received nothing, and requests rotor commands.
     pub fn new() -> Self {
         let mut station = Station {
             client: Client::new(Client::STATION),
@@ -62,7 +62,7 @@ impl Station {
         station
     }
 
-    /// Queues the question for a rotor command after each tick, which the vehicle does not send by itself.
+    /// Queues the request for a rotor command after each tick, which the vehicle does not send by default.
     pub fn ask_for_rotors(&mut self) {
         self.client.say(Uplink::Command(ROTORS));
     }
@@ -87,7 +87,7 @@ impl Station {
         self.say(&Uplink::Heartbeat);
     }
 
-    /// Queues the order to follow setpoints, in mode offboard.
+    /// Queues the switch to offboard mode, in which the vehicle follows setpoints.
     pub fn follow(&mut self) {
         self.say(&Uplink::Command(Command::SelectMode(modes::custom(FlightMode::Offboard))));
     }
@@ -98,7 +98,7 @@ impl Station {
         self.client.command(command, Patience::ONCE);
     }
 
-    /// Queues a question, and starts timing its answer.
+    /// Queues a ping, and starts timing its answer.
     pub fn ping(&mut self) {
         self.client.command(PING, Patience::ONCE);
         self.pings += 1;
@@ -134,11 +134,11 @@ impl Station {
             _ => {}
         });
         heard.answer = client.answer(Command::Arm);
-        // A long flight has many texts, which nobody reads here.
+        // The texts of a long flight would fill memory, and nobody reads them here.
         drop(client.take_texts());
     }
 
-    /// Returns what the vehicle has sent.
+    /// Returns the data received from the vehicle.
     pub fn heard(&self) -> &ReceivedMessages {
         &self.heard
     }
@@ -148,19 +148,19 @@ impl Station {
         self.client.counters()
     }
 
-    /// Returns the time from sending a question to its answer \[ms\].
+    /// Returns the round-trip times of the pings \[ms\].
     pub fn round_trip_ms(&self) -> &Extremes {
         &self.round_trip_ms
     }
 
-    /// Returns the number of questions without an answer.
+    /// Returns the number of pings without an answer.
     pub fn unanswered(&self) -> u64 {
         self.pings - self.round_trip_ms.count()
     }
 }
 
 impl ReceivedMessages {
-    /// Returns the reason for which the vehicle refused to arm.
+    /// Returns the reason why the vehicle refused to arm.
     pub fn refusal(&self) -> Option<&'static str> {
         let Some(Answer::Refused(number)) = self.answer else { return None };
         let known = Refusal::ALL.into_iter().find(|refusal| *refusal as i32 == number).map(Refusal::reason);

@@ -8,30 +8,31 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::time::SystemTime;
 
-/// The logs of a vehicle that stations may download: those that were in its folder at the start, and its own since.
+/// The logs of a vehicle that stations may download: those in its folder at the start, and its own new ones.
 ///
-/// The folder is read once, at the start, for a flight has no time to read it: from then on this keeps account of what
-/// the vehicle writes and erases. A name stands for a file itself: a symbolic link is not followed.
+/// The folder is read only once, at the start, because a flight has no time to read it. Afterwards, this type keeps
+/// track of the logs that the vehicle writes and erases. Each name must be a regular file; symbolic links are not
+/// followed.
 #[derive(Clone, Debug)]
 pub struct StoredLogs(Rc<RefCell<Shelf>>);
 
 #[derive(Debug)]
 struct Shelf {
     folder: PathBuf,
-    /// Names, the oldest first. Whoever lists them keeps a copy, which a change leaves as it is.
+    /// Names, oldest first. A listing keeps its own copy, which later changes do not affect.
     names: Rc<Vec<String>>,
-    /// The one that is being written.
+    /// Name of the log being written.
     current: String,
 }
 
 impl StoredLogs {
-    /// Reads the logs in a folder.
+    /// Reads the names of the logs in a folder.
     pub(crate) fn read(folder: &Path) -> Self {
         let entries = fs::read_dir(folder).into_iter().flatten().flatten();
         let mut logs: Vec<(SystemTime, String)> = entries
             .filter_map(|entry| {
                 let name = entry.file_name().into_string().ok()?;
-                // A name that stations could not be told is left out.
+                // Leaves out names that cannot be sent to stations.
                 let is_name = name.len() <= NAME_MAX && !name.contains(char::is_control);
                 let is_log = is_name && Path::new(&name).extension().is_some_and(|it| it == "ulg");
                 let data = fs::symlink_metadata(entry.path()).ok().filter(|data| is_log && data.is_file())?;
@@ -42,7 +43,7 @@ impl StoredLogs {
         Self::of(folder, logs.into_iter().map(|(_, name)| name).collect())
     }
 
-    /// No logs, and the folder of those to come.
+    /// Returns an empty list for logs that will be written into this folder.
     pub(crate) fn none_in(folder: &Path) -> Self {
         Self::of(folder, Vec::new())
     }
@@ -55,7 +56,7 @@ impl StoredLogs {
         })))
     }
 
-    /// Adds the log at `path`, which is being written from now on.
+    /// Adds the log at `path`, which is now being written.
     pub(crate) fn begin(&self, path: &Path) {
         let name = path.file_name().and_then(|name| name.to_str()).filter(|name| name.len() <= NAME_MAX);
         let Some(name) = name else { return };
@@ -64,17 +65,17 @@ impl StoredLogs {
         Rc::make_mut(&mut shelf.names).push(name.into());
     }
 
-    /// Returns their names, the oldest first.
+    /// Returns the names of the logs, oldest first.
     pub fn names(&self) -> Rc<Vec<String>> {
         Rc::clone(&self.0.borrow().names)
     }
 
-    /// True of the log that is being written.
+    /// Returns true for the log being written.
     pub fn is_current(&self, name: &str) -> bool {
         self.0.borrow().current == name
     }
 
-    /// Returns what the system knows of a log.
+    /// Returns the file system's metadata of a log.
     ///
     /// # Errors
     /// If there is no such log.
@@ -82,7 +83,7 @@ impl StoredLogs {
         only_file(fs::symlink_metadata(self.path(name)?)?)
     }
 
-    /// Opens a log to be read.
+    /// Opens a log for reading.
     ///
     /// # Errors
     /// If there is no such log, or it cannot be read.
@@ -92,7 +93,7 @@ impl StoredLogs {
         let mut options = OpenOptions::new();
         do_not_follow(options.read(true));
         let file = options.open(path)?;
-        // Once more: another file may have taken its place meanwhile.
+        // Checked again: the file may have been replaced before it was opened.
         only_file(file.metadata()?)?;
         Ok(file)
     }
@@ -104,7 +105,7 @@ impl StoredLogs {
     pub fn remove(&self, name: &str) -> io::Result<()> {
         let path = self.path(name)?;
         match fs::remove_file(path) {
-            // Somebody else has removed it.
+            // A file that somebody else has removed counts as removed.
             Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
             _ => {
                 Rc::make_mut(&mut self.0.borrow_mut().names).retain(|own| own != name);
@@ -113,7 +114,7 @@ impl StoredLogs {
         }
     }
 
-    /// Returns the path of a log that is known, so that no name leads out of the folder.
+    /// Returns the path of a known log. Other names are refused, so that no name leads out of the folder.
     fn path(&self, name: &str) -> io::Result<PathBuf> {
         let shelf = self.0.borrow();
         let known = shelf.names.iter().any(|own| own == name);
@@ -121,12 +122,12 @@ impl StoredLogs {
     }
 }
 
-/// Refuses what is no file, such as a symbolic link.
+/// Refuses anything but a regular file, for example a symbolic link.
 fn only_file(data: Metadata) -> io::Result<Metadata> {
     if data.is_file() { Ok(data) } else { Err(ErrorKind::NotFound.into()) }
 }
 
-/// Opens no symbolic link, and waits for nobody at the other end of a pipe.
+/// Makes opening fail for a symbolic link, and not wait for the other end of a pipe.
 #[cfg(unix)]
 fn do_not_follow(options: &mut OpenOptions) {
     use std::os::unix::fs::OpenOptionsExt;

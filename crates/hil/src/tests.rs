@@ -1,4 +1,4 @@
-//! The loop around the host's autopilot, in lockstep.
+//! Tests the loop with the host as autopilot, in lockstep.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, reason = "tests")]
 
 use super::*;
@@ -86,7 +86,8 @@ fn a_dead_line_is_noticed() {
     assert!(matches!(error, Err(Error::Silent)));
 }
 
-/// Samples and fixes have to reach the vehicle; the station's states would be another vehicle's.
+/// Without the instruments' readings, the flight is refused: the station's states would replace the estimate under
+/// test.
 #[test]
 fn instruments_that_nobody_reads_are_refused() {
     struct Elsewhere;
@@ -101,7 +102,7 @@ fn instruments_that_nobody_reads_are_refused() {
     assert!(error.unwrap_err().to_string().contains("[instruments]"));
 }
 
-/// The firmware's own estimate in the loop; without a tracker it says what it misses, and does not arm.
+/// The firmware flies on its own estimate. Without a tracker it reports what is missing, and does not arm.
 #[test]
 fn the_firmware_flies_on_its_own_estimate() {
     let mut scenario = scenario("mocap", 8.0);
@@ -120,9 +121,9 @@ fn the_firmware_flies_on_its_own_estimate() {
     assert_eq!(error.unwrap_err().to_string(), "the vehicle did not arm: arming refused: estimator has no heading");
 }
 
-/// Outdoors the local frame begins where the vehicle stands: whatever the receiver's error is then, it arms, and flies
-/// the reference from there. What is left is by how much the receiver's error changes meanwhile: at most some 5 m, of
-/// 1.2 m, 1.2 m and 1.8 m at each of two times.
+/// Outdoors, the local frame's origin is the vehicle's position at the start. Whatever the receiver's error is then,
+/// the vehicle arms and flies the reference from there. The remaining error is the change of the receiver's error: at
+/// most some 5 m, for standard deviations of 1.2 m, 1.2 m and 1.8 m at both times.
 #[test]
 fn a_receiver_that_is_off_at_the_start_is_no_obstacle() {
     let outdoor = scenario("outdoor", 60.0);
@@ -140,7 +141,7 @@ fn a_receiver_that_is_off_at_the_start_is_no_obstacle() {
     for seed in 1..=5 {
         arms_and_flies(Scenario { seed, ..outdoor.clone() });
     }
-    // Kilometres from the scenario's origin.
+    // Starts kilometres from the scenario's origin.
     for seed in 6..=20 {
         let mut away = Scenario { seed, duration_s: 6.0, ..outdoor.clone() };
         away.initial.position_m += Vector3::new(200.0, -900.0, 30.0) * seed as f64;
@@ -150,7 +151,7 @@ fn a_receiver_that_is_off_at_the_start_is_no_obstacle() {
     }
 }
 
-/// The firmware's estimator has the settings of the vehicle's file.
+/// The firmware's estimator uses the settings in the vehicle's file.
 #[test]
 fn the_firmwares_estimator_is_the_vehicle_files() {
     let paper = afbc_vehicles::built_in("paper").unwrap();
@@ -190,7 +191,7 @@ fn a_link_that_stays_down_ends_the_flight() {
     assert_eq!(fly_host(&scenario).0.lost, None);
 }
 
-/// The log of the loop has the columns that every log has, then the rotors', and a row for each 10 ms.
+/// The log has the columns of every log, then the rotors', and a row for every 10 ms.
 #[test]
 fn the_log_has_the_columns_of_every_log() {
     let scenario = scenario("hover", 0.5);

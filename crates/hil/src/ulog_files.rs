@@ -1,56 +1,56 @@
-//! The black box in files: one for each start of the vehicle.
+//! Writes the black box to files, one for each start of the vehicle.
 
 use crate::log_file::LogFile;
 use crate::stored_logs::StoredLogs;
 use afbc_files::{Error, Output};
 use std::path::{Path, PathBuf};
 
-/// Logs of earlier starts that may still be on their way to the disk.
+/// Most logs of earlier starts that may still wait for the disk.
 const ENDING_MAX: usize = 8;
-/// Most starts that are logged: stations may ask for any number of them.
+/// Most starts that are logged, because stations may restart the vehicle any number of times.
 const STARTS_MAX: u32 = 1000;
-/// Numbers of files that are tried, one after the other, until one is free.
+/// Most file numbers that are tried until one is free.
 const NUMBERS_TRIED: u32 = 1000;
 
-/// The ULog of a vehicle. A log that cannot be written any more ends, and the flight goes on.
+/// The ULog files of a vehicle. If a log cannot be written any more, it ends, and the flight continues.
 #[derive(Clone, Debug)]
 pub struct UlogFiles {
     place: LogPlace,
     stored: StoredLogs,
     is_live: bool,
-    /// That of the last start.
+    /// Path of the last start's log.
     path: PathBuf,
     /// Number of starts.
     starts: u32,
-    /// The last start's, until it has failed.
+    /// Log of the last start; none after a failure.
     file: Option<LogFile>,
-    /// Those of earlier starts that are not written yet.
+    /// Logs of earlier starts that are not completely written.
     ending: Vec<(PathBuf, LogFile)>,
-    /// A failure of which nobody knows yet, and the first of all.
+    /// The failure that was not reported yet, and the first failure.
     untold: Option<String>,
     failure: Option<String>,
 }
 
-/// Where the logs of a vehicle are.
+/// Location of a vehicle's logs.
 #[derive(Clone, Debug)]
 enum LogPlace {
-    /// In a file for the first start; the others are beside it.
+    /// Path of the first start's file. The other files are next to it.
     File(PathBuf),
-    /// In a folder, with those of all earlier runs, by number; the last one.
+    /// Folder with the logs of all runs, and the number of the last log.
     Folder(PathBuf, u32),
 }
 
 impl UlogFiles {
-    /// Creates the file at `path`, where there must be none; that of the second start has `-2` behind its name, and so
-    /// on. In a folder, each start has the next file that is free: `log001.ulg`, `log002.ulg` ...
+    /// Creates the file at `path`, which must not exist. The second start's file has `-2` after its name, and so on. If
+    /// `path` is a folder, each start gets the next free file: `log001.ulg`, `log002.ulg` and so on.
     ///
     /// # Errors
-    /// One line on why it cannot be created.
+    /// One line with the reason why the file cannot be created.
     pub fn create(path: &Path) -> Result<Self, String> {
         let (mut place, stored) = if path.is_dir() {
             let stored = StoredLogs::read(path);
             let number = |name: &String| name.strip_prefix("log")?.strip_suffix(".ulg")?.parse::<u32>().ok();
-            // By the largest number and not by how many there are: stations may have erased some.
+            // Counts from the largest number, not from the number of logs: stations may have erased some.
             let last = stored.names().iter().filter_map(number).max().unwrap_or(0);
             (LogPlace::Folder(path.into(), last), stored)
         } else {
@@ -63,13 +63,13 @@ impl UlogFiles {
         Ok(UlogFiles { place, stored, is_live: false, path, starts: 1, file: Some(file), ending, untold, failure })
     }
 
-    /// The same of a flight that goes on by itself ([`LogFile::live`]).
+    /// Makes the logs live, for a flight in real time ([`LogFile::live`]).
     #[must_use]
     pub fn live(self) -> Self {
         UlogFiles { is_live: true, file: self.file.map(LogFile::live), ..self }
     }
 
-    /// Returns what takes the bytes of a host ([`Host::log`](crate::Host::log)).
+    /// Returns a receiver for a host's log bytes ([`Host::log`](crate::Host::log)).
     pub fn sink(&self) -> impl FnMut(&[u8]) + 'static {
         let mut sink = self.file.as_ref().map(LogFile::sink);
         move |bytes| {
@@ -79,12 +79,12 @@ impl UlogFiles {
         }
     }
 
-    /// Returns the logs that there are.
+    /// Returns the logs that stations may download.
     pub fn stored(&self) -> StoredLogs {
         self.stored.clone()
     }
 
-    /// Ends the file, and creates that of the next start. Waits for no disk.
+    /// Ends the file, and creates the next start's file. Does not wait for the disk.
     pub fn next_start(&mut self) {
         self.look();
         if let Some(file) = self.file.take() {
@@ -110,22 +110,22 @@ impl UlogFiles {
         }
     }
 
-    /// Returns a line on why the log has ended early, once.
+    /// Returns one line with the reason why the log ended early. Reports it only once.
     pub fn take_failure(&mut self) -> Option<String> {
         self.look();
         self.untold.take()
     }
 
-    /// Writes what is left.
+    /// Writes the rest.
     ///
     /// # Errors
-    /// A line on why a log has ended early, told or not.
+    /// One line with the reason why the first log ended early, even if it was reported before.
     pub fn finish(mut self) -> Result<(), String> {
         self.end();
         self.failure.map_or(Ok(()), Err)
     }
 
-    /// Writes what is left; returns a line on why a log has ended early, unless that was told.
+    /// Writes the rest. Returns one line with the reason why a log ended early, unless it was reported before.
     pub fn end(&mut self) -> Option<String> {
         let last = self.file.take().map(|file| (self.path.clone(), file));
         for (path, file) in self.ending.split_off(0).into_iter().chain(last) {
@@ -136,7 +136,7 @@ impl UlogFiles {
         self.untold.take()
     }
 
-    /// Notes what has failed, and forgets what is written.
+    /// Notes new failures, and drops logs that are completely written.
     fn look(&mut self) {
         if let Some(failure) = self.file.as_ref().and_then(LogFile::take_failure) {
             self.file = None;
@@ -156,7 +156,7 @@ impl UlogFiles {
 }
 
 impl LogPlace {
-    /// Creates a start's file.
+    /// Creates the file of a start.
     fn create(&mut self, start: u32) -> Result<(PathBuf, LogFile), String> {
         let mut tried = 0;
         loop {
@@ -170,7 +170,7 @@ impl LogPlace {
             tried += 1;
             match Output::new(&path, "--ulog").and_then(|output| LogFile::create(&output)) {
                 Ok(file) => return Ok((path, file)),
-                // Somebody else logs into the folder, too.
+                // Another process may log into the same folder.
                 Err(Error::Exists { .. }) if matches!(self, LogPlace::Folder(..)) && tried < NUMBERS_TRIED => {}
                 Err(error) => return Err(error.to_string()),
             }

@@ -1,4 +1,4 @@
-//! Acro mode by radio: flips, and what ends them.
+//! Tests acro mode by radio: flips, and how they end.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -20,14 +20,14 @@ fn vehicle(name: &str) -> Option<Vehicle> {
     BUILT_IN.iter().find(|built_in| built_in.name == name).map(|built_in| built_in.read().unwrap())
 }
 
-/// A vehicle that hovers some metres up, with acro mode on the other end of the mode's switch.
+/// Returns a vehicle that hovers some metres up, with acro mode at the other end of the mode switch.
 fn hovering(name: &str, seed: u64, most_deg_s: f32) -> Flier {
     let mut flier = Flier::of(vehicle(name).as_ref(), true, seed, crsf(), 4);
     flier.set("COM_FLTMODE6", 6.0);
     for axis in ["MC_ACRO_R_MAX", "MC_ACRO_P_MAX", "MC_ACRO_Y_MAX"] {
         flier.set(axis, most_deg_s);
     }
-    // The Crazyflie, of 28 g, is shaken where it stands.
+    // Wind shakes the Crazyflie (28 g) on the ground.
     flier.set("EST_STILL_ACC", 1.5);
     flier.fly(8_000);
     flier.up();
@@ -43,16 +43,16 @@ fn climb(flier: &mut Flier) {
     flier.fly(3_000);
 }
 
-/// What a flip was like.
+/// Measurements of a flip.
 #[derive(Debug)]
 struct Flip {
-    /// Largest angle turned about the axis \[rad\].
+    /// Angle turned about the axis \[rad\].
     turned_rad: f64,
-    /// Largest error of the rate from 0.4 s on \[rad/s\].
+    /// Largest error of the rates after the first 0.4 s \[rad/s\].
     off_rad_s: f64,
-    /// Height lost until it was level for a second \[m\].
+    /// Largest loss of height until 6 s after the flip \[m\].
     lost_m: f64,
-    /// Time from the end until it was upright for good \[ms\].
+    /// Time from the flip's end until the vehicle stays upright \[ms\].
     upright_ms: u64,
 }
 
@@ -61,7 +61,7 @@ fn tilt_rad(flier: &Flier) -> f64 {
     (attitude_rad.x.cos() * attitude_rad.y.cos()).acos()
 }
 
-/// Turns once about an axis by one stick, and gives the switch back.
+/// Turns about an axis for one second with one stick at its end, then returns to position mode.
 fn flip(flier: &mut Flier, stick: usize, end: u16) -> Flip {
     let axis = [ROLL, PITCH, YAW].iter().position(|other| *other == stick).unwrap();
     let wanted_rad_s = f64::from(FLIP_DEG_S.to_radians()) * if (end > 1500) == (stick != YAW) { 1.0 } else { -1.0 };
@@ -96,8 +96,8 @@ fn flip(flier: &mut Flier, stick: usize, end: u16) -> Flip {
     Flip { turned_rad, off_rad_s, lost_m, upright_ms }
 }
 
-/// Turned once about roll and pitch, by its rate, and upright and in position mode afterwards. Rotors of the paper's
-/// vehicle turn it about yaw by half of that rate only, which is none of the checks.
+/// Each flip about roll and pitch follows its rate, and ends upright in position mode. About yaw, the rotors of the
+/// paper's vehicle only reach half the rate, so that yaw rates are not checked.
 #[test]
 fn flips_end_in_position_mode() {
     for name in ["paper", "racer", "crazyflie"] {
@@ -105,12 +105,12 @@ fn flips_end_in_position_mode() {
         for (stick, end) in [(ROLL, 2000), (ROLL, 1000), (PITCH, 2000), (PITCH, 1000), (YAW, 2000)] {
             climb(&mut flier);
             let flip = flip(&mut flier, stick, end);
-            // Thrust that carries it drives it down while it is upside down: some g t^2 of 1 s, and the way to stop.
-            // The Crazyflie, with the slowest rotors, leans by more than 0.5 rad again to stop where it is.
+            // Upside down, the thrust drives the vehicle down: it loses some g t^2 in 1 s, and more until it stops. The
+            // Crazyflie has the slowest rotors, and leans by more than 0.5 rad again to stop.
             let (lost_m, upright_ms) = if name == "crazyflie" { (20.0, 3_000) } else { (15.0, 1_200) };
             assert!(flip.lost_m < lost_m && flip.upright_ms < upright_ms, "{name} {flip:?}");
             if stick != YAW {
-                // A turn less what it takes to turn up to the rate; to a fifth.
+                // One turn, minus the time to reach the rate, within a fifth.
                 assert!((5.8..6.5).contains(&flip.turned_rad.abs()), "{name} {flip:?}");
                 assert!(flip.off_rad_s < 1.3, "{name} {flip:?}");
             }
@@ -119,7 +119,8 @@ fn flips_end_in_position_mode() {
     }
 }
 
-/// Turning over is what a pilot in acro mode wants: nothing stops the motors, for longer than a tumbling vehicle has.
+/// A flip is what a pilot in acro mode wants: no tumble detection stops the motors, even for longer than its usual
+/// time.
 #[test]
 fn it_is_not_found_tumbling() {
     let mut flier = hovering("paper", 2, 720.0);
@@ -137,7 +138,7 @@ fn it_is_not_found_tumbling() {
     assert!(flier.armed() && tilt_rad(&flier) < 0.5, "{}", tilt_rad(&flier));
 }
 
-/// Half a second of the last frame, and hold.
+/// When the radio is lost in a flip, the last frame holds for half a second, then hold mode rights the vehicle.
 #[test]
 fn a_pilot_who_is_lost_in_a_flip_is_righted() {
     let mut flier = hovering("paper", 3, FLIP_DEG_S);

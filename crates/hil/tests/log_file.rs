@@ -1,4 +1,4 @@
-//! Logs on disks that are full or do not move.
+//! Tests logs on disks that are full or stuck.
 #![cfg(unix)]
 #![allow(clippy::expect_used, missing_docs, reason = "tests")]
 
@@ -18,7 +18,7 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
-/// A file that takes nothing: a pipe whose reader does not read until it is told to.
+/// Creates a pipe at `path` that takes nothing: its reader does not read until it gets a signal.
 fn stuck(path: &Path) -> Sender<()> {
     assert!(Command::new("mkfifo").arg(path).status().expect("run").success());
     let (begin, waits) = channel();
@@ -37,7 +37,7 @@ fn a_log_is_whole() {
     let log = LogFile::create(&Output::new(&path, "--exact-log").expect("new")).expect("created");
     let mut sink = log.sink();
     let bytes: Vec<u8> = (0..30_000_000_u32).map(|it| (it / 7) as u8).collect();
-    // Faster than any disk, and all of it arrives.
+    // Written faster than any disk, and yet complete.
     bytes.chunks(777).for_each(&mut sink);
     log.finish().expect("written");
     assert!(fs::read(path).expect("read") == bytes && log.take_failure().is_none());
@@ -54,14 +54,14 @@ fn a_full_disk_fails_the_end() {
         assert!(log.finish().is_err_and(|error| error.kind() == std::io::ErrorKind::StorageFull), "{bytes}");
         assert!(log.finish().is_err(), "it does not become whole by asking again");
     }
-    // Told once, while it goes on.
+    // A live log reports the failure once, while the flight continues.
     let log = LogFile::to(File::create(FULL).expect("opened")).expect("begun").live();
     log.sink()(&[0; 200_000]);
     let told = std::iter::repeat_with(|| log.take_failure()).flatten().next();
     assert!(told.is_some_and(|told| told.contains("No space left")) && log.take_failure().is_none());
 }
 
-/// A live log waits for no disk: it ends, and says so. Nor does the next start of its vehicle wait.
+/// A live log does not wait for the disk: it ends, and reports that once.
 #[test]
 fn a_live_log_waits_for_no_disk() {
     let folder = folder("stuck");
@@ -74,7 +74,7 @@ fn a_live_log_waits_for_no_disk() {
     assert_eq!(log.take_failure(), None);
 }
 
-/// Each start has its file, and one that was cut is told at the end, too.
+/// Each start has its own complete file.
 #[test]
 fn every_start_ends_whole() {
     let folder = folder("starts");

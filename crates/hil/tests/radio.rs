@@ -1,4 +1,5 @@
-//! Flights by radio: from a receiver's bytes to the plant, with receivers that are stuck, noisy, half dead or silent.
+//! Tests flights by radio, from a receiver's bytes to the plant, with receivers that are stuck, noisy, faulty or
+//! silent.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -34,7 +35,7 @@ fn a_flight_by_radio() {
     flier.fly(3_000);
     let moved_m = flier.position_m() - before_m;
     assert!(moved_m.y > 2.0, "a stick to the left: {moved_m:?}");
-    // Down, and off when it has landed.
+    // Lands, and then disarms by the switch.
     flier.channels.us[THROTTLE] = 1000;
     flier.fly(20_000);
     assert!(flier.position_m().z < 0.2, "landed: {:?}", flier.position_m());
@@ -43,7 +44,7 @@ fn a_flight_by_radio() {
     assert!(!flier.armed());
 }
 
-/// On the ground, with what speaks against it named.
+/// Arming on the ground is refused, and the reason is reported.
 #[test]
 fn arming_is_refused_with_a_reason() {
     let mut flier = Flier::new(2, crsf(), 4, false);
@@ -65,7 +66,7 @@ fn arming_is_refused_with_a_reason() {
     assert!(!flier.armed() && flier.says("arming refused: IMU 2 is faulty"));
 }
 
-/// Within 20 ms, whoever is in control and whatever it does.
+/// The kill switch stops the motors within 20 ms.
 #[test]
 fn the_kill_switch_stops_the_motors() {
     for every_ms in [2, 4, 6] {
@@ -77,7 +78,8 @@ fn the_kill_switch_stops_the_motors() {
     }
 }
 
-/// It holds what was last heard for half a second, then its place; a pilot who is back takes over by moving something.
+/// After a loss, the last sticks hold for half a second, then the vehicle holds its position. A returning pilot takes
+/// over by moving a switch.
 #[test]
 fn a_lost_pilot_is_waited_for() {
     let mut flier = Flier::new(4, crsf(), 4, false);
@@ -101,7 +103,7 @@ fn a_lost_pilot_is_waited_for() {
     assert_eq!(flier.mode(), FlightMode::Position);
 }
 
-/// Nine frames of ten are lost, or arrive damaged, in bursts; SBUS has no checksum.
+/// Flies with a receiver that loses or damages nine frames of ten, and with SBUS, which has no checksum.
 #[test]
 fn a_bad_receiver_is_flown_with() {
     let half_dead: Receiver = Box::new(|channels, random| match random.next_u32() % 10 {
@@ -122,7 +124,7 @@ fn a_bad_receiver_is_flown_with() {
     assert!(flier.armed() && tilt_rad < 0.5, "{tilt_rad}");
     assert_eq!(flier.mode(), FlightMode::Position);
 
-    // A frame of fifty with a wrong bit in its channels.
+    // One frame of fifty has a wrong bit in its channels.
     let noisy: Receiver = Box::new(|channels, random| {
         let mut bytes = SbusFrame { channels: *channels, frame_lost: false, failsafe: false }.encode().to_vec();
         if random.next_u32() % 50 == 0 {
@@ -138,7 +140,7 @@ fn a_bad_receiver_is_flown_with() {
     assert!((flier.position_m() - place_m).norm() < 8.0, "{:?}", flier.position_m() - place_m);
 }
 
-/// A receiver that has given up says so, or sends its last frame for ever: then the pilot has the switches of another.
+/// A receiver that gives up sets SBUS's failsafe flag, while its channels show other switches.
 #[test]
 fn a_receiver_that_gives_up_is_a_loss() {
     let mut flier = Flier::new(
@@ -156,7 +158,7 @@ fn a_receiver_that_gives_up_is_a_loss() {
     assert_eq!((flier.mode(), flier.armed()), (FlightMode::Hold, true));
 }
 
-/// A station's sticks do not count while the pilot's own are there.
+/// A station's sticks are ignored while the radio is connected.
 #[test]
 fn the_pilots_sticks_go_first() {
     let mut flier = Flier::new(8, crsf(), 4, false);
@@ -179,7 +181,7 @@ fn the_pilots_sticks_go_first() {
     assert!((flier.position_m() - place_m).norm() > 4.0);
 }
 
-/// Channels of a station in place of a receiver's, as many times per second.
+/// Sends the channels from a station, every 40 ms, instead of from a receiver.
 fn relayed(flier: &mut Flier, ms: u64) {
     for _ in 0..ms {
         let message = Uplink::Target(ExternalTarget::Channels(ChannelsOverride::new(flier.channels.us)));
@@ -192,9 +194,8 @@ fn silent() -> Receiver {
     Box::new(|_, _| Vec::new())
 }
 
-/// RC_CHANNELS_OVERRIDE arms, flies and kills by the same switches; when it stops, that is a loss; a receiver that
-/// hears
-/// its pilot goes first.
+/// RC_CHANNELS_OVERRIDE arms, flies and kills with the same switches as a receiver. If it stops, the radio counts as
+/// lost. A receiver that is connected has priority.
 #[test]
 fn a_flight_by_a_stations_channels() {
     let mut flier = Flier::new(9, silent(), 4, false);
@@ -215,7 +216,7 @@ fn a_flight_by_a_stations_channels() {
     relayed(&mut flier, 3_000);
     assert!(flier.position_m().x - before_m.x > 3.0, "{:?}", flier.position_m());
 
-    // The pilot's receiver hears its transmitter, which has its switches off: that disarms nothing in the air.
+    // The pilot's receiver connects with the arm switch off. That does not disarm in the air.
     flier.receiver = crsf();
     flier.channels.us[ARM] = 1000;
     flier.fly(500);
@@ -229,13 +230,13 @@ fn a_flight_by_a_stations_channels() {
     }
     assert!(flier.armed() && (flier.position_m() - place_m).norm() < 2.0, "{:?}", flier.position_m() - place_m);
 
-    // Both are silent: lost, and held.
+    // Without receiver and station, the radio counts as lost, and the vehicle holds its position.
     flier.receiver = silent();
     flier.fly(1_200);
     assert_eq!((flier.mode(), flier.armed()), (FlightMode::Hold, true));
     assert!(flier.says("radio: lost"));
 
-    // A station that comes back kills within two messages.
+    // A station that is back can kill within two messages.
     relayed(&mut flier, 1_000);
     assert!(flier.armed());
     flier.channels.us[KILL] = 2000;
@@ -243,8 +244,8 @@ fn a_flight_by_a_stations_channels() {
     assert!(!flier.armed());
 }
 
-/// What a station does not send any more is lost as a stick is, whatever else it sends: one stick is centred, and with
-/// nothing but "leave alone" in every channel the pilot is lost.
+/// If a station stops sending one stick's channel, that stick counts as centred, even if other channels go on. If every
+/// channel says "leave alone", the radio counts as lost.
 #[test]
 fn channels_that_are_not_refreshed_are_lost() {
     const ALONE: u16 = u16::MAX;
@@ -278,13 +279,12 @@ fn channels_that_are_not_refreshed_are_lost() {
     assert!(moved_m(&mut flier, [ALONE; 18]) < 1.0, "holds");
 }
 
-/// Two receivers on one transmitter, of which either falls silent in turn, or both at once for a while.
+/// Flies with a receiver that alternates between full reception, one frame of three, and one of twenty.
 #[test]
 fn a_receiver_that_switches_is_flown_with() {
     let mut frames = 0;
     let switching: Receiver = Box::new(move |channels, random| {
         frames += 1;
-        // One in CRSF's full range, the other with what it heard last and some noise of its own.
         let heard = match frames / 200 % 3 {
             0 => true,
             1 => random.next_u32() % 3 == 0,

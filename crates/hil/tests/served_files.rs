@@ -1,4 +1,4 @@
-//! What a host serves of files and tells of itself.
+//! Tests the files and metadata that a host serves.
 #![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
 use afbc_hil::{MetadataFiles, ServedFiles, UlogFiles};
@@ -66,14 +66,14 @@ fn a_folders_logs_are_served_and_nothing_else_of_it() {
     for name in ["log/secret.txt", "log/sub.ulg", "log", "etc", "", "secret.txt", "log/none.ulg", "etc/none"] {
         assert_eq!(read(&mut files, name), Err(FtpError::FILE_NOT_FOUND), "{name}");
     }
-    // By number, and out of any range.
+    // By number, and beyond the end.
     assert_eq!(files.count_logs(), Poll::Ready(2));
     assert_eq!(files.log(0), Poll::Ready(Some(LogInfo { size: 1000, utc_s: 1_700_000_001 })));
     assert_eq!(files.log(2), Poll::Ready(None));
     let mut block = [0; 90];
     assert_eq!((files.read_log(0, 950, &mut block), &block[..50]), (Poll::Ready(50), &old[950..]));
     assert_eq!([files.read_log(0, 1000, &mut block), files.read_log(7, 0, &mut block)], [Poll::Ready(0); 2]);
-    // Nothing can be changed, except that old logs can be removed.
+    // Nothing can be changed, but old logs can be removed.
     assert!(matches!(files.open(&path("log/new.ulg"), FileAccess::Create), Err(FtpError::FILE_PROTECTED)));
     assert!(matches!(files.open(&path("log/old.ulg"), FileAccess::Write), Err(FtpError::FILE_PROTECTED)));
     for change in [FileChange::CreateDirectory(&path("log/x")), FileChange::Truncate(&path("log/old.ulg"), 1)] {
@@ -85,7 +85,7 @@ fn a_folders_logs_are_served_and_nothing_else_of_it() {
     assert_eq!(files.change(FileChange::Remove(&path("log/secret.txt"))), Err(FtpError::FILE_NOT_FOUND));
     files.change(FileChange::Remove(&path("log/old.ulg"))).expect("removed");
     assert!(!folder.join("old.ulg").exists());
-    // All that are not being written.
+    // Erases all logs that are not being written.
     logs.next_start();
     let mut files = ServedFiles::new(Some(logs.stored()), Vec::new());
     assert_eq!(names(&mut files, "log").len(), 2);
@@ -95,7 +95,7 @@ fn a_folders_logs_are_served_and_nothing_else_of_it() {
     assert_eq!(ServedFiles::new(None, Vec::new()).erase_logs(), Poll::Ready(false));
 }
 
-/// Of a file for each start, those of this run alone.
+/// If there is one file per start, only this run's files are served.
 #[test]
 fn a_files_starts_are_served() {
     let folder = folder("starts");
@@ -109,7 +109,7 @@ fn a_files_starts_are_served() {
     assert!(folder.join("other.ulg").exists() && !folder.join("flight.ulg").exists());
 }
 
-/// The metadata as the published schemas and QGroundControl want it, and each number as it is declared.
+/// The metadata follow the published schemas and QGroundControl's needs, with each number as declared.
 #[test]
 fn metadata_describes_every_parameter() {
     let table = ParameterTable::<4>::new(Configuration::default());
@@ -164,7 +164,7 @@ fn metadata_describes_every_parameter() {
             restarts.insert(name.to_owned());
         }
         if let Some(places) = told["decimalPlaces"].as_i64() {
-            // What is shown of the default is the default, to four digits.
+            // The shown default equals the default to four digits.
             let default = f64::from(parameter.value);
             let shown: f64 = format!("{default:.*}", places as usize).parse().expect("a number");
             assert!((shown - default).abs() <= 5e-4 * default.abs(), "{name}: {shown} for {default}");
@@ -179,7 +179,7 @@ fn metadata_describes_every_parameter() {
     assert_eq!((&mass["shortDesc"], &mass["default"]), (&"m: mass of the vehicle".into(), &0.486.into()));
 }
 
-/// A symbolic link in the folder is nobody's log: neither one that was there nor one that takes a log's place.
+/// A symbolic link is never served as a log, whether it existed before or replaces a log.
 #[cfg(unix)]
 #[test]
 fn links_are_not_served() {
@@ -198,7 +198,7 @@ fn links_are_not_served() {
         assert_eq!(read(&mut files, &format!("log/{name}")), Err(FtpError::FILE_NOT_FOUND), "{name}");
         assert!(files.change(FileChange::Remove(&path(&format!("log/{name}")))).is_err(), "{name}");
     }
-    // Swapped while it is served, also for what would be waited for.
+    // Replaces a served log by a link, or by a pipe that would block.
     let fifo =
         |path: &PathBuf| assert!(std::process::Command::new("mkfifo").arg(path).status().expect("run").success());
     let swaps: [&dyn Fn(&PathBuf); 2] =
@@ -214,8 +214,8 @@ fn links_are_not_served() {
     assert!(elsewhere.join("secret.ulg").exists() && folder.join("secret.ulg").exists());
 }
 
-/// The folder is read at the start alone: what others put there later is not seen, however often somebody asks. What
-/// the vehicle writes is seen at once.
+/// The folder is read only at the start. Files that others add later are not served. The vehicle's own new logs are
+/// served at once.
 #[test]
 fn the_folder_is_read_once() {
     let folder = folder("read-once");
@@ -228,11 +228,11 @@ fn the_folder_is_read_once() {
     logs.next_start();
     assert_eq!((files.count_logs(), names(&mut files, "log").len()), (Poll::Ready(1002), 1002));
     assert_eq!(read(&mut files, "log/log002.ulg"), Ok(Vec::new()));
-    // A listing that is under way keeps its places.
+    // A listing keeps its places while logs are removed.
     let tenth = files.entry(&path("log"), 10);
     files.change(FileChange::Remove(&path("log/old999.ulg"))).expect("removed");
     assert_eq!(files.entry(&path("log"), 10), tenth);
-    // Erased in parts, each soon done.
+    // Logs are erased in parts, so that each call is short.
     let mut parts = 0;
     while files.erase_logs() == Poll::Pending {
         parts += 1;

@@ -1,5 +1,5 @@
-//! Landings on the vehicle's own estimate, with each kind of receiver: it stays under the law that flew, upright, and
-//! disarms soon after it has touched the ground.
+//! Tests landings on the vehicle's own estimate, with both kinds of receiver. The vehicle must stay under its law and
+//! upright, and disarm soon after it touches the ground.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs, reason = "a test that cannot go on should say why")]
 
 use afbc::Profile;
@@ -19,20 +19,20 @@ use std::collections::VecDeque;
 use std::path::Path;
 
 const STATION: Address = Address { system: 255, component: 190 };
-/// From the ground, outdoors.
+/// Scenario that starts on the ground, outdoors.
 const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../twin/scenarios/hover.toml");
-/// Where the local frame's origin is \[degrees, m\].
+/// Geographic position of the local frame's origin \[degrees, m\].
 const PLACE: [f64; 3] = [47.397_742, 8.545_594, 488.0];
-/// Time between two epochs \[ms\], and bytes that a wire of 38,400 baud brings in a millisecond.
+/// Time between two epochs \[ms\], and bytes per millisecond at 38,400 baud.
 const PERIOD_MS: u64 = 200;
 const BYTES: usize = 4;
 /// Steady winds \[m/s\].
 const WINDS_M_S: [[f64; 3]; 3] = [[2.0, 1.0, 0.0], [0.3, 0.2, 0.0], [-3.0, 2.0, 0.0]];
-/// Time from the first touch of the ground to disarming, at most \[s\], and largest tilt of a flight \[rad\].
+/// Longest time from the first touch of the ground to disarming \[s\], and largest tilt of a flight \[rad\].
 const DISARMS_S: f64 = 1.5;
 const TILT_RAD: f64 = 0.8;
 
-/// A receiver that speaks NMEA 0183, its wire and its driver.
+/// Simulates a receiver that speaks NMEA 0183, its serial line and its driver.
 struct NmeaReceiver {
     newest: Option<(Vector3<f32>, Vector3<f32>)>,
     wire: VecDeque<u8>,
@@ -53,7 +53,7 @@ impl NmeaReceiver {
         NmeaReceiver { newest: None, wire: VecDeque::new(), began_ms: 0, decoder, frame, scale }
     }
 
-    /// Puts its fix, once its last byte has come, in the place of those that the instruments measure.
+    /// Replaces the instruments' fixes by the receiver's own fix, once its last byte has arrived.
     fn replace(&mut self, readings: &mut Readings, now_ms: u64) {
         let mut aids: Vec<_> = readings.aids.into_iter().flatten().collect();
         aids.retain(|aid| {
@@ -75,7 +75,7 @@ impl NmeaReceiver {
         readings.aids = std::array::from_fn(|index| aids.get(index).copied());
     }
 
-    /// Position, and speed and course over the ground, of one epoch (NMEA 0183: GGA and RMC).
+    /// Returns the NMEA 0183 sentences of one epoch: GGA (position) and RMC (speed and course over ground).
     fn epoch(&self, now_ms: u64) -> String {
         let (position_m, velocity_m_s) = self.newest.unwrap();
         let [north, west, up] = position_m.cast::<f64>().into();
@@ -99,14 +99,14 @@ impl NmeaReceiver {
     }
 }
 
-/// How a landing went.
+/// Measurements of a landing.
 #[derive(Debug, Default)]
 struct Landing {
-    /// Why the law was switched off, if it was.
+    /// Reason why the law was switched off, if it was.
     tripped: Option<&'static str>,
     /// Largest tilt of the flight \[rad\].
     tilt_rad: f64,
-    /// When it touched the ground first after the order to land, and when it disarmed \[s\].
+    /// Times of the first touch of the ground after the command to land, and of disarming \[s\].
     touched_s: Option<f64>,
     disarmed_s: Option<f64>,
 }
@@ -170,7 +170,7 @@ fn scenario(seed: u64, wind_m_s: [f64; 3]) -> Scenario {
     scenario
 }
 
-/// What a landing must be like.
+/// Checks a landing.
 fn check(landing: &Landing, what: &str) {
     assert_eq!(landing.tripped, None, "{what}: {landing:?}");
     let (Some(touched_s), Some(disarmed_s)) = (landing.touched_s, landing.disarmed_s) else {
@@ -180,7 +180,7 @@ fn check(landing: &Landing, what: &str) {
     assert!(disarmed_s > touched_s && landing.tilt_rad < TILT_RAD, "{what}: {landing:?}");
 }
 
-/// Flies seeds in all winds, with either receiver.
+/// Flies all seeds in all winds, with either receiver.
 fn sweep(vehicle: Option<&Vehicle>, seeds: impl Iterator<Item = u64> + Clone) {
     for (speaks_nmea, wind_m_s) in [true, false].into_iter().flat_map(|nmea| WINDS_M_S.map(|wind| (nmea, wind))) {
         for seed in seeds.clone() {
@@ -197,8 +197,8 @@ fn sweep(vehicle: Option<&Vehicle>, seeds: impl Iterator<Item = u64> + Clone) {
     }
 }
 
-/// With NMEA, seed 1 once ended under the fallback law, rocking by 1.1 rad: the vehicle stood on an edge of its feet,
-/// and the moments that were to level it gave so much thrust that it was not found on the ground.
+/// With NMEA, seed 1 once ended under the fallback law, rocking by 1.1 rad. The vehicle stood on an edge of its feet,
+/// and its levelling moments took so much thrust that it was not detected as landed.
 #[test]
 fn landings_end_upright_under_the_law_that_flew() {
     sweep(None, 1..=6);
@@ -206,7 +206,7 @@ fn landings_end_upright_under_the_law_that_flew() {
 
 #[test]
 fn every_vehicle_disarms_soon_after_it_has_touched_the_ground() {
-    // The breeze rocks the Crazyflie, of 28 g, on its feet: it is not found at rest, and does not arm.
+    // Wind shakes the Crazyflie (28 g) on its feet, so that it is not found at rest and does not arm.
     for built_in in BUILT_IN.iter().filter(|built_in| built_in.name != "crazyflie") {
         sweep(Some(&built_in.read().unwrap()), 1..=1);
     }

@@ -1,4 +1,4 @@
-//! Flights on two inertial sensors, of which one is wrong: the other one carries the vehicle.
+//! Tests flights on two inertial sensors. If one is wrong, the vehicle must fly on the other.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -22,37 +22,37 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::path::Path;
 
 const STATION: Address = Address { system: 255, component: 190 };
-/// From the ground, outdoors.
+/// Scenario that starts on the ground, outdoors.
 const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../twin/scenarios/hover.toml");
-/// Noise of the second sensor beside the first \[rad/s, m/s2\].
+/// Noise of the second sensor, added to the first sensor's \[rad/s, m/s2\].
 const NOISE: [f32; 2] = [0.02, 1.0];
-/// When the vehicle has hovered, and when a flight ends \[ms\].
+/// Time after which the vehicle hovers at its height \[ms\].
 const HOVERS_MS: u64 = 12_000;
-/// What a flight may be off from where it was \[m\], and its largest tilt \[rad\]: 30 deg/s or 0.5 g are hidden for
-/// half a second, and what they have led to is braked.
+/// Largest distance from the hover position \[m\], and largest tilt \[rad\]. A fault of 30 deg/s or 0.5 g goes
+/// unnoticed for half a second, and its effect must be braked.
 const OFF_M: f64 = 4.0;
 const TILT_RAD: f64 = 1.3;
-/// Flights with a wrong sensor.
+/// Number of flights with a wrong sensor.
 const CASES: usize = 64;
 
-/// What a sensor does.
+/// Fault of a sensor.
 #[derive(Clone, Copy, Debug)]
 enum Fault {
     None,
-    /// A bias of its rates, 0, or its force, 1, that is there after so long \[rad/s, m/s2, ms\].
+    /// A bias of the rates (0) or the force (1), which grows over this time \[rad/s, m/s2, ms\].
     Bias(usize, Vector3<f32>, u64),
-    /// Its rates, 0, or its force, 1, repeat themselves.
+    /// The rates (0) or the force (1) get stuck.
     Stuck(usize),
 }
 
-/// How a flight went, from the fault on.
+/// Measurements of a flight from the fault on.
 #[derive(Debug, Default)]
 struct Flown {
     lost: bool,
-    /// Largest tilt \[rad\], and distance from where it was \[m\].
+    /// Largest tilt \[rad\], and largest distance from the hover position \[m\].
     tilt_rad: f64,
     off_m: f64,
-    /// Changes of the sensor that flies: when \[ms\], and whether the second flies.
+    /// Changes of the sensor in use: time \[ms\], and true for the second sensor.
     changes: Vec<(u64, bool)>,
     second_flies: bool,
     works: [bool; 2],
@@ -62,14 +62,14 @@ fn normal(random: &mut Xoshiro256PlusPlus) -> f32 {
     (0..12).map(|_| random.next_u64() as f32 / u64::MAX as f32).sum::<f32>() - 6.0
 }
 
-/// Sticks from stop to stop, each at a pace of its own.
+/// Returns sticks that jump from stop to stop, each with its own period.
 fn jerky(now_ms: u64) -> ManualControl {
     let stick = |period_ms: u64| if (now_ms / period_ms).is_multiple_of(2) { 1.0 } else { -1.0 };
     ManualControl { roll: stick(2_600), pitch: stick(3_700), throttle: 0.3 * stick(1_100), yaw: stick(1_900) }
 }
 
-/// Takes off and hovers. At `at_ms` a sensor fails, the second if `of_second`; without a fault it is flown by jerky
-/// sticks from then on.
+/// Takes off and hovers. At `at_ms` one sensor fails, the second if `of_second`. Without a fault, jerky sticks fly the
+/// vehicle from then on.
 fn fly(
     scenario: &Scenario,
     mut host: Host,
@@ -85,7 +85,7 @@ fn fly(
     let mut speeds = RotorSpeeds::<ROTORS_MAX>::default();
     let (mut flown, mut selector) = (Flown::default(), ImuSelector::NEW);
     let mut draw = |sigma: f32| Vector3::from_fn(|_, _| sigma * normal(&mut random));
-    // Scale and alignment of the second differ by a percent, and its biases.
+    // The second sensor differs in scale and alignment by a percent, and in its biases.
     let errors = Matrix3::from_columns(&[draw(0.007), draw(0.007), draw(0.007)]) + Matrix3::identity();
     let biases = [draw(0.02), draw(0.2)];
     let (mut stuck, mut armed_ms, mut start_m) = (None, None, Vector3::zeros());
@@ -126,7 +126,7 @@ fn fly(
             _ => None,
         };
         let message = match fault {
-            // MAV_STANDARD_MODE_POSITION_HOLD, once the sticks are heard.
+            // MAV_STANDARD_MODE_POSITION_HOLD, once the sticks are received.
             Fault::None if now_ms == at_ms + 100 => Some(Uplink::Command(Command::SelectStandardMode(1))),
             Fault::None if now_ms > at_ms && now_ms % 1_000 > 0 => {
                 Some(Uplink::Target(ExternalTarget::Sticks(jerky(now_ms))))
@@ -168,20 +168,20 @@ fn scenario(seed: u64) -> Scenario {
     scenario
 }
 
-/// What a flight with a fault must be like.
+/// Checks a flight with a fault.
 fn check(flown: &Flown, second_flies: bool, works: [bool; 2], what: &str) {
     assert!(!flown.lost && flown.off_m < OFF_M && flown.tilt_rad < TILT_RAD, "{what}: {flown:?}");
     assert_eq!((flown.second_flies, flown.works), (second_flies, works), "{what}: {flown:?}");
 }
 
-/// Whichever sensor, quantity, axis, size and instant, sudden or by and by, with and without a compass: the wrong one
-/// does not fly any more soon, and the right one is never left.
+/// For either sensor, and faults of any quantity, axis, size, time and onset, with or without a compass: the wrong
+/// sensor is soon out of use, and the right one never is.
 #[test]
 fn the_right_one_flies_of_two_that_disagree() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
     let mut uniform = |least: f32, most: f32| least + (most - least) * (random.next_u64() as f32 / u64::MAX as f32);
     for case in 0..CASES {
-        // 3 to 30 deg/s; or 0.15 to 0.5 g.
+        // A bias of 3 to 30 deg/s, or of 0.15 to 0.5 g.
         let quantity = usize::from(case % 5 == 4);
         let size = [uniform(3.0_f32.ln(), 30.0_f32.ln()).exp().to_radians(), uniform(1.5, 5.0)][quantity];
         let direction = match case % 4 {
@@ -192,7 +192,7 @@ fn the_right_one_flies_of_two_that_disagree() {
         let of_second = case / 8 % 2 == 1;
         let fault = Fault::Bias(quantity, direction * size, ramp_ms);
         let at_ms = uniform(13_000.0, 17_000.0) as u64;
-        // Without a compass nothing tells of a heading in a hover.
+        // Without a compass, nothing measures the heading in a hover.
         let has_compass = case / 16 % 2 == 0 || direction.z.abs() > 0.7;
         let flown = fly(&scenario(case as u64 + 1), Host::new().unwrap(), of_second, fault, at_ms, 26_000, has_compass);
         let what = format!("case {case}: of second {of_second}, {fault:?} at {at_ms} ms, compass {has_compass}");
@@ -201,7 +201,7 @@ fn the_right_one_flies_of_two_that_disagree() {
     }
 }
 
-/// The same of every vehicle.
+/// Every other vehicle flies on the right sensor, too.
 #[test]
 fn every_vehicle_is_carried_by_the_right_one() {
     let faults = [
@@ -221,7 +221,7 @@ fn every_vehicle_is_carried_by_the_right_one() {
     }
 }
 
-/// A quantity that repeats itself while the other sensor's changes is no sample, and the other sensor flies.
+/// A sensor with a stuck quantity is not used; the other sensor flies.
 #[test]
 fn a_quantity_that_is_stuck_does_not_fly() {
     for (case, of_second) in [false, true].into_iter().cycle().take(8).enumerate() {
@@ -231,7 +231,7 @@ fn a_quantity_that_is_stuck_does_not_fly() {
     }
 }
 
-/// Nothing changes in flights without a fault, of every vehicle, by jerky sticks, in calm air and in a strong wind.
+/// Without a fault the sensors are never changed, for each vehicle, with jerky sticks, in calm air and in strong wind.
 #[test]
 fn without_a_fault_the_first_flies() {
     let vehicles = BUILT_IN.iter().filter(|built_in| built_in.name != "crazyflie");

@@ -1,4 +1,4 @@
-//! A vehicle that is flown by radio: from a receiver's bytes to the plant.
+//! Simulates a vehicle flown by radio, from a receiver's bytes to the plant.
 #![allow(dead_code, reason = "each test uses a part")]
 
 use afbc::Profile;
@@ -16,7 +16,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 use std::path::Path;
 
-/// From the ground, outdoors, on the estimate.
+/// Scenario that starts on the ground, outdoors, with an estimator.
 const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../twin/scenarios/hover.toml");
 /// MAV_PARAM_TYPE_REAL32.
 const REAL32: u8 = 9;
@@ -30,7 +30,7 @@ pub(crate) const ARM: usize = 4;
 pub(crate) const MODE: usize = 5;
 pub(crate) const KILL: usize = 6;
 
-/// What a receiver makes of a frame: its bytes, or nothing.
+/// Encodes the channels as a receiver's bytes, or returns no bytes.
 pub(crate) type Receiver = Box<dyn FnMut(&Channels, &mut Xoshiro256PlusPlus) -> Vec<u8>>;
 
 pub(crate) struct Flier {
@@ -48,13 +48,13 @@ pub(crate) struct Flier {
     pub(crate) texts: Vec<u8>,
 }
 
-/// Every frame arrives.
+/// Returns a CRSF receiver that gets every frame.
 pub(crate) fn crsf() -> Receiver {
     Box::new(|channels, _| CrsfFrame::Channels(*channels).encode().to_vec())
 }
 
 impl Flier {
-    /// On the ground, its estimate ready; the pilot is heard, sticks centred, switches off.
+    /// Creates a vehicle on the ground with a ready estimate. The radio is connected, sticks centred, switches off.
     pub(crate) fn new(seed: u64, receiver: Receiver, every_ms: u64, sbus: bool) -> Self {
         let mut flier = Self::of(None, false, seed, receiver, every_ms);
         flier.set("RC_PROTOCOL", u8::from(sbus).into());
@@ -62,7 +62,7 @@ impl Flier {
         flier
     }
 
-    /// Likewise another vehicle, without a wind if it is calm, and before its estimate is ready.
+    /// Creates a vehicle whose estimate is not ready yet. `vehicle` selects its type, and `calm` removes the wind.
     pub(crate) fn of(vehicle: Option<&Vehicle>, calm: bool, seed: u64, receiver: Receiver, every_ms: u64) -> Self {
         let mut scenario = load(Path::new(SCENARIO)).unwrap();
         if calm {
@@ -110,7 +110,7 @@ impl Flier {
             self.host.hear_radio(&bytes);
         }
         let mut buffer = [0; FRAME_MAX];
-        // A station that was heard is missed when it is silent.
+        // A heartbeat every second, as the vehicle would miss a station that falls silent.
         let message = message.or((self.ms % 1_000 == 500).then_some(&Uplink::Heartbeat));
         let bytes = message.map_or(Vec::new(), |message| self.sender.send(message, &mut buffer).to_vec());
         let tick = self.host.next_tick(&bytes);
@@ -135,7 +135,7 @@ impl Flier {
         self.world.plant().motion().position_m
     }
 
-    /// Largest tilt from now on for a time \[rad\].
+    /// Flies for this time, and returns the largest tilt \[rad\].
     pub(crate) fn tilt_rad(&mut self, ms: u64) -> f64 {
         (0..ms).fold(0.0, |most: f64, _| {
             self.tick(None);
