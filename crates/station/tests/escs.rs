@@ -272,7 +272,7 @@ fn a_failed_rotor_is_reported() {
             Downlink::Telemetry(Telemetry::EscInfo(info)) => Some(info.failures),
             _ => None,
         });
-        assert_eq!(flags, Some(failures.map(|it| if it.is_some() { 128 } else { 0 })[..4].try_into().expect("four")));
+        assert_eq!(flags, Some(failures.map(|it| if it.is_some() { 64 } else { 0 })[..4].try_into().expect("four")));
         let (texts, orders) = vehicle.turn(500, [SPEED; 4]);
         let again = format!("rotor {} turns as commanded again", rotor + 1);
         assert_eq!((texts, orders), (vec![(MavSeverity::MAV_SEVERITY_NOTICE, again)], vec![]));

@@ -7,8 +7,8 @@ use afbc_types::Stamped;
 
 /// Value for an unknown temperature.
 const NO_TEMPERATURE: i16 = i16::MAX;
-/// Bit of `ESC_FAILURE_FLAGS` that marks a failed rotor.
-const GENERIC: u16 = 128;
+/// `ESC_FAILURE_GENERIC`, the flag of a failed rotor.
+const GENERIC: u16 = 64;
 
 /// Returns the number of the first ESC of a group of four, and the readings of the group.
 fn four(status: &VehicleStatus, page: u8) -> Option<(u8, [Option<Stamped<EscReading>>; ESCS_PER_MESSAGE])> {
