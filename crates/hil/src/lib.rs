@@ -5,7 +5,7 @@
 //!
 //! 1. [`Autopilot`]: receives and sends bytes once per millisecond.
 //! 2. [`Host`]: the firmware's code in this process. Other implementations are an emulated processor, and a board on a
-//!   serial port.
+//!    serial port.
 //! 3. [`Station`]: tracker, commander and ground station, at the other end of the link.
 //! 4. [`fly()`]: arms, releases the vehicle, flies a scenario, disarms. [`MessagePeriods`] sets the message rates.
 //!

@@ -106,7 +106,7 @@ enum Command {
     Paper(paper::Paper),
     #[cfg(feature = "all")]
     #[command(flatten)]
-    Other(commands::Other),
+    Other(Box<commands::Other>),
     #[cfg(not(feature = "all"))]
     #[command(external_subcommand)]
     Absent(Vec<String>),
