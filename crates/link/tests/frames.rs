@@ -89,8 +89,8 @@ fn what_is_no_rotation_is_refused() {
 /// Returns the largest rounding error of a velocity that is rotated into the body frame and back \[m/s\].
 ///
 /// The rotation `v + 2w(q x v) + 2q x (q x v)` rounds about ten times, each by at most half of EPSILON times the speed.
-/// Twice as much comes from |q|, which is 1 within two roundings and enters squared. In total, 8 EPSILON times the speed
-/// per rotation.
+/// Twice as much comes from |q|, which is 1 within two roundings and enters squared. In total, 8 EPSILON times the
+/// speed per rotation.
 fn rotated_twice(state: &State) -> f32 {
     16.0 * f32::EPSILON * state.velocity_m_s.norm()
 }
