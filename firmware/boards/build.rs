@@ -7,7 +7,8 @@ fn main() {
     let board = Path::new(env!("CARGO_MANIFEST_DIR"));
     let [own, sections] = [board.join("memory.x"), board.with_file_name("link.x")];
     let root = board.ancestors().nth(3).expect("the workspace's root");
-    for file in [&own, &sections, &root.join("memory.x")] {
+    // Cargo takes a file that is not there for changed, and would link every image at each build.
+    for file in [&own, &sections, &root.join("memory.x")].into_iter().filter(|file| file.is_file()) {
         println!("cargo:rerun-if-changed={}", file.display());
     }
     // Uses the board's own memory map. Without one, cortex-m-rt's link.x includes the map at the workspace's root.

@@ -35,7 +35,7 @@ fn framed(record: &Record) -> Vec<u8> {
     write(record, &mut [0; FRAME_MAX]).unwrap().to_vec()
 }
 
-/// What happens to a frame in transit.
+/// Fault of a frame in transit.
 #[derive(Clone, Debug)]
 enum Fate {
     Arrives,

@@ -44,7 +44,7 @@ fn each_flight_has_a_law_of_its_own() {
 }
 
 proptest! {
-    /// Whatever a law returns, the rotors turn at finite speeds within their limits.
+    /// The rotors turn at finite speeds within their limits, for any input that a law returns.
     #[test]
     fn no_input_reaches_the_rotors_unchecked(inputs in prop::array::uniform4(prop::num::f32::ANY)) {
         let [roll_n, pitch_n, yaw_n, thrust_n] = inputs;

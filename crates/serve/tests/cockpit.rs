@@ -160,7 +160,7 @@ fn nonsense_is_refused() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Whatever a page sends, the vehicle flies on, and its frames are valid JSON.
+    /// The vehicle flies on for any text that a page sends, and its frames are valid JSON.
     #[test]
     fn no_input_stops_it(text in ".{0,60}", lines in prop::collection::vec("[a-z]{1,9} [0-9a-z. -]{0,12}", 3)) {
         let mut page = Page::of("mocap");

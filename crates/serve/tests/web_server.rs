@@ -213,7 +213,7 @@ fn commands_of_the_page_fly_the_vehicle() {
     }
 }
 
-/// Whatever arrives, the flight's loop does not wait, and well-behaved clients are still served.
+/// Hostile clients do not make the flight's loop wait, and well-behaved clients are still served.
 #[test]
 fn hostile_clients_cost_the_flight_nothing() {
     let mut flight = Flight::new(None);

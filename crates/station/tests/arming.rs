@@ -301,9 +301,9 @@ fn limited(limits: &[f32; 4]) -> Bench {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(150))]
 
-    /// Whatever the limits and the state, even if limits change meanwhile: the checks say "ready to arm" and SYS_STATUS
-    /// shows the vehicle as ready exactly if an arm command is accepted in that tick. Otherwise the checks begin with
-    /// the reason of the refusal.
+    /// The checks say "ready to arm", and SYS_STATUS shows the vehicle as ready, exactly if an arm command is accepted
+    /// in that tick. Otherwise the checks begin with the reason of the refusal. This holds for any limits and states,
+    /// also if limits change meanwhile.
     #[test]
     fn the_report_is_what_the_flight_core_decides(
         limits in prop::array::uniform4(size(4.0)),

@@ -364,7 +364,7 @@ fn defaults_are_restored_and_listed() {
 }
 
 proptest! {
-    /// Whatever stations send, every PARAM_SET of a parameter is answered or counted, and the vehicle can fly.
+    /// Every PARAM_SET of a parameter is answered or counted, for any messages of stations, and the vehicle can fly.
     #[test]
     fn any_questions(
         asks in prop::collection::vec((0..5_u8, any::<u16>(), any::<[u8; 4]>(), any::<u8>(), any::<bool>()), 0..200),

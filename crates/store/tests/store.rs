@@ -153,7 +153,7 @@ proptest! {
         prop_assert_eq!(works(bytes), (Found { foreign: true, ..Found::default() }, vec![]));
     }
 
-    /// Whatever bits flip in a store's flash, only values that were written are found.
+    /// A store finds only values that were written, for any flipped bits in its flash.
     #[test]
     fn flipped_bits_make_no_value(flips in prop::collection::vec(0..960_usize * 8, 1..40), sets in 1..60_u32) {
         let mut store = Store::open(blank::<480>(), 0, 1).unwrap();

@@ -10,6 +10,7 @@ use afbc_campaign::compare::{self, choose, standard};
 use afbc_campaign::suite::suite_at;
 use afbc_files::read::words::nearest;
 use afbc_report::compare as report;
+use afbc_scenario::contender::MONITORED;
 use afbc_sim::LogRate;
 use clap::Args;
 use std::path::PathBuf;
@@ -65,7 +66,7 @@ impl Compare {
             let known = compare::standard_and_monitored();
             let is_rough = rough::is_named(path);
             let contenders = match self.controllers.as_slice() {
-                [] if is_rough => choose(&known, &["afbc-monitored".to_owned()])?,
+                [] if is_rough => choose(&known, &[MONITORED.to_owned()])?,
                 [] if own.is_empty() => known,
                 names => choose(&known, names)?,
             };

@@ -1,4 +1,4 @@
-//! What the tests of all drivers have in common.
+//! Tests that every driver passes.
 
 use super::{Model, Rig, comes_back_at_once, refuses_another, run, survives_all_troubles};
 use afbc_drivers::{InertialReading, MagneticReading, PartFault, PressureReading, SensorPart};
@@ -6,7 +6,7 @@ use afbc_types::Stamped;
 use nalgebra::Vector3;
 use std::ops::RangeInclusive;
 
-/// What gives the time of a part's readings.
+/// Source of the time of a part's readings.
 #[derive(Debug)]
 pub enum Pace {
     /// Its interrupts, one in so many us; at least so many readings are in the first second.

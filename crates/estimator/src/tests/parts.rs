@@ -398,7 +398,7 @@ fn an_aid_is_live_for_a_while() {
     assert_eq!((record.accepted, record.accepted_us, record.rejected_since_us), (1, Some(1000), None));
     assert!(record.is_live(1100, 100) && !record.is_live(1101, 100) && record.is_live(500, 0));
     assert_eq!(record.reject(2000), 0);
-    // Which aids hold position and velocity.
+    // Each aid holds the position, the velocity or neither.
     for live in Aid::ALL {
         let mut aids = Aids::default();
         aids.of_mut(live).accept(1000);
