@@ -2,14 +2,14 @@
 //! the ground stations.
 
 use crate::samples::{self, SampleTime, SampleValue};
+use afbc_comms::AuxSensors;
+use afbc_comms::services::health::sensor;
+use afbc_comms::services::origin::{EarthOrigin, Global};
+use afbc_comms::services::status::{GnssReceiver, SensorBits};
 use afbc_drivers::battery::{BatteryPins, BatteryScale};
 use afbc_drivers::{FixReading, MagneticReading, PressureReading};
 use afbc_estimator::Origin;
 use afbc_onboard::sensors::{FixFrame, field, height};
-use afbc_station::AuxSensors;
-use afbc_station::services::health::sensor;
-use afbc_station::services::origin::{EarthOrigin, Global};
-use afbc_station::services::status::{GnssReceiver, SensorBits};
 use afbc_types::Stamped;
 use core::cell::RefCell;
 use embassy_sync::blocking_mutex::Mutex;

@@ -1,8 +1,8 @@
 //! Telemetry of the motor controllers, passed between the board's tasks and the link task.
 
 use crate::vehicle::{ParameterTable, ROTORS};
+use afbc_comms::EscReports;
 use afbc_estimator::VelocityNotch;
-use afbc_station::EscReports;
 use afbc_types::ROTORS_MAX;
 use core::cell::{Cell, RefCell};
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};

@@ -4,13 +4,13 @@
 use crate::aux_sensors;
 use crate::board::Board;
 use crate::vehicle::{NAME, ParameterTable, ROTORS};
+use afbc_comms::{Comms, LogServer, REPORT_MAX};
 use afbc_log::storage::{
     BlockSink, KeptLogs, LogBlock, LogKeeper, LogPage, LogPages, LogQuery, LogWriter, StorageState,
 };
 use afbc_log::ulog::{BesideTick, LogStart};
 use afbc_onboard::parameters::RecordChange;
 use afbc_onboard::{EscTelemetry, TickRecord};
-use afbc_station::{Comms, LogServer, REPORT_MAX};
 use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use embassy_futures::select::{Either3, select3};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -167,7 +167,7 @@ impl LinkLog {
     #[inline(never)]
     pub(crate) fn send(&mut self, now_us: u64, messages: &[u8]) {
         let LinkLog { writer, queue, .. } = self;
-        for (severity, text) in afbc_link::sent_texts(messages) {
+        for (severity, text) in afbc_mavlink::sent_texts(messages) {
             writer.text(now_us, severity, text);
         }
         writer.send(queue, storage());

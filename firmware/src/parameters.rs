@@ -8,8 +8,8 @@
 
 use crate::control;
 use crate::vehicle::{CONFIGURATION, NAME, ParameterTable, Prepared};
+use afbc_comms::services::signing::{Signing, SigningRecord};
 use afbc_onboard::parameters::{Kept, RecordChange};
-use afbc_station::services::signing::{Signing, SigningRecord};
 use afbc_store::{Error, RecordName, Store, hash};
 use core::cell::RefCell;
 use core::future::poll_fn;

@@ -4,9 +4,9 @@ use crate::board::{Board, Links, Transmitter as _};
 use crate::recording;
 use crate::ticks::Tick;
 use crate::vehicle::ParameterTable;
+use afbc_comms::{Comms, RadioControl};
 use afbc_onboard::ControlInputs;
-use afbc_radio::RadioProtocol;
-use afbc_station::{Comms, RadioControl};
+use afbc_rc::RadioProtocol;
 use static_cell::StaticCell;
 
 /// Baud rate of CRSF: that of ExpressLRS, and close enough to Crossfire's 416,666.

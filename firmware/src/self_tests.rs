@@ -1,9 +1,9 @@
 //! Self-tests of the sensors: passes a station's request from the link task to the sensor tasks, and the results back.
 
 use crate::control;
-pub use afbc_station::services::health::sensor;
-use afbc_station::services::sensors;
-use afbc_station::services::status::SensorBits;
+pub use afbc_comms::services::health::sensor;
+use afbc_comms::services::sensors;
+use afbc_comms::services::status::SensorBits;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 /// Bits of the first, or only, inertial sensor.

@@ -1,7 +1,7 @@
 //! Board connected to a serial port.
 
 use afbc_hil::{Autopilot, Error, Station};
-use afbc_link::Command;
+use afbc_mavlink::Command;
 use serialport::SerialPort;
 use std::io;
 use std::thread;

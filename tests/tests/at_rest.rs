@@ -5,7 +5,7 @@ use afbc::integral::IntegralBackstepping;
 use afbc::monitor::Bounds;
 use afbc::{Adaptive, Backstepping, Controller, Guarded, Profile};
 use afbc_control::{FlightController, Settings, Trace, Validated};
-use afbc_peers::{Dfbc, Geometric, Indi, L1, Pid, dfbc, geometric, indi, l1, pid};
+use afbc_laws::{Dfbc, Geometric, Indi, L1, Pid, dfbc, geometric, indi, l1, pid};
 use afbc_types::{Parameters, PerAxis, Setpoint, State};
 use core::fmt::Debug;
 use nalgebra::Vector3;

@@ -3,7 +3,7 @@
 
 use afbc_flight_core::{EndReason, Mode};
 use afbc_hil::{Host, Station};
-use afbc_link::Command;
+use afbc_mavlink::Command;
 use afbc_plant::{Contact, Environment, Motion, Plant, PlantModel, Realism};
 use afbc_types::{Parameters, State};
 use nalgebra::Vector3;

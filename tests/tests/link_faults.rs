@@ -6,7 +6,7 @@
 
 use afbc_flight_core::{Mode, Refusal, Request};
 use afbc_hil::{Host, Station};
-use afbc_link::Command;
+use afbc_mavlink::Command;
 use afbc_plant::{Contact, Environment, Motion, Plant, PlantModel, Realism};
 use afbc_scenario::Scenario;
 use afbc_scenario::paper;

@@ -5,10 +5,10 @@ use afbc_campaign::random::{Random, Seen};
 use afbc_flight_core::Mode;
 use afbc_guidance::FlightMode;
 use afbc_hil::{Autopilot, Error, Host, MessagePeriods, Station, firmware, fly};
-use afbc_link::{
+use afbc_log::exact::{Frames, Record, ReplayStep, Replayer};
+use afbc_mavlink::{
     Address, Command, Datum, Decoder, Downlink, FRAME_MAX, Height, ParameterRequest, Sender, Telemetry, Uplink,
 };
-use afbc_log::exact::{Frames, Record, ReplayStep, Replayer};
 use afbc_onboard::{Configuration, Readings, Report};
 use afbc_plant::{Motion, Payload, Plant, RotorFault};
 use afbc_scenario::{Scenario, load};

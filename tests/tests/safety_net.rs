@@ -7,7 +7,7 @@ use crate::airborne::checker::End;
 use crate::airborne::{Checker, STATION, Session, Tick, on_all_cores};
 use crate::safety_cases::{Case, Do, Start, cases};
 use afbc_guidance::FlightMode;
-use afbc_link::{Command, Datum, Height, Uplink};
+use afbc_mavlink::{Command, Datum, Height, Uplink};
 use std::{env, fs};
 
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/safety.md");

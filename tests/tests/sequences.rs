@@ -5,9 +5,9 @@
 //! SEQUENCES=1` flies only number seventeen.
 
 use crate::airborne;
+use afbc_comms::services::modes;
 use afbc_guidance::FlightMode;
-use afbc_link::{Address, Answer, Command, ControlRequest, Datum, Downlink, Height, Mission, Plan, Storage, Uplink};
-use afbc_station::services::modes;
+use afbc_mavlink::{Address, Answer, Command, ControlRequest, Datum, Downlink, Height, Mission, Plan, Storage, Uplink};
 use airborne::checker::{Bounds, End};
 use airborne::session::{global, item};
 use airborne::{COMPANION, Checker, STATION, Session, Tick, on_all_cores, place, velocity};

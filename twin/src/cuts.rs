@@ -8,7 +8,7 @@ use crate::machine::{Machine, quiet_usb};
 use crate::random::Random;
 use crate::trouble::Patient;
 use crate::wire::Wire;
-use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, ParameterName, ParameterRequest, Sender, Uplink};
+use afbc_mavlink::{Address, Decoder, Downlink, FRAME_MAX, ParameterName, ParameterRequest, Sender, Uplink};
 use rigless::emulator::{AccessKind, Driver, Host, Settled, Start, Stop, run};
 use rigless::image::Image;
 use rigless::machine::matekh743::MatekH743;

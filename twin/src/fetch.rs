@@ -2,7 +2,7 @@
 //! logs.
 
 use crate::check::check;
-use afbc_link::{Decoder, LogEntry, LogMessage, LogRequest, Question, Uplink};
+use afbc_mavlink::{Decoder, LogEntry, LogMessage, LogRequest, Question, Uplink};
 use std::error::Error;
 
 /// Time after the flight until the log has ended, and between two attempts of a request [ms].

@@ -2,7 +2,7 @@
 
 use crate::check::check;
 use afbc_ground::UploadEnd;
-use afbc_link::{MavCmd, MissionItem};
+use afbc_mavlink::{MavCmd, MissionItem};
 use std::error::Error;
 
 /// MAV_FRAME_LOCAL_NED, whose origin is the vehicle's start.

@@ -1,7 +1,7 @@
 //! Pilot's transmitter, with a CRSF receiver at a UART of the board.
 
 use crate::wire::Wire;
-use afbc_radio::{Channels, CrsfDecoder, CrsfFrame};
+use afbc_rc::{Channels, CrsfDecoder, CrsfFrame};
 use std::collections::BTreeSet;
 
 /// Duration of a byte of ten bits at 420,000 baud \[ns\].

@@ -3,7 +3,7 @@
 //! Frames, units and the meaning of "(n)" are defined in [`afbc_types`].
 //!
 //! * [`FlightController`]: a step from state and setpoint to an [`Action`], and a [`Trace`] of its internal signals.
-//!   Control laws are in the crates `afbc` and `afbc-peers`. A new law needs only this crate.
+//!   Control laws are in the crates `afbc` and `afbc-laws`. A new law needs only this crate.
 //! * [`Validated`]: a controller's memory behind a screen that rejects implausible inputs.
 //! * [`mixer`]: control allocation, from U1..U4 to rotor forces and speeds, and back.
 //! * [`command_filter`]: a smooth reference with two derivatives.

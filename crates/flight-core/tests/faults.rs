@@ -6,7 +6,7 @@ use afbc_flight_core::{
     ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, RequestAnswer, Stamped, Ticketed,
     Tracker,
 };
-use afbc_link::{Address, Command, Counters, Decoder, FRAME_MAX, Sender, Uplink};
+use afbc_mavlink::{Address, Command, Counters, Decoder, FRAME_MAX, Sender, Uplink};
 use afbc_types::{Parameters, PoseSigmas, RotorSpeeds, Setpoint, State};
 
 const STATION: Address = Address { system: 255, component: 190 };

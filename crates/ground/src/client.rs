@@ -5,7 +5,7 @@ use crate::parameters::VehicleParameters;
 use crate::repeated::Patience;
 use crate::uploads::{UploadEnd, Uploads};
 use crate::vehicle::{VehicleState, VehicleText};
-use afbc_link::{
+use afbc_mavlink::{
     Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, MissionItem, ParameterRequest, Plan,
     ReceivedFrame, Sender, Uplink,
 };

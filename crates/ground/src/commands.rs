@@ -2,7 +2,7 @@
 //! time.
 
 use crate::repeated::{Due, Patience, Repeated};
-use afbc_link::{Answer, Command, MavCmd};
+use afbc_mavlink::{Answer, Command, MavCmd};
 use std::collections::BTreeMap;
 
 /// A command that no vehicle knows: it is answered at once and changes nothing.

@@ -1,7 +1,7 @@
 //! Download of the vehicle's parameters.
 
 use crate::repeated::{Due, Patience, Repeated};
-use afbc_link::{ParameterRequest, ParameterValue};
+use afbc_mavlink::{ParameterRequest, ParameterValue};
 use std::collections::BTreeMap;
 
 /// Time without a new parameter after which missing ones are requested \[ms\], how many times that is done, and how

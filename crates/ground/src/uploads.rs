@@ -1,7 +1,7 @@
 //! Uploads of missions, fences and rally points. The vehicle requests them item by item.
 
 use crate::repeated::{Due, Patience, Repeated};
-use afbc_link::{Mission, MissionItem, MissionResult, Plan};
+use afbc_mavlink::{Mission, MissionItem, MissionResult, Plan};
 use std::collections::VecDeque;
 
 /// Result of an upload.

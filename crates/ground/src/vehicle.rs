@@ -1,6 +1,6 @@
 //! State of the vehicle, as its messages report it.
 
-use afbc_link::{Address, Downlink, MavSeverity};
+use afbc_mavlink::{Address, Downlink, MavSeverity};
 
 /// `MAV_COMP_ID_AUTOPILOT1`.
 const AUTOPILOT: u8 = 1;

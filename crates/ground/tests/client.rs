@@ -4,7 +4,7 @@
 mod line;
 
 use afbc_ground::{Client, CommandState, Patience, UploadEnd};
-use afbc_link::{
+use afbc_mavlink::{
     Address, Answer, Command, Downlink, Mission, MissionItem, MissionResult, ParameterRequest, Plan, Uplink,
 };
 use line::{COMPANION, Line, OTHER_VEHICLE, VEHICLE};

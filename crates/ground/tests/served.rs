@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc_ground::bring_up::{BringUpLog, BringUpOptions, Error, Verdict, bring_up};
-use afbc_link::{Address, Command, Downlink, FRAME_MAX, Key, SIGNED_FRAME_MAX, Sender, Stamp, Uplink};
+use afbc_mavlink::{Address, Command, Downlink, FRAME_MAX, Key, SIGNED_FRAME_MAX, Sender, Stamp, Uplink};
 use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
 

@@ -4,6 +4,7 @@ use crate::host_black_box::{HostBlackBox, Sink};
 use crate::metadata::MetadataFiles;
 use afbc::AdaptiveEstimate;
 use afbc_calibration::RawSample;
+use afbc_comms::{Calibrator, Comms, EscAction, EscReports, EscsHeard, RadioControl};
 use afbc_log::exact::Recorder;
 use afbc_log::ulog::{BlackBox, LogStart};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
@@ -12,7 +13,6 @@ use afbc_onboard::{
     TickDetails, TickInputs, TickRecord,
 };
 use afbc_scenario::{AnyController, FlownLaw};
-use afbc_station::{Calibrator, Comms, EscAction, EscReports, EscsHeard, RadioControl};
 use afbc_store::RecordName;
 use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX};
 

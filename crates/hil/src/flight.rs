@@ -4,7 +4,7 @@ use super::{Autopilot, Error, MessagePeriods, ReceivedMessages, Station};
 use afbc::Profile;
 use afbc_control::{Action, Trace};
 use afbc_files::read::FileError;
-use afbc_link::{Answer, Command};
+use afbc_mavlink::{Answer, Command};
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_sim::flight::{Lost, Pilot, Sample, View, World, lockstep};

@@ -8,12 +8,14 @@ use crate::served_files::{OpenFile, ServedFiles};
 use crate::simulated_escs::SimulatedEscs;
 use crate::stored_logs::StoredLogs;
 use afbc::AdaptiveEstimate;
+use afbc_comms::services::signing::{Signing, SigningRecord};
+use afbc_comms::{Calibrator, Comms, EscReports, EscsHeard, RadioControl, Setup, Transfers};
 use afbc_estimator::Origin;
 use afbc_files::Flash;
 use afbc_flight_core::rate::PERIOD_US;
-use afbc_link::{Decoder, MissionItem, Uplink};
 use afbc_log::exact::Recorder;
 use afbc_log::ulog::LogStart;
+use afbc_mavlink::{Decoder, MissionItem, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
 use afbc_onboard::{
     Configuration, ControlInputs, Flight, ImuSelector, Link, Prepare, RawReadings, Readings, Report, TickBefore,
@@ -22,8 +24,6 @@ use afbc_onboard::{
 use afbc_plant::Plant;
 use afbc_scenario::FlownLaw;
 use afbc_scenario::contender::{ControllerKind, Law};
-use afbc_station::services::signing::{Signing, SigningRecord};
-use afbc_station::{Calibrator, Comms, EscReports, EscsHeard, RadioControl, Setup, Transfers};
 use afbc_store::{RecordName, Store};
 use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX, with_rotors};
 use afbc_vehicles::Vehicle;

@@ -1,8 +1,8 @@
 //! The black box of a host. Its ring is emptied after every tick, or by the stream to a station.
 
 use afbc_estimator::Origin;
-use afbc_link::{Address, Decoder, Downlink};
 use afbc_log::ulog::{BesideTick, BlackBox, LogRing};
+use afbc_mavlink::{Address, Decoder, Downlink};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{EscTelemetry, TickRecord};
 use afbc_types::ROTORS_MAX;

@@ -1,5 +1,5 @@
 //! Flies scenarios with the firmware, or a replacement for it, as autopilot. The plant is on this side and the law on
-//! the other. Only the bytes of [`afbc_link`] connect them.
+//! the other. Only the bytes of [`afbc_mavlink`] connect them.
 //!
 //! # Reading order
 //!

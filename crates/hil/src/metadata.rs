@@ -2,9 +2,9 @@
 //!
 //! See <https://mavlink.io/en/services/component_information.html>. QGroundControl reads version 1 of both files.
 
-use afbc_link::ComponentMetadata;
+use afbc_comms::services::ftp::crc32;
+use afbc_mavlink::ComponentMetadata;
 use afbc_onboard::parameters::{Kind, Parameter, ParameterTable};
-use afbc_station::services::ftp::crc32;
 use afbc_types::Declaration;
 use serde_json::{Map, Value, json};
 

@@ -69,7 +69,7 @@ fn least_baud() -> u32 {
 #[allow(clippy::unwrap_used, reason = "a test")]
 mod tests {
     use super::*;
-    use afbc_link::{Address, Command, FRAME_MAX, MavCmd, Sender, Uplink};
+    use afbc_mavlink::{Address, Command, FRAME_MAX, MavCmd, Sender, Uplink};
     use afbc_types::{PoseSigmas, Setpoint, State};
 
     #[test]

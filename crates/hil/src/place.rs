@@ -1,8 +1,8 @@
 //! Geographic position of a simulated flight.
 
+use afbc_comms::services::origin::{EarthOrigin, Global};
 use afbc_estimator::Origin;
 use afbc_scenario::Scenario;
-use afbc_station::services::origin::{EarthOrigin, Global};
 
 /// Returns the geographic origin of a scenario's GNSS fixes, or none for a scenario without a GNSS receiver.
 #[must_use]

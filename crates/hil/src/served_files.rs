@@ -2,10 +2,10 @@
 
 use crate::host_black_box::HostBlackBox;
 use crate::stored_logs::StoredLogs;
-use afbc_link::FtpError;
-use afbc_station::services::storage::{
+use afbc_comms::services::storage::{
     DirectoryEntry, FileAccess, FileChange, FilePath, FileStore, LogInfo, LogSource, LogStore,
 };
+use afbc_mavlink::FtpError;
 use std::fs::File;
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::rc::Rc;

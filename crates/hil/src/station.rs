@@ -1,12 +1,12 @@
 //! The simulator's end of the link.
 
 use super::Extremes;
+use afbc_comms::services::modes;
+use afbc_comms::{BUSY, CALIBRATES};
 use afbc_flight_core::Refusal;
 use afbc_ground::{Client, PING, Patience};
 use afbc_guidance::FlightMode;
-use afbc_link::{Answer, Command, Counters, Downlink, HealthArray, Uplink};
-use afbc_station::services::modes;
-use afbc_station::{BUSY, CALIBRATES};
+use afbc_mavlink::{Answer, Command, Counters, Downlink, HealthArray, Uplink};
 use afbc_types::{PoseSigmas, ROTORS_MAX, RotorSpeeds, Setpoint, State};
 use nalgebra::Vector3;
 use std::time::Instant;

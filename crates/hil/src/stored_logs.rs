@@ -1,6 +1,6 @@
 //! The logs that stations may download.
 
-use afbc_station::services::storage::NAME_MAX;
+use afbc_comms::services::storage::NAME_MAX;
 use std::cell::RefCell;
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, ErrorKind};

@@ -10,11 +10,11 @@
 
 mod flier;
 
+use afbc_comms::AuxSensors;
+use afbc_comms::services::{health::sensor, status::SensorBits};
 use afbc_guidance::FlightMode;
-use afbc_link::{ChannelsOverride, Command, ExternalTarget, ManualControl, Uplink};
-use afbc_radio::{Channels, CrsfFrame, SbusFrame};
-use afbc_station::AuxSensors;
-use afbc_station::services::{health::sensor, status::SensorBits};
+use afbc_mavlink::{ChannelsOverride, Command, ExternalTarget, ManualControl, Uplink};
+use afbc_rc::{Channels, CrsfFrame, SbusFrame};
 use flier::{ARM, Flier, KILL, MODE, PITCH, ROLL, Receiver, THROTTLE, crsf};
 use rand_xoshiro::rand_core::Rng;
 

@@ -1,12 +1,12 @@
 //! Tests the files and metadata that a host serves.
 #![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
+use afbc_comms::services::ftp::crc32;
+use afbc_comms::services::storage::{FileAccess, FileChange, FilePath, FileStore, LogInfo, LogStore};
 use afbc_hil::{MetadataFiles, ServedFiles, UlogFiles};
-use afbc_link::FtpError;
+use afbc_mavlink::FtpError;
 use afbc_onboard::Configuration;
 use afbc_onboard::parameters::{Kind, ParameterTable};
-use afbc_station::services::ftp::crc32;
-use afbc_station::services::storage::{FileAccess, FileChange, FilePath, FileStore, LogInfo, LogStore};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;

@@ -7,7 +7,7 @@ use afbc_drivers::nmea::NmeaDecoder;
 use afbc_drivers::ublox::DELAY_US;
 use afbc_estimator::{Measurement, Origin};
 use afbc_hil::Host;
-use afbc_link::{Address, Command, Datum, FRAME_MAX, Height, Sender, Uplink};
+use afbc_mavlink::{Address, Command, Datum, FRAME_MAX, Height, Sender, Uplink};
 use afbc_onboard::sensors::FixFrame;
 use afbc_onboard::{Aged, Readings};
 use afbc_scenario::{Scenario, load};

@@ -10,7 +10,7 @@
 use afbc::Profile;
 use afbc_estimator::Measurement;
 use afbc_hil::Host;
-use afbc_link::{Address, Command, Datum, ExternalTarget, FRAME_MAX, Height, ManualControl, Sender, Uplink};
+use afbc_mavlink::{Address, Command, Datum, ExternalTarget, FRAME_MAX, Height, ManualControl, Sender, Uplink};
 use afbc_onboard::{Aged, ImuSelector};
 use afbc_scenario::{Scenario, load};
 use afbc_sim::flight::World;

@@ -4,8 +4,8 @@
 
 mod room;
 
-use afbc_link::LogRequest;
 use afbc_log::storage::StorageState;
+use afbc_mavlink::LogRequest;
 use proptest::prelude::*;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};

@@ -4,9 +4,9 @@
 
 mod room;
 
-use afbc_link::LogRequest;
+use afbc_comms::services::storage::LogStore;
 use afbc_log::storage::{LogMode, StorageState};
-use afbc_station::services::storage::LogStore;
+use afbc_mavlink::LogRequest;
 use proptest::prelude::*;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};

@@ -4,8 +4,8 @@
 
 mod room;
 
+use afbc_comms::services::storage::LogStore;
 use afbc_log::storage::{LogMode, StorageState, log_name};
-use afbc_station::services::storage::LogStore;
 use proptest::prelude::*;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};

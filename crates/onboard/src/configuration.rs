@@ -10,7 +10,7 @@ use afbc_estimator::Settings as Estimation;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::{Curve, Response};
 use afbc_flight_core::protocol::MotorOutputs;
-use afbc_radio::RadioSettings;
+use afbc_rc::RadioSettings;
 use afbc_types::{Airframe, Declared, Mounting, OutOfRange, Parameters, PerAxis, SensorCalibration};
 
 /// Everything that the firmware knows about its vehicle. The vehicles' configurations are in `vehicles/`.

@@ -3,7 +3,7 @@
 //!
 //! A vehicle with an inertial sensor flies on [its own estimate](EstimatorFrontEnd); without one, on states from the
 //! link. [`Flight`] runs the control tick every millisecond, on [`ControlInputs`] and [`Readings`]. On the board, the
-//! tick interrupts everything else, including the services of `afbc_station` that fill the inputs from messages. A host
+//! tick interrupts everything else, including the services of `afbc_comms` that fill the inputs from messages. A host
 //! that runs the same ticks with the same inputs and times gets the same bits as the processor.
 //!
 //! ```

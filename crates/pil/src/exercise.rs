@@ -1,7 +1,7 @@
 //! A test flight with every kind of event, as the bytes that reach the vehicle. Used for comparisons and budgets.
 
 use afbc_hil::Station;
-use afbc_link::{Command, Uplink};
+use afbc_mavlink::{Command, Uplink};
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 

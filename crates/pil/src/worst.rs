@@ -8,7 +8,7 @@
 use crate::{Emulator, Error};
 use afbc_estimator::Measurement;
 use afbc_hil::Station;
-use afbc_link::{Command, Uplink};
+use afbc_mavlink::{Command, Uplink};
 use afbc_onboard::{AIDS_MAX, Aged, Readings};
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;

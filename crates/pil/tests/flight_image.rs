@@ -4,10 +4,10 @@
 
 mod common;
 
+use afbc_comms::CLOCK_FAILED;
 use afbc_flight_core::Refusal;
 use afbc_hil::Station;
-use afbc_link::{Address, Answer, Command, Decoder, Downlink, HealthArray, Uplink};
-use afbc_station::CLOCK_FAILED;
+use afbc_mavlink::{Address, Answer, Command, Decoder, Downlink, HealthArray, Uplink};
 use common::start_or_skip;
 use pil::budget::Linked;
 use pil::clock_tree::{FLASH_ACR, RCC_CFGR, RCC_PLLCFGR};

@@ -3,10 +3,10 @@
 
 mod common;
 
+use afbc_comms::services::streams::DEFAULTS;
 use afbc_flight_core::Mode;
 use afbc_hil::{Host, HostTick, Station};
-use afbc_link::{Command, Uplink};
-use afbc_station::services::streams::DEFAULTS;
+use afbc_mavlink::{Command, Uplink};
 use common::start_or_skip;
 use pil::exercise::{TICKS, bytes_of_tick};
 use pil::{Emulator, Image, TickReply};

@@ -8,7 +8,7 @@ use afbc::monitor::Bounds;
 use afbc::{Guarded, LAG_S, Profile, Safeguards, Settings, adaptive, by_rule, slowness};
 use afbc_control::FlightController;
 use afbc_files::read::FileError;
-use afbc_peers::slowed;
+use afbc_laws::slowed;
 use afbc_types::{
     Airframe, Axis, Declaration, Declared, OutOfRange, Parameters, PerAxis, Rotor, ValueMut, with_rotors,
 };

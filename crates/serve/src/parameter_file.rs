@@ -1,11 +1,11 @@
 //! A vehicle's parameters in a file, stored by the firmware's code.
 
+use afbc_comms::services::signing::SigningRecord;
 use afbc_files::{Flash, FlashError, FlashFailure};
 use afbc_hil::Host;
 use afbc_onboard::Link;
 use afbc_onboard::parameters::{Kept, RecordChange};
 use afbc_scenario::Scenario;
-use afbc_station::services::signing::SigningRecord;
 use afbc_store::{Error, Store, hash};
 use afbc_types::OutOfRange;
 use std::io::ErrorKind;

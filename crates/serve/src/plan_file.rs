@@ -5,7 +5,7 @@
 
 use crate::waypoint_file;
 use afbc_files::read::FileError;
-use afbc_link::{MissionItem, Place};
+use afbc_mavlink::{MissionItem, Place};
 use serde_json::Value;
 
 /// MAVLink frames MAV_FRAME_GLOBAL and MAV_FRAME_LOCAL_NED.

@@ -2,10 +2,10 @@
 
 use crate::plan_file::QgcPlan;
 use crate::vehicle::ServedVehicle;
+use afbc_comms::services::modes::custom;
 use afbc_ground::{Client, CommandState, Patience, UploadEnd};
 use afbc_guidance::FlightMode;
-use afbc_link::{Answer, Command, Downlink, Mission, MissionItem, Plan};
-use afbc_station::services::modes::custom;
+use afbc_mavlink::{Answer, Command, Downlink, Mission, MissionItem, Plan};
 
 /// Peer number of the station.
 const PEER: u32 = 0;

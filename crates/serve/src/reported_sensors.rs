@@ -1,16 +1,16 @@
 //! Sensor data that a vehicle's services get outside the control tick: GNSS receiver, battery, barometer and
 //! magnetometer state, and the local frame's place on the earth.
 
+use afbc_comms::AuxSensors;
+use afbc_comms::services::health::sensor;
+use afbc_comms::services::origin::EarthOrigin;
+use afbc_comms::services::status::{GnssReceiver, SensorBits};
 use afbc_estimator::Measurement;
-use afbc_link::telemetry::BatteryStatus;
+use afbc_mavlink::telemetry::BatteryStatus;
 use afbc_onboard::Readings;
 use afbc_plant::InstrumentSuite;
 use afbc_scenario::Scenario;
 use afbc_sim::flight::World;
-use afbc_station::AuxSensors;
-use afbc_station::services::health::sensor;
-use afbc_station::services::origin::EarthOrigin;
-use afbc_station::services::status::{GnssReceiver, SensorBits};
 
 /// Silence after which a sensor counts as failed \[ms\].
 const SILENT_MS: u32 = 1000;

@@ -5,7 +5,7 @@
 //! first line is the home position if it is a waypoint; version 120 has no home.
 
 use afbc_files::read::{FileError, Source};
-use afbc_link::MissionItem;
+use afbc_mavlink::MissionItem;
 
 /// Beginning of every file, before the version.
 const MAGIC: &str = "QGC WPL";

@@ -2,12 +2,12 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc::Trip;
+use afbc_comms::services::modes;
 use afbc_guidance::FlightMode;
-use afbc_link::{Address, AttitudeAndThrust, Command, ExternalTarget, FRAME_MAX, Sender, Uplink};
+use afbc_mavlink::{Address, AttitudeAndThrust, Command, ExternalTarget, FRAME_MAX, Sender, Uplink};
 use afbc_plant::Motion;
 use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
-use afbc_station::services::modes;
 use afbc_types::Axis;
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -51,9 +51,9 @@ impl Flown {
         let velocity_m_s = Vector3::new(x, y, z);
         for time_ms in 0..milliseconds {
             if time_ms % 50 == 0 {
-                self.hear(Uplink::Target(ExternalTarget::Motion(afbc_link::PositionTarget {
+                self.hear(Uplink::Target(ExternalTarget::Motion(afbc_mavlink::PositionTarget {
                     velocity_m_s,
-                    ..afbc_link::PositionTarget::NONE
+                    ..afbc_mavlink::PositionTarget::NONE
                 })));
             }
             if time_ms == 50 {

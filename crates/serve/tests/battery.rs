@@ -2,13 +2,13 @@
 //! battery is empty.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs, reason = "tests")]
 
+use afbc_comms::services::modes::custom;
+use afbc_comms::services::origin::EarthOrigin;
 use afbc_guidance::FlightMode;
-use afbc_link::{Address, Command, Datum, Decoder, Downlink, FRAME_MAX, Height, Place, Sender, Uplink};
+use afbc_mavlink::{Address, Command, Datum, Decoder, Downlink, FRAME_MAX, Height, Place, Sender, Uplink};
 use afbc_plant::Battery;
 use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
-use afbc_station::services::modes::custom;
-use afbc_station::services::origin::EarthOrigin;
 use nalgebra::Vector3;
 
 const STATION: Address = Address { system: 255, component: 190 };

@@ -2,7 +2,7 @@
 //! parse them, the parameters, and the sensors' true errors.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
-use afbc_link::{Address, Answer, CalibrationRequest, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
+use afbc_mavlink::{Address, Answer, CalibrationRequest, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
 use afbc_plant::InstrumentSuite;
 use afbc_plant::instruments::{Imu, Magnetometer};
 use afbc_scenario::built_in;

@@ -1,15 +1,15 @@
 //! Geofences in closed loop, uploaded as stations do: the vehicle stays inside, whatever it is commanded.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs, reason = "tests")]
 
+use afbc_comms::services::modes;
+use afbc_comms::services::origin::EarthOrigin;
 use afbc_guidance::FlightMode;
-use afbc_link::{
+use afbc_mavlink::{
     Address, Command, Datum, Decoder, Downlink, ExternalTarget, FRAME_MAX, Height, ManualControl, Mission, MissionItem,
     MissionResult, Place, Plan, PositionTarget, Sender, Uplink,
 };
 use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
-use afbc_station::services::modes;
-use afbc_station::services::origin::EarthOrigin;
 use nalgebra::{Vector2, Vector3};
 use std::f32::consts::TAU;
 

@@ -1,7 +1,7 @@
 //! Stored parameters survive restarts of the server and of a vehicle.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
-use afbc_link::{
+use afbc_mavlink::{
     Address, Command, Decoder, Downlink, FRAME_MAX, Key, ParameterName, ParameterRequest, Reboot, ReceivedFrame,
     SIGNED_FRAME_MAX, Sender, SetupSigning, Stamp, Storage, Uplink,
 };

@@ -1,7 +1,7 @@
 //! Landings in weather: contact with the ground must not be mistaken for a failing law.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
-use afbc_link::{Address, Command, Datum, FRAME_MAX, Height, Sender, Uplink};
+use afbc_mavlink::{Address, Command, Datum, FRAME_MAX, Height, Sender, Uplink};
 use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
 

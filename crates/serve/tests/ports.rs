@@ -1,7 +1,7 @@
 //! Tests of the ports, on loopback at free ports. No test depends on the speed of the machine.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
-use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
+use afbc_mavlink::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
 use afbc_scenario::built_in;
 use afbc_serve::{Addresses, Lines, Ports, RunEnd, Server, TimeRate, fleet, run};
 use std::io::{Cursor, ErrorKind, Read, Write};

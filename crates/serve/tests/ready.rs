@@ -1,7 +1,7 @@
 //! The time at which stations consider the vehicle ready.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
-use afbc_link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Sender, Telemetry, Uplink};
+use afbc_mavlink::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Sender, Telemetry, Uplink};
 use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
 

@@ -1,7 +1,7 @@
 //! Whole flights with bad sensors: a tracker whose frame jumps, GNSS that comes back, vibrating rotors.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
-use afbc_link::{Address, Command, Datum, FRAME_MAX, Height, Sender, Uplink};
+use afbc_mavlink::{Address, Command, Datum, FRAME_MAX, Height, Sender, Uplink};
 use afbc_scenario::{Scenario, built_in};
 use afbc_serve::{Server, fleet};
 use nalgebra::Vector3;

@@ -1,7 +1,7 @@
 //! Tests of the server in lockstep, without clock and sockets.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
-use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
+use afbc_mavlink::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
 use afbc_plant::InstrumentSuite;
 use afbc_scenario::{Scenario, built_in};
 use afbc_serve::{Server, Then, fleet};

@@ -1,7 +1,7 @@
 //! Unknown clients at the ports: who is heard, who gets telemetry, who is disconnected, and the cost per step.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
-use afbc_link::{
+use afbc_mavlink::{
     Address, Command, Decoder, Downlink, FRAME_MAX, Key, ReceivedFrame, SIGNED_FRAME_MAX, Sender, SetupSigning, Stamp,
     Uplink,
 };

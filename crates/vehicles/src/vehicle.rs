@@ -12,7 +12,7 @@ use afbc_flight_core::protocol::MotorOutputs;
 use afbc_onboard::{Configuration, EscSettings, Link};
 use afbc_plant::Realism;
 use afbc_plant::instruments::Imu;
-use afbc_radio::RadioSettings;
+use afbc_rc::RadioSettings;
 use afbc_types::{
     Airframe, Declaration, Declared, Mounting, OutOfRange, Parameters, PerAxis, Rotor, SensorCalibration, Value,
     ValueMut, with_rotors,

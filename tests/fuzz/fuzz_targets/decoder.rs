@@ -3,11 +3,11 @@
 //! state. For arbitrary bytes and for frames within frames, they deliver the same as an independent reference.
 #![no_main]
 
-#[path = "../../../crates/link/tests/reference/mod.rs"]
+#[path = "../../../crates/mavlink/tests/reference/mod.rs"]
 mod reference;
 
 use libfuzzer_sys::fuzz_target;
-use afbc_link::{Address, Counters, Decoder, Downlink, FRAME_MAX, Message, Sender, Uplink};
+use afbc_mavlink::{Address, Counters, Decoder, Downlink, FRAME_MAX, Message, Sender, Uplink};
 use mavlink::Message as _;
 use mavlink::dialects::common::MavMessage;
 

@@ -6,7 +6,7 @@
 
 use afbc_flight_core::Request;
 use afbc_guidance::FlightMode;
-use afbc_radio::{
+use afbc_rc::{
     ACQUIRE_FRAMES, CrsfDecoder, CrsfFrame, PilotInputs, RadioLink, RadioPilot, RadioSettings, SbusDecoder, SbusFrame,
 };
 use libfuzzer_sys::fuzz_target;

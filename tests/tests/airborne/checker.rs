@@ -2,11 +2,11 @@
 //! its stations and the true motion, and complains of everything that must not happen.
 
 use super::{Tick, Truth};
+use afbc_comms::services::modes;
 use afbc_guidance::FlightMode;
-use afbc_link::{
+use afbc_mavlink::{
     Address, Answer, Command, ControlRequest, Downlink, ExternalTarget, Mission, ParameterRequest, Uplink,
 };
-use afbc_station::services::modes;
 
 /// Time within which a command must be answered \[ms\].
 const ANSWERED_MS: u32 = 1000;

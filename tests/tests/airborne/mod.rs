@@ -6,7 +6,7 @@ pub mod session;
 pub use checker::Checker;
 pub use session::{COMPANION, STATION, Session};
 
-use afbc_link::{Address, Downlink, ExternalTarget, PositionTarget, Uplink};
+use afbc_mavlink::{Address, Downlink, ExternalTarget, PositionTarget, Uplink};
 use nalgebra::Vector3;
 use std::sync::Mutex;
 use std::thread;

@@ -1,11 +1,11 @@
 //! A session with the server's vehicle and its stations.
 
 use super::{Tick, Truth};
+use afbc_comms::services::origin::EarthOrigin;
 use afbc_ground::{Client, Patience};
-use afbc_link::{Address, Command, Datum, Decoder, Downlink, Height, MissionItem, Place, Plan, Uplink};
+use afbc_mavlink::{Address, Command, Datum, Decoder, Downlink, Height, MissionItem, Place, Plan, Uplink};
 use afbc_scenario::{Scenario, built_in};
 use afbc_serve::{Server, fleet};
-use afbc_station::services::origin::EarthOrigin;
 use nalgebra::Vector3;
 
 pub const STATION: Address = Client::STATION;

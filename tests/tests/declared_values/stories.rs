@@ -3,10 +3,10 @@
 use super::document::Case;
 use crate::airborne::session::{is_armed, item};
 use crate::airborne::{STATION, Session, Tick, velocity};
+use afbc_comms::services::modes;
 use afbc_guidance::FlightMode;
-use afbc_link::{Command, ExternalTarget, ManualControl, Uplink};
+use afbc_mavlink::{Command, ExternalTarget, ManualControl, Uplink};
 use afbc_scenario::Scenario;
-use afbc_station::services::modes;
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
 

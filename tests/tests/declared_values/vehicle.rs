@@ -7,7 +7,7 @@ use crate::airborne::STATION;
 use afbc::Profile;
 use afbc_guidance::{Flying, Net};
 use afbc_hil::Host;
-use afbc_link::{Decoder, Downlink, FRAME_MAX, ParameterRequest, Sender, Uplink};
+use afbc_mavlink::{Decoder, Downlink, FRAME_MAX, ParameterRequest, Sender, Uplink};
 use afbc_onboard::parameters::ParameterTable;
 use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_scenario::{Scenario, built_in};

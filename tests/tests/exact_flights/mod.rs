@@ -1,12 +1,12 @@
 //! Flights of the firmware's code, with their exact logs.
 
+use afbc_comms::AuxSensors;
 use afbc_hil::Host;
-use afbc_link::telemetry::BatteryStatus;
-use afbc_link::{Address, Command, Datum, FRAME_MAX, Height, ParameterRequest, Sender, Uplink};
 use afbc_log::exact::{FRAME_MAX as RECORD_MAX, Frames, Record, write};
+use afbc_mavlink::telemetry::BatteryStatus;
+use afbc_mavlink::{Address, Command, Datum, FRAME_MAX, Height, ParameterRequest, Sender, Uplink};
 use afbc_scenario::Scenario;
 use afbc_sim::flight::World;
-use afbc_station::AuxSensors;
 use afbc_types::{ROTORS_MAX, RotorSpeeds, State};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};

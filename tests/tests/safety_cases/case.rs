@@ -3,11 +3,11 @@
 use crate::airborne::STATION;
 use crate::airborne::checker::{Bounds, End};
 use crate::airborne::session::{global, item};
+use afbc_comms::services::modes;
 use afbc_guidance::FlightMode;
-use afbc_link::{
+use afbc_mavlink::{
     Address, AttitudeAndThrust, Command, Datum, ExternalTarget, Height, ManualControl, MissionItem, Uplink,
 };
-use afbc_station::services::modes;
 
 /// An event.
 #[derive(Clone, Debug)]

@@ -3,7 +3,7 @@
 use super::case::*;
 use crate::airborne::{COMPANION, STATION, velocity};
 use afbc_guidance::FlightMode;
-use afbc_link::{Command, Uplink};
+use afbc_mavlink::{Command, Uplink};
 
 /// Returns all cases with several faults.
 pub(super) fn cases() -> Vec<Case> {

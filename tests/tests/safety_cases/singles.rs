@@ -5,7 +5,7 @@ use crate::airborne::checker::CUTS;
 use crate::airborne::session::item;
 use crate::airborne::{COMPANION, STATION, place, velocity};
 use afbc_guidance::FlightMode;
-use afbc_link::{Command, Uplink};
+use afbc_mavlink::{Command, Uplink};
 
 /// Returns all cases with one fault.
 pub(super) fn cases() -> Vec<Case> {

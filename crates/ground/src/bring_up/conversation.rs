@@ -5,7 +5,7 @@ use super::heard::Heard;
 use crate::client::Client;
 use crate::commands::CommandState;
 use crate::repeated::Patience;
-use afbc_link::{Answer, Command, Decoder, InertialSample, ReceivedFrame};
+use afbc_mavlink::{Answer, Command, Decoder, InertialSample, ReceivedFrame};
 
 /// Carries bytes to the board and back.
 ///

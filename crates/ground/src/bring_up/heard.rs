@@ -1,7 +1,7 @@
 //! Messages in which the vehicle reported its sensors and its clock.
 
-use afbc_link::telemetry::{ActuatorOutputs, BatteryStatus, Fix, SystemStatus, Version};
-use afbc_link::{Downlink, HealthArray, InertialSample, Telemetry};
+use afbc_mavlink::telemetry::{ActuatorOutputs, BatteryStatus, Fix, SystemStatus, Version};
+use afbc_mavlink::{Downlink, HealthArray, InertialSample, Telemetry};
 use nalgebra::Vector3;
 
 /// The newest message of each kind, and some counts.

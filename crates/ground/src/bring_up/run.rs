@@ -5,7 +5,7 @@ use super::error::Error;
 use super::log::BringUpLog;
 use super::steps;
 use super::turns;
-use afbc_link::ParameterValue;
+use afbc_mavlink::ParameterValue;
 
 /// Longest wait for the first heartbeat (sent once per second) and for the health array \[ms\].
 const SILENT_MS: u64 = 5_000;

@@ -5,7 +5,7 @@ use super::error::Error;
 use super::log::BringUpStep;
 use super::statistics::VectorStatistics;
 use crate::commands::PING;
-use afbc_link::{Answer, Command, InertialSample};
+use afbc_mavlink::{Answer, Command, InertialSample};
 use nalgebra::Vector3;
 
 /// MAVLink message that the bring-up requests.

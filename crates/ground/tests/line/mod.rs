@@ -1,7 +1,7 @@
 //! A vehicle that follows the protocols strictly, and a line to it that loses, repeats and delays frames.
 
 use afbc_ground::Client;
-use afbc_link::{
+use afbc_mavlink::{
     Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Mission, MissionItem, MissionResult, ParameterError,
     ParameterRequest, ParameterValue, Plan, Sender, Uplink,
 };

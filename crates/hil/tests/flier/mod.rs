@@ -4,9 +4,9 @@
 use afbc::Profile;
 use afbc_guidance::FlightMode;
 use afbc_hil::Host;
-use afbc_link::{Address, FRAME_MAX, ParameterRequest, Sender, Uplink};
+use afbc_mavlink::{Address, FRAME_MAX, ParameterRequest, Sender, Uplink};
 use afbc_onboard::Report;
-use afbc_radio::{Channels, CrsfFrame};
+use afbc_rc::{Channels, CrsfFrame};
 use afbc_scenario::{Scenario, load};
 use afbc_sim::flight::World;
 use afbc_types::{ROTORS_MAX, RotorSpeeds};

@@ -1,6 +1,6 @@
 //! Queries about stored logs, from a task that must not block on the storage to the task that may.
 
-use afbc_station::services::storage::{LogInfo, LogStore};
+use afbc_comms::services::storage::{LogInfo, LogStore};
 use core::task::Poll;
 
 /// Bytes of a log read at once: five parts of a download.

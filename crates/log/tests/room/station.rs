@@ -1,10 +1,10 @@
 //! Simulates a vehicle with a ground station.
 
 use super::{Card, Room, Storage};
-use afbc_link::{LogEntry, LogMessage, LogRequest};
+use afbc_comms::services::log_transfer::LogTransfer;
+use afbc_comms::services::storage::LogStore;
 use afbc_log::storage::LogMode;
-use afbc_station::services::log_transfer::LogTransfer;
-use afbc_station::services::storage::LogStore;
+use afbc_mavlink::{LogEntry, LogMessage, LogRequest};
 use std::task::Poll;
 
 /// Number of ticks within which a card without stalls answers.

@@ -10,7 +10,7 @@ use crate::{BUILT_IN, Scenario, built_in};
 use afbc::Profile;
 use afbc::adaptive;
 use afbc_files::read::FileError;
-use afbc_peers::pid;
+use afbc_laws::pid;
 use afbc_plant::PlantModel;
 
 #[test]

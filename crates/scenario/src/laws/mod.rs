@@ -13,7 +13,7 @@ pub use own::{OWN_GAINS_MAX, OwnController, OwnFlight, OwnGain, OwnGains, OwnKin
 use afbc::{Adaptive, Backstepping, Controller, Guarded, Profile, Safeguards, adaptive, backstepping};
 use afbc_control::{Action, FlightController, Mixer, Smoothing, Trace};
 use afbc_files::read::words::nearest;
-use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
+use afbc_laws::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
 use afbc_types::{Axis, PerAxis, Setpoint, State};
 
 declare::laws! {

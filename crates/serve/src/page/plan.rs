@@ -2,10 +2,10 @@
 
 use crate::ServedVehicle;
 use crate::page::local_frame::LocalFrame;
+use afbc_comms::services::mission::to_guidance;
+use afbc_comms::services::origin::{EarthOrigin, Global};
 use afbc_guidance::Item;
-use afbc_link::{MavCmd, MissionItem};
-use afbc_station::services::mission::to_guidance;
-use afbc_station::services::origin::{EarthOrigin, Global};
+use afbc_mavlink::{MavCmd, MissionItem};
 use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 

@@ -2,7 +2,7 @@
 
 use crate::Server;
 use afbc_ground::{Client, Patience, UploadEnd};
-use afbc_link::{
+use afbc_mavlink::{
     Address, Answer, Command, Downlink, ExternalTarget, MavCmd, MavSeverity, MissionItem, Plan, PositionTarget, Uplink,
 };
 use nalgebra::Vector3;
