@@ -3,7 +3,7 @@
 
 use crate::check::check;
 use crate::fly::images;
-use crate::machine::{Machine, Signal};
+use crate::machine::{EarlyRevision, Machine, Signal};
 use crate::steady::{SteadyPin, floating};
 use crate::wire::Wire;
 use afbc_mavlink::telemetry::Telemetry;
@@ -37,6 +37,9 @@ const END: u64 = 1_200_000_000;
 const LOOK_FROM: u64 = END - 10_000_000;
 const LOOK_EVERY: u64 = 1_000;
 const TICK: u64 = 1_000_000;
+/// Virtual time within which an image has set its clocks \[ns\].
+const START_UP: u64 = 100_000_000;
+
 /// Observations from outside.
 struct Seen {
     /// Times at which the watchdog was fed \[ns\].
@@ -83,8 +86,52 @@ impl<M: Machine> Driver<M> for Seen {
     }
 }
 
+/// Writes to the register of an erratum's workaround.
+struct Workaround {
+    register: u64,
+    written: Vec<u64>,
+}
+
+impl<M: Machine> Driver<M> for Workaround {
+    fn on_settled(&mut self, _: &mut Session<M>, _: &mut dyn Host, settled: Settled) {
+        if let Settled::Access { access, value } = settled
+            && (access.kind, access.address) == (AccessKind::Write, self.register)
+        {
+            self.written.push(value);
+        }
+    }
+
+    fn on_stop(&mut self, _: &mut Session<M>, _: Stop, _: &mut dyn Host) -> Option<VirtualNanos> {
+        None
+    }
+}
+
+/// Returns what the start of an image writes to the register of an erratum's workaround, on the chip's early revision
+/// or on that of the models.
+fn workaround<M: Machine>(image: &Path, revision: EarlyRevision, is_early: bool) -> Result<Vec<u64>, Box<dyn Error>> {
+    let mut board = M::built()?;
+    if is_early {
+        board.set_early_revision()?;
+    }
+    let driver = Workaround { register: revision.register, written: Vec::new() };
+    let images = images::<M>(image, &[])?;
+    let finished = run(Session::new(board, 0, VirtualNanos(START_UP))?, &Start::new(&images), driver)?;
+    Ok(finished.driver.written)
+}
+
+/// Checks that an image works around the erratum of the chip's early revision, and does so on this revision only.
+fn check_early_revision<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
+    let Some(revision) = M::EARLY_REVISION else { return Ok(()) };
+    let [early, later] = [true, false].map(|is_early| workaround::<M>(image, revision, is_early));
+    let (early, later) = (early?, later?);
+    println!("{}: writes {early:x?} to {:#x}; a later revision writes {later:x?}", revision.name, revision.register);
+    check(early == [revision.value], &format!("the erratum of {}", revision.name))?;
+    check(later.is_empty(), "no workaround where there is no erratum")
+}
+
 /// Boots an image.
 pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
+    check_early_revision::<M>(image)?;
     let mut board = M::built()?;
     let wire = Wire::default();
     check(board.attach_link(wire.clone()), "the link is wired")?;

@@ -14,8 +14,9 @@ use rigless::machine::Board;
 use rigless::machine::flight::{Actuate, Actuator, Signals};
 use rigless::machine::matekh743::{self, MatekH743};
 use rigless::machine::pixracer::{self, Pixracer};
-use rigless::mcu::Operate;
+use rigless::mcu::{Mcu, Operate};
 use rigless::session::Session;
+use rigless::soc::stm32h743::generated::dbgmcu;
 use rigless::soc::{Error, Width};
 use rigless::time::VirtualNanos;
 use std::ops::Range;
@@ -49,6 +50,16 @@ pub struct Divider {
     pub register: u64,
     /// Clock \[Hz\].
     pub clock_hz: u64,
+}
+
+/// Early revision of a chip, with an erratum that firmware must work around by a write to a register at its start.
+#[derive(Clone, Copy, Debug)]
+pub struct EarlyRevision {
+    pub name: &'static str,
+    /// Address of the register.
+    pub register: u64,
+    /// Value that the erratum's workaround writes.
+    pub value: u64,
 }
 
 /// Board in the emulator, with the facts and connections that the twin needs.
@@ -85,8 +96,19 @@ pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
     /// Interrupt status register of the USB core, if the models have it as plain memory.
     const USB_STATUS: Option<u64> = None;
 
+    /// Early revision of the board's chip, if firmware must work around its errata.
+    const EARLY_REVISION: Option<EarlyRevision> = None;
+
     /// Creates the board.
     fn built() -> Result<Box<Self>, Error>;
+
+    /// Gives the chip the identity of [`EARLY_REVISION`](Self::EARLY_REVISION).
+    ///
+    /// # Errors
+    /// The models lack the register with the identity.
+    fn set_early_revision(&mut self) -> Result<(), Error> {
+        Ok(())
+    }
 
     /// Returns the motor outputs.
     fn motors(&mut self) -> Vec<Actuator>;
@@ -169,8 +191,22 @@ impl Machine for MatekH743 {
     /// OTG_GINTSTS (RM0433, 57.14.6).
     const USB_STATUS: Option<u64> = Some(0x4008_0014);
 
+    /// Revision Y returns wrong data when its AXI RAM handles two reads at once (ES0392, "Reading from AXI SRAM may lead
+    /// to data read corruption"). AXI_TARG7_FN_MOD limits the RAM to one read at a time. The models are of revision V.
+    const EARLY_REVISION: Option<EarlyRevision> =
+        Some(EarlyRevision { name: "STM32H743 revision Y", register: 0x5100_8108, value: 1 });
+
     fn built() -> Result<Box<Self>, Error> {
         MatekH743::new().map(Box::new)
+    }
+
+    fn set_early_revision(&mut self) -> Result<(), Error> {
+        /// DBGMCU_IDC of revision Y (RM0433, 60.5.8).
+        const REVISION_Y: u64 = 0x1003_6450;
+        let bus = self.mcu.bus_mut();
+        let unit = bus.slot("DBGMCU")?;
+        bus.slot_mut(unit).registers_mut().set(dbgmcu::Register::Idc, REVISION_Y);
+        Ok(())
     }
 
     fn motors(&mut self) -> Vec<Actuator> {
