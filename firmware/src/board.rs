@@ -1,9 +1,10 @@
 //! Interface between firmware and board. A crate in `firmware/boards/` implements [`Board`] and builds its images by
 //! [`image!`](crate::image!). Firmware and board meet nowhere else.
 
+pub use afbc_types::ROTORS_MAX;
+
 use crate::samples::Sampler;
 use crate::ticks::Tick;
-use crate::vehicle::ROTORS;
 use afbc_flight_core::protocol::MotorProtocol;
 use afbc_log::storage::LogKeeper;
 use cortex_m::interrupt::InterruptNumber;
@@ -74,8 +75,8 @@ pub trait Board: Sized + 'static {
     /// True if a task that is not needed in flight has panicked.
     fn task_has_failed(&self) -> bool;
 
-    /// Outputs throttles to the motors: 0, or 48 to 2047.
-    fn drive(&mut self, throttles: [u16; ROTORS]);
+    /// Outputs throttles to the motors: 0, or 48 to 2047; 0 where there is no motor.
+    fn drive(&mut self, throttles: &[u16; ROTORS_MAX]);
 
     /// Feeds the watchdog.
     fn feed_watchdog(&mut self);

@@ -12,13 +12,12 @@ use crate::recording::{self, ExactLog};
 use crate::samples::{self, Sampler as _};
 use crate::self_tests;
 use crate::ticks::{self, Tick};
-use crate::vehicle::{ParameterTable, ROTORS};
 pub use afbc_comms::Comms;
 use afbc_comms::services::imus::{self, ImuNews};
 use afbc_comms::services::signing::Signing;
 use afbc_comms::services::status::SensorBits;
 use afbc_comms::{AuxSensors, Calibrator, EscAction, EscReports, EscsHeard, REPORT_MAX, Reboot, Setup};
-use afbc_onboard::parameters::RecordChange;
+use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{ControlInputs, EscTelemetry, TickRecord};
 use afbc_types::ROTORS_MAX;
 use core::array;
@@ -266,7 +265,7 @@ fn pass_on<B: Board>(news: &ControlInputs, log: &mut Option<&'static mut ExactLo
 
 /// Writes a tick into the exact log and the black box.
 fn record<B: Board>(
-    tick: &TickRecord<'_, ROTORS>,
+    tick: &TickRecord<'_>,
     log: &mut Option<&'static mut ExactLog>,
     black_box: &mut Option<&'static mut LinkLog>,
     table: &ParameterTable,

@@ -7,8 +7,8 @@ use crate::recording;
 use crate::samples::{self, Sampler as _};
 use crate::ticks::{self, Tick};
 use crate::time::{self, Stopwatch};
-use crate::vehicle::{Configuration, Flight, Prepared, Report};
-use afbc_onboard::{ControlInputs, TickBefore, TickDetails, TickInputs};
+use crate::vehicle::{Flight, Prepared};
+use afbc_onboard::{Configuration, ControlInputs, Report, TickBefore, TickDetails, TickInputs};
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
@@ -208,7 +208,7 @@ fn tick<B: Board>(
     }
     let report = flight.tick(now_us, messages, &inputs.readings);
 
-    board.drive(report.throttles);
+    board.drive(&report.throttles);
     // A failed task is restarted by a reset, unless the vehicle is armed.
     let may_reset = board.task_has_failed() && !report.mode.armed();
     // Fed at a wrong tick rate too, since in the air that is better than a reset; not fed if the clock has stopped.

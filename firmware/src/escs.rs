@@ -1,8 +1,9 @@
 //! Telemetry of the motor controllers, passed between the board's tasks and the link task.
 
-use crate::vehicle::{ParameterTable, ROTORS};
+use crate::vehicle::ROTORS;
 use afbc_comms::EscReports;
 use afbc_estimator::VelocityNotch;
+use afbc_onboard::parameters::ParameterTable;
 use afbc_types::ROTORS_MAX;
 use core::cell::{Cell, RefCell};
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};

@@ -3,7 +3,7 @@
 
 pub use afbc_onboard::indicator::IndicatorSignals;
 
-use crate::vehicle::Report;
+use afbc_onboard::Report;
 use afbc_onboard::indicator::{Indication, Indicator, STEP_US};
 use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_time::{Instant, Timer};

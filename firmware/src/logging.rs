@@ -3,13 +3,13 @@
 
 use crate::aux_sensors;
 use crate::board::Board;
-use crate::vehicle::{NAME, ParameterTable, ROTORS};
+use crate::vehicle::NAME;
 use afbc_comms::{Comms, LogServer, REPORT_MAX};
 use afbc_log::storage::{
     BlockSink, KeptLogs, LogBlock, LogKeeper, LogPage, LogPages, LogQuery, LogWriter, StorageState,
 };
 use afbc_log::ulog::{BesideTick, LogStart};
-use afbc_onboard::parameters::RecordChange;
+use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{EscTelemetry, TickRecord};
 use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use embassy_futures::select::{Either3, select3};
@@ -143,7 +143,7 @@ impl LinkLog {
 
     /// Logs a tick.
     #[inline(never)]
-    pub(crate) fn tick(&mut self, tick: &TickRecord<'_, ROTORS>, table: &ParameterTable, escs: &EscTelemetry) {
+    pub(crate) fn tick(&mut self, tick: &TickRecord<'_>, table: &ParameterTable, escs: &EscTelemetry) {
         let beside = BesideTick { escs: Some(escs), origin: aux_sensors::frame_origin() };
         let start = LogStart { vehicle: NAME, law: LAW, hardware: self.hardware, ..LogStart::default() };
         self.writer.tick((tick, &beside), table, &start, storage(), PERIOD_US);

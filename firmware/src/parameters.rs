@@ -7,9 +7,9 @@
 //! most, which is within its tolerance. No word is written while armed ([`Gate`]).
 
 use crate::control;
-use crate::vehicle::{CONFIGURATION, NAME, ParameterTable, Prepared};
+use crate::vehicle::{CONFIGURATION, NAME, Prepared, ROTORS};
 use afbc_comms::services::signing::{Signing, SigningRecord};
-use afbc_onboard::parameters::{Kept, RecordChange};
+use afbc_onboard::parameters::{Kept, ParameterTable, RecordChange};
 use afbc_store::{Error, RecordName, Store, hash};
 use core::cell::RefCell;
 use core::future::poll_fn;
@@ -104,7 +104,7 @@ pub struct Keeper<M>(Option<Store<Gate<M>>>);
 /// Reads the parameters and the signing key from `memory`, whose sectors begin at `start`, and makes room for changes.
 /// If the store cannot be read, the parameters are the image's.
 pub fn read<M: NorFlash>(memory: M, start: u32) -> (Keeper<M>, ParameterTable, Signing) {
-    let mut table = ParameterTable::new(CONFIGURATION);
+    let mut table = ParameterTable::with_rotors::<ROTORS>(CONFIGURATION);
     // The store is tied to the vehicle's name, so that values set for another vehicle are ignored.
     let Ok(mut store) = Store::open(Gate(memory), start, hash(NAME.as_bytes())) else {
         UNREAD.store(true, Ordering::Relaxed);

@@ -3,9 +3,9 @@
 use crate::board::{Board, Links, Transmitter as _};
 use crate::recording;
 use crate::ticks::Tick;
-use crate::vehicle::ParameterTable;
 use afbc_comms::{Comms, RadioControl};
 use afbc_onboard::ControlInputs;
+use afbc_onboard::parameters::ParameterTable;
 use afbc_rc::RadioProtocol;
 use static_cell::StaticCell;
 

@@ -3,9 +3,9 @@
 use crate::board::{Board, Links, Transmitter};
 use crate::samples::Sampler;
 use crate::ticks::Tick;
-use crate::vehicle::{NAME, ParameterTable, ROTORS};
+use crate::vehicle::NAME;
 use afbc_log::exact::RecordQueue;
-use afbc_onboard::parameters::RecordChange;
+use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{ControlInputs, TickRecord};
 use core::sync::atomic::{AtomicBool, Ordering};
 use static_cell::StaticCell;
@@ -68,7 +68,7 @@ impl ExactLog {
 
     /// Records a tick.
     #[inline(never)]
-    pub fn tick(&mut self, tick: &TickRecord<'_, ROTORS>) {
+    pub fn tick(&mut self, tick: &TickRecord<'_>) {
         self.queue.tick(tick);
     }
 

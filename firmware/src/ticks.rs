@@ -1,8 +1,7 @@
 //! Queue of the control ticks' results, from the control task to the link task. Ticks carry details while a log is
 //! written.
 
-use crate::vehicle::Report;
-use afbc_onboard::TickDetails;
+use afbc_onboard::{Report, TickDetails};
 use core::array;
 use core::cell::RefCell;
 use core::future::poll_fn;

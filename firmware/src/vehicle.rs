@@ -2,25 +2,20 @@
 //!
 //! The build selects the vehicle and checks its file.
 
-use afbc_types::{Airframe, Choice, Parameters, Rotor};
+use afbc_onboard::Configuration;
+use afbc_types::{Choice, Parameters, Rotor, Rotors};
 use nalgebra::Vector3;
 
-/// Configuration of the vehicle's flight software.
-pub type Configuration = afbc_onboard::Configuration<ROTORS>;
-/// Parameters from which the configuration is made.
-pub type ParameterTable = afbc_onboard::parameters::ParameterTable<ROTORS>;
 /// Configuration ready to fly.
 pub type Prepared = afbc_onboard::Prepared<ROTORS>;
 /// The vehicle's flight software.
 pub type Flight = afbc_onboard::Flight<ROTORS>;
-/// Result of one tick.
-pub type Report = afbc_onboard::Report<ROTORS>;
 
 include!(concat!(env!("OUT_DIR"), "/vehicle.rs"));
 
-/// Configuration into which the generated code puts the vehicle's values; it replaces all values of this airframe.
-const PLAIN: Configuration = Configuration::plain(Airframe {
-    parameters: Parameters {
+/// Configuration into which the generated code puts the vehicle's values; it replaces all of these parameters.
+const PLAIN: Configuration = Configuration::plain(
+    Parameters {
         mass_kg: 0.0,
         arm_m: 0.0,
         inertia_kg_m2: Vector3::new(0.0, 0.0, 0.0),
@@ -29,8 +24,8 @@ const PLAIN: Configuration = Configuration::plain(Airframe {
         drag_factor_n_m_s2: 0.0,
         gravity_m_s2: 0.0,
     },
-    rotors: [Rotor { x: 0.0, y: 0.0, pushes_left: false }; ROTORS],
-});
+    Rotors::new(&FRAME),
+);
 
 /// Returns the choice that vehicle files call `word`.
 #[expect(clippy::indexing_slicing, reason = "evaluated by the compiler, which refuses an unknown word")]

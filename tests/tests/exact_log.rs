@@ -50,7 +50,7 @@ fn paper() -> Vehicle {
 /// An image without a vehicle file has the built-in vehicle whose name it writes into the log.
 #[test]
 fn the_papers_vehicle_is_built_in() {
-    assert_eq!(paper().configuration::<4>().unwrap(), Configuration::default());
+    assert_eq!(paper().configuration().unwrap(), Configuration::default());
 }
 
 #[test]

@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// Replays the log. Returns the number of ticks and the first difference.
 fn replay(log: &[u8]) -> (u32, Option<ReplayDifference>) {
-    let (mut replayer, mut frames) = (Replayer::new(Configuration::<4>::default()).unwrap(), Frames::default());
+    let (mut replayer, mut frames) = (Replayer::new(Configuration::default()).unwrap(), Frames::default());
     let (mut ticks, mut armed) = (0, false);
     for record in log.iter().filter_map(|byte| frames.take(*byte)) {
         match replayer.take(&record) {

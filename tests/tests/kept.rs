@@ -12,14 +12,14 @@ use afbc_vehicles::{BUILT_IN, Vehicle};
 use std::fs;
 use std::path::Path;
 
-fn kept<const N: usize>(vehicle: &Vehicle, rotors: Configuration<N>, format: Format) {
-    let original: Configuration<N> = vehicle.configuration().unwrap();
+fn kept(vehicle: &Vehicle, other: Configuration, format: Format) {
+    let original = vehicle.configuration().unwrap();
     let all = ParameterTable::new(original.clone());
     let text = written(format, &vehicle.name, all.iter().map(|it| (it.name, it.value, it.kind.number())));
     // The store belongs to an image with other values, so it must keep all values of the file.
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{}-{format:?}.store", vehicle.name));
     let _ = fs::remove_file(&path);
-    let mut table = ParameterTable::new(rotors.clone());
+    let mut table = ParameterTable::new(other.clone());
     let mut store = Store::open(Flash::open(&path).unwrap(), 0, hash(b"image")).unwrap();
     store.make_room().unwrap();
     for entry in read("a.params", &text).unwrap() {
@@ -29,30 +29,30 @@ fn kept<const N: usize>(vehicle: &Vehicle, rotors: Configuration<N>, format: For
     }
     assert_eq!(table.check(), Ok(()));
     drop(store);
-    let (mut found, mut notices) = (ParameterTable::new(rotors), Vec::new());
+    let (mut found, mut notices) = (ParameterTable::new(other), Vec::new());
     let mut store = Store::open(Flash::known(&path).unwrap(), 0, hash(b"image")).unwrap();
     Kept::NOW.load(&mut found, &mut store, |notice| notices.push(notice)).unwrap();
     assert_eq!(notices, []);
     // Debug output shows every bit except those of NaN, which does not occur.
     assert_eq!(format!("{:?}", found.configuration()), format!("{original:?}"), "{}", vehicle.name);
-    let flown = |configuration: &Configuration<N>| format!("{:?}", Prepared::new(configuration).unwrap());
-    assert_eq!(flown(found.configuration()), flown(&original));
+    with_rotors!(original.rotors.count(), N => {
+        let flown = |configuration| format!("{:?}", Prepared::<N>::new(configuration).unwrap());
+        assert_eq!(flown(found.configuration()), flown(&original));
+    });
 }
 
 #[test]
 fn from_a_vehicles_file_through_parameters_and_store_nothing_changes() {
     let vehicles: Vec<Vehicle> = BUILT_IN.iter().map(|vehicle| vehicle.read().unwrap()).collect();
     for vehicle in &vehicles {
-        with_rotors!(vehicle.rotors.len(), N => {
-            // The other image has the same rotors, since their positions are not parameters.
-            let mut other: Configuration<N> = vehicle.configuration().unwrap();
-            other.airframe.parameters.mass_kg *= 0.97;
-            other.settings.bumpless = !other.settings.bumpless;
-            other.estimation.gyro_noise_rad_s_rthz *= 2.0;
-            other.gains.z.gamma += 0.1;
-            kept(vehicle, other.clone(), Format::Qgc);
-            kept(vehicle, other, Format::Mavproxy);
-        });
+        // The other image has the same rotors, since their positions are not parameters.
+        let mut other = vehicle.configuration().unwrap();
+        other.parameters.mass_kg *= 0.97;
+        other.settings.bumpless = !other.settings.bumpless;
+        other.estimation.gyro_noise_rad_s_rthz *= 2.0;
+        other.gains.z.gamma += 0.1;
+        kept(vehicle, other.clone(), Format::Qgc);
+        kept(vehicle, other, Format::Mavproxy);
     }
 }
 
@@ -97,7 +97,7 @@ fn a_parameter_under_two_names_has_one_of_its_values() {
         store.set(RecordName::new(name).unwrap(), kept.edition, Some(value.to_bits())).unwrap();
     }
     let paper = afbc_vehicles::built_in("paper").unwrap().read().unwrap();
-    let (mut table, mut notices) = (ParameterTable::new(paper.configuration::<4>().unwrap()), 0);
+    let (mut table, mut notices) = (ParameterTable::new(paper.configuration().unwrap()), 0);
     kept.load(&mut table, &mut store, |_| notices += 1).unwrap();
     let mass_kg = table.get(RecordName::new("V_MASS").unwrap()).unwrap().value;
     assert!([0.47, 0.5].contains(&mass_kg) && table.check().is_ok(), "{mass_kg} kg");

@@ -57,7 +57,7 @@ struct Flier {
     ms: u64,
     sender: Sender,
     decoder: Decoder<Downlink>,
-    report: Option<Report<ROTORS_MAX>>,
+    report: Option<Report>,
     /// Texts with their times \[ms\].
     texts: Vec<(u64, String)>,
     /// Newest rotor speeds in ESC_STATUS, for up to eight rotors \[rev/min\].

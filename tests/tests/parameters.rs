@@ -140,7 +140,7 @@ fn groups() -> Vec<Group> {
         group("Arming: `[arming]` of a vehicle file", "ARM_", ArmingLimits::DEFAULT),
         group("Estimator: `[estimator]` of a vehicle file", "EST_", afbc_estimator::Settings::DEFAULT),
         group("Guidance: `[guidance]` of a vehicle file", "", afbc_guidance::Settings::DEFAULT),
-        group("Radio control", "", Configuration::<4>::default().radio),
+        group("Radio control", "", Configuration::default().radio),
         group("Link", "", Link::DEFAULT),
         profiles("Control: `[settings]`, `[limits]`", "C_", Profile::settings),
         profiles("AFBC's monitor", "M_", bounds),

@@ -7,7 +7,7 @@ use std::error::Error;
 
 /// Replays a log of the image's default vehicle, and fails at the first tick that differs.
 pub fn check_log(log: &[u8]) -> Result<(), Box<dyn Error>> {
-    let mut replayer = Replayer::new(Configuration::<4>::default())?;
+    let mut replayer = Replayer::new(Configuration::default())?;
     let mut frames = Frames::default();
     let (mut ticks, mut flown) = (0_u32, 0_u32);
     for record in log.iter().filter_map(|byte| frames.take(*byte)) {

@@ -279,7 +279,7 @@ impl Comms {
 
     /// Sends all messages that are due after a tick, at most [`REPORT_MAX`] bytes, by one call of `send` per frame.
     /// `tick_us` is the duration of the tick.
-    pub fn report<const N: usize>(&mut self, report: &Report<N>, tick_us: f32, mut send: impl FnMut(&[u8])) {
+    pub fn report(&mut self, report: &Report, tick_us: f32, mut send: impl FnMut(&[u8])) {
         self.tick += 1;
         self.tick_us_max = self.tick_us_max.max(tick_us);
         let dropped_frames = self.bad_frames();
@@ -302,7 +302,7 @@ impl Comms {
         if self.dispatcher.streams.rotors() && (self.state_is_news || self.tick.is_multiple_of(ROTORS)) {
             self.state_is_news = false;
             // Rotor commands do not count against the link's rate, which is lower while they are sent.
-            self.send(&Downlink::Rotors { time_us: now_us, armed, speeds: report.motors.padded() }, &mut send);
+            self.send(&Downlink::Rotors { time_us: now_us, armed, speeds: report.motors }, &mut send);
         }
         let commands = &mut self.dispatcher.commands;
         let settled = report.answer.and_then(|answer| commands.settle(answer));
@@ -348,11 +348,7 @@ impl Comms {
     /// call of `send` per frame; `report` and this function together send at most [`REPORT_MAX`] bytes. Returns the
     /// change of `table`, which is to be flown ([`Flight::adopt`](afbc_onboard::Flight::adopt)) and stored
     /// ([`Kept::keep`](afbc_onboard::parameters::Kept::keep)). Nothing changes while the vehicle is armed.
-    pub fn parameters<const N: usize>(
-        &mut self,
-        table: &mut ParameterTable<N>,
-        mut send: impl FnMut(&[u8]),
-    ) -> Option<RecordChange> {
+    pub fn parameters(&mut self, table: &mut ParameterTable, mut send: impl FnMut(&[u8])) -> Option<RecordChange> {
         let change = self.dispatcher.grant(table);
         // COM_DL_LOSS_T. Its range is checked, so the conversion is safe.
         let silent_us = (table.configuration().guidance.net.station_lost_s * 1e6) as u64;
@@ -420,11 +416,11 @@ impl Comms {
     /// each [`report`](Self::report) and before [`parameters`](Self::parameters), which sets the parameters that were
     /// found; only in a shell that [has sensors](Setup::calibrates). `sample` is the average of
     /// [`RawReadings`](afbc_onboard::RawReadings), if one has been completed since the last call.
-    pub fn calibrate<const N: usize>(
+    pub fn calibrate(
         &mut self,
         calibrator: &mut Calibrator,
         sample: Option<RawSample>,
-        table: &ParameterTable<N>,
+        table: &ParameterTable,
         mut send: impl FnMut(&[u8]),
     ) {
         self.dispatcher.calibrate(calibrator, sample, table);
@@ -455,7 +451,7 @@ impl Comms {
     }
 
     /// Queues the texts that announce the events of a tick.
-    fn watch<const N: usize>(&mut self, report: &Report<N>) {
+    fn watch(&mut self, report: &Report) {
         let Comms { dispatcher, failsafes, tick, .. } = self;
         let warning = MavSeverity::MAV_SEVERITY_WARNING;
         if let Some(Err(refusal)) = report.answer.map(|answer| answer.result) {
@@ -567,7 +563,7 @@ impl Comms {
 }
 
 /// Returns a sample of the IMU with its calibration applied, in the body frame.
-fn corrected<const N: usize>(sample: &RawSample, configuration: &Configuration<N>) -> InertialSample {
+fn corrected(sample: &RawSample, configuration: &Configuration) -> InertialSample {
     let Configuration { imu, calibration, .. } = configuration;
     let r_body_sensor = imu.r_body_sensor();
     InertialSample {

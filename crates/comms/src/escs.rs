@@ -47,21 +47,21 @@ pub struct EscAction {
 impl EscReports {
     /// Creates the receiver of ESC telemetry for a vehicle with this configuration. All parameters must be in range.
     #[must_use]
-    pub fn new<const N: usize>(configuration: &Configuration<N>) -> Self {
-        let Configuration { airframe, response, curve, escs, .. } = configuration;
+    pub fn new(configuration: &Configuration) -> Self {
+        let Configuration { parameters, rotors, response, curve, escs, .. } = configuration;
         EscReports {
-            line: EscLine::new(u8::try_from(N).unwrap_or(u8::MAX)),
+            line: EscLine::new(rotors.count() as u8),
             monitor: RotorMonitor::new(response, curve),
-            follower: NotchFollower::new(OutputFilter::of(&airframe.parameters, N).notch().copied()),
+            follower: NotchFollower::new(OutputFilter::of(parameters, rotors.count()).notch().copied()),
             settings: *escs,
         }
     }
 
     /// Adopts another configuration. The vehicle must be disarmed.
-    pub fn adopt<const N: usize>(&mut self, configuration: &Configuration<N>) {
-        let Configuration { airframe, response, curve, escs, .. } = configuration;
+    pub fn adopt(&mut self, configuration: &Configuration) {
+        let Configuration { parameters, rotors, response, curve, escs, .. } = configuration;
         (self.monitor, self.settings) = (RotorMonitor::new(response, curve), *escs);
-        self.follower.adopt(OutputFilter::of(&airframe.parameters, N).notch().copied());
+        self.follower.adopt(OutputFilter::of(parameters, rotors.count()).notch().copied());
     }
 
     /// Returns the serial telemetry line with its counters.
@@ -78,33 +78,13 @@ struct Turning {
     rad_s: Stamped<f32>,
 }
 
-/// Data of a tick with which ESC telemetry is compared.
-struct EscTick<'a> {
-    now_us: u64,
-    armed: bool,
-    airborne: bool,
-    /// Commanded rotor speeds \[rad/s\].
-    speeds: &'a [f32],
-}
-
 impl Comms {
     /// Processes the ESC telemetry since the last tick. To be called after each [`report`](Self::report), even if there
     /// is no telemetry.
-    pub fn escs<const N: usize>(
-        &mut self,
-        reports: &mut EscReports,
-        heard: &EscsHeard<'_>,
-        report: &Report<N>,
-    ) -> EscAction {
-        let (armed, airborne) = (report.mode.armed(), report.guided.airborne);
-        let tick = EscTick { now_us: report.time_us, armed, airborne, speeds: report.motors.0.as_slice() };
-        self.listen(reports, heard, &tick)
-    }
-
-    /// This function is not generic, so that it is compiled for size.
     #[inline(never)]
-    fn listen(&mut self, reports: &mut EscReports, heard: &EscsHeard<'_>, tick: &EscTick<'_>) -> EscAction {
-        let EscTick { now_us, armed, airborne, speeds } = *tick;
+    pub fn escs(&mut self, reports: &mut EscReports, heard: &EscsHeard<'_>, report: &Report) -> EscAction {
+        let (now_us, armed, airborne) = (report.time_us, report.mode.armed(), report.guided.airborne);
+        let speeds = report.motors.0.as_slice().get(..report.rotors.into()).unwrap_or_default();
         let EscSettings { serial, answers, poles, follows, detects, .. } = reports.settings;
         let hears = serial || answers;
         let mut action = EscAction::default();

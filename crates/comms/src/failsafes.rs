@@ -26,11 +26,7 @@ pub(crate) struct Failsafes {
 
 impl Failsafes {
     /// Returns the notices of failsafes that begin in the tick numbered `tick`.
-    pub(crate) fn watch<const N: usize>(
-        &mut self,
-        report: &Report<N>,
-        tick: u64,
-    ) -> impl Iterator<Item = Notice> + use<N> {
+    pub(crate) fn watch(&mut self, report: &Report, tick: u64) -> impl Iterator<Item = Notice> + use<> {
         let Report { mode, ended, health, .. } = report;
         let entered = (*mode != self.mode).then_some(*mode);
         let given_up = matches!(ended, Some(EndReason::StateLost | EndReason::Tumbled));

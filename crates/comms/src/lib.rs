@@ -8,12 +8,12 @@
 //! use afbc_onboard::{Configuration, ControlInputs, Flight, Readings};
 //! use afbc_comms::Comms;
 //!
-//! let mut flight = Flight::new(&Configuration::default())?;
+//! let mut flight = Flight::<4>::new(&Configuration::default())?;
 //! let (mut comms, mut inputs, mut taken) = (Comms::new(), ControlInputs::EMPTY, ControlInputs::EMPTY);
 //! inputs.merge(&comms.receive(b"MAVLink, or noise"));
 //! inputs.take_into(&mut taken);
 //! let report = flight.tick(1_000, &mut taken, &Readings::NONE);
-//! assert_eq!(report.throttles, [0; 4]); // disarmed
+//! assert_eq!(report.throttles, [0; 8]); // disarmed
 //! comms.report(&report, 0.0, |_bytes| ());
 //! # Ok::<(), afbc_types::OutOfRange>(())
 //! ```

@@ -56,12 +56,7 @@ pub struct Service {
 
 impl Service {
     /// Handles a station's message. The table is changed only while `disarmed`.
-    pub fn hear<const N: usize>(
-        &mut self,
-        ask: ParameterRequest,
-        table: &mut ParameterTable<N>,
-        disarmed: bool,
-    ) -> Heard {
+    pub fn hear(&mut self, ask: ParameterRequest, table: &mut ParameterTable, disarmed: bool) -> Heard {
         match ask {
             // A list in progress continues to its end and then restarts, so that every station gets all of it.
             ParameterRequest::List => self.left = table.count(),
@@ -85,11 +80,7 @@ impl Service {
     ///
     /// # Errors
     /// Returns the reason if the vehicle is armed.
-    pub fn restore<const N: usize>(
-        &mut self,
-        table: &mut ParameterTable<N>,
-        disarmed: bool,
-    ) -> Result<RecordChange, Reason> {
+    pub fn restore(&mut self, table: &mut ParameterTable, disarmed: bool) -> Result<RecordChange, Reason> {
         if !disarmed {
             return Err(Reason::new("parameters", "not while armed"));
         }
@@ -100,12 +91,7 @@ impl Service {
 
     /// Returns the next value to be sent at `now_us` over a link of `link_bytes_s` bytes per second. To be called until
     /// it returns none. Answers to PARAM_SET are sent at once, all others use at most [`LINK_SHARE`] of the link.
-    pub fn next_value<const N: usize>(
-        &mut self,
-        now_us: u64,
-        link_bytes_s: u32,
-        table: &ParameterTable<N>,
-    ) -> Option<ParameterValue> {
+    pub fn next_value(&mut self, now_us: u64, link_bytes_s: u32, table: &ParameterTable) -> Option<ParameterValue> {
         const COST: u64 = VALUE_BYTES as u64 * 100_000_000;
         // One second fills the budget, and the limit prevents an overflow of the product below.
         let elapsed_us = now_us.saturating_sub(self.at_us).min(1_000_000);
@@ -132,13 +118,7 @@ impl Service {
         self.dropped
     }
 
-    fn set<const N: usize>(
-        &mut self,
-        asked: ParameterName,
-        value: Option<f32>,
-        table: &mut ParameterTable<N>,
-        disarmed: bool,
-    ) -> Heard {
+    fn set(&mut self, asked: ParameterName, value: Option<f32>, table: &mut ParameterTable, disarmed: bool) -> Heard {
         let name = named(asked);
         let Some(before) = name.and_then(|name| table.get(name)) else {
             let reason = match name {

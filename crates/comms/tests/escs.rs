@@ -162,7 +162,7 @@ fn stations_see_what_controllers_tell() {
     let heard = EscsHeard { bytes: &[], speeds_rev_min: electrical(&eight) };
     let step = |vehicle: &mut Vehicle| {
         vehicle.bench.now_us += 1000;
-        let report = Report { time_us: vehicle.bench.now_us, ..vehicle.idle }.padded();
+        let report = Report { time_us: vehicle.bench.now_us, rotors: 8, ..vehicle.idle };
         let (mut messages, mut decoder) = (Vec::new(), afbc_mavlink::Decoder::new(STATION));
         vehicle.bench.comms.report(&report, 0.0, |bytes| {
             decoder.feed_accepted(bytes, |_| true, |_, message: Downlink| messages.push(message));
@@ -321,7 +321,7 @@ fn rotors_of_a_disarmed_vehicle_are_not_judged() {
 /// following is off or speeds are missing.
 #[test]
 fn the_notch_follows_the_rotors_of_an_armed_vehicle() {
-    let home = OutputFilter::of(&Configuration::default().airframe.parameters, 4);
+    let home = OutputFilter::of(&Configuration::default().parameters, 4);
     let home_rad_s = home.notch().expect("one").centre_rad_s();
     let speeds = [1.1, 1.2, 1.3, 1.2].map(|share| share * home_rad_s);
     let moves = |vehicle: &mut Vehicle, speeds: &[f32]| {
@@ -350,12 +350,12 @@ fn another_configuration_is_adopted() {
     let mut vehicle = Vehicle::new(EscSettings::DEFAULT);
     assert_eq!(vehicle.tick(&EscsHeard::default()).0.ask, None);
     let mut changed = configuration(EscSettings { poles: 12, serial: true, answers: true, ..EscSettings::DEFAULT });
-    changed.airframe.parameters.mass_kg *= 1.44;
+    changed.parameters.mass_kg *= 1.44;
     vehicle.reports.adopt(&changed);
     let (action, _) = vehicle.tick(&EscsHeard::default());
     assert_eq!((action.ask, vehicle.bench.comms.esc_telemetry().poles), (Some(0), 12));
     // 1.44 times the mass needs rotors that turn 1.2 times as fast, and the notch moves with them.
-    let home = OutputFilter::of(&changed.airframe.parameters, 4);
+    let home = OutputFilter::of(&changed.parameters, 4);
     vehicle.mode = Mode::Disarmed;
     let moved = (0..50).find_map(|_| vehicle.tick(&EscsHeard::default()).0.notch);
     assert_eq!(moved.map(|notch| notch.centre_rad_s()), home.notch().map(|home| home.centre_rad_s()));

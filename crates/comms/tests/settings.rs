@@ -78,10 +78,7 @@ fn the_station_in_control_sets_and_everyone_hears_it() {
     assert_eq!((bench.changes[1], bench.changes.len()), (bench.changes[0], 2));
     // Another station may read.
     bench.hear_from(SECOND, Uplink::Parameter(ParameterRequest::ReadName(padded("V_MASS"))));
-    assert_eq!(
-        reported(&listen(&mut bench, 20), "V_MASS"),
-        Some(bench.table.configuration().airframe.parameters.mass_kg)
-    );
+    assert_eq!(reported(&listen(&mut bench, 20), "V_MASS"), Some(bench.table.configuration().parameters.mass_kg));
 }
 
 #[test]

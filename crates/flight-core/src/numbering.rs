@@ -4,7 +4,7 @@
 //! an output drives the rotor in its corner, in whatever order the vehicle's file lists the rotors. For any other
 //! frame, output n drives rotor n.
 
-use afbc_types::Rotor;
+use afbc_types::{Rotor, Rotors};
 use core::array;
 
 /// A corner of an X frame, seen from above with the front up.
@@ -28,12 +28,9 @@ const ASIDE: f32 = 0.1;
 /// Returns the index of the rotor that each output drives. For an output without a rotor, the index is beyond the
 /// vehicle's rotors.
 #[must_use]
-pub fn rotors_of_outputs<const N: usize, const OUTPUTS: usize>(
-    numbering: [Corner; 4],
-    rotors: &[Rotor; N],
-) -> [usize; OUTPUTS] {
-    let rotor_in = |corner| rotors.iter().position(|rotor| self::corner(rotor) == Some(corner));
-    let is_x = N == numbering.len() && numbering.iter().all(|corner| rotor_in(*corner).is_some());
+pub fn rotors_of_outputs<const OUTPUTS: usize>(numbering: [Corner; 4], rotors: &Rotors) -> [usize; OUTPUTS] {
+    let rotor_in = |corner| rotors.iter().position(|rotor| self::corner(&rotor) == Some(corner));
+    let is_x = rotors.count() == numbering.len() && numbering.iter().all(|corner| rotor_in(*corner).is_some());
     array::from_fn(|output| match numbering.get(output) {
         // Always found: `is_x` has checked every corner.
         Some(corner) if is_x => rotor_in(*corner).unwrap_or(output),

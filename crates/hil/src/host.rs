@@ -1,7 +1,6 @@
 //! Runs the firmware's code in this process.
 
 use super::{Autopilot, Error};
-use crate::aircraft::{Aircraft, Core, ExactLog, Exchange};
 use crate::host_black_box::{HostBlackBox, Sink};
 use crate::metadata::MetadataFiles;
 use crate::served_files::{OpenFile, ServedFiles};
@@ -14,23 +13,33 @@ use afbc_estimator::Origin;
 use afbc_files::Flash;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_log::exact::Recorder;
-use afbc_log::ulog::LogStart;
+use afbc_log::ulog::{BlackBox, LogStart};
 use afbc_mavlink::{Decoder, MissionItem, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
 use afbc_onboard::{
-    Configuration, ControlInputs, Flight, ImuSelector, Link, Prepare, RawReadings, Readings, Report, TickBefore,
-    TickDetails, TickInputs, TickRecord,
+    AnyFlight, Configuration, ControlInputs, ImuSelector, Link, RawReadings, Readings, Report, TickBefore, TickDetails,
+    TickInputs, TickRecord,
 };
 use afbc_plant::Plant;
 use afbc_scenario::FlownLaw;
 use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_store::{RecordName, Store};
-use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX, with_rotors};
+use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX};
 use afbc_vehicles::Vehicle;
+
+/// The writer of the exact log, and the receiver of its bytes.
+struct ExactLog {
+    recorder: Recorder,
+    write: Sink,
+}
 
 /// The firmware without its hardware, ticked in lockstep.
 pub struct Host {
-    flight: Box<dyn Core>,
+    flight: Box<AnyFlight<FlownLaw>>,
+    table: ParameterTable,
+    law: FlownLaw,
+    /// Telemetry from the motor controllers' line.
+    esc_reports: EscReports,
     setup: Setup,
     comms: Comms,
     inputs: ControlInputs,
@@ -74,7 +83,7 @@ const HARDWARE: &str = "SITL";
 #[derive(Clone, Debug)]
 pub struct HostTick {
     /// Report of the control tick.
-    pub report: Report<ROTORS_MAX>,
+    pub report: Report,
     /// Bytes sent over the link.
     pub bytes: Vec<u8>,
     /// A parameter change, to be stored.
@@ -110,9 +119,7 @@ impl Host {
         let Some(vehicle) = vehicle else {
             return Self::image(ParameterTable::new(Configuration { link, ..Configuration::default() }), PAPER);
         };
-        with_rotors!(vehicle.rotors.len(), N => {
-            Self::image(ParameterTable::<N>::new(Configuration { link, ..vehicle.configuration()? }), &vehicle.name)
-        })
+        Self::image(ParameterTable::new(Configuration { link, ..vehicle.configuration()? }), &vehicle.name)
     }
 
     /// Creates the firmware of this vehicle under another law, without a monitor. No firmware image has this law, but
@@ -121,10 +128,8 @@ impl Host {
     /// # Errors
     /// The first parameter or gain out of range.
     pub fn under(vehicle: &Vehicle, law: Law) -> Result<Self, OutOfRange> {
-        with_rotors!(vehicle.rotors.len(), N => {
-            let table = ParameterTable::<N>::new(vehicle.configuration()?);
-            Self::of(table, FlownLaw(Some(law)), [&vehicle.name, law.kind().name()])
-        })
+        let table = ParameterTable::new(vehicle.configuration()?);
+        Self::of(table, FlownLaw(Some(law)), [&vehicle.name, law.kind().name()])
     }
 
     /// Creates the firmware as [`linked`](Self::linked) does, with the parameters and the signing key from `store`.
@@ -139,32 +144,31 @@ impl Host {
         notice: &mut dyn FnMut(&str),
     ) -> Result<Self, OutOfRange> {
         let signing = Signing::kept(|name| store.get(name).ok().flatten().map(|(_, bits)| bits));
-        let mut host = match vehicle {
-            None => Self::image(loaded(Configuration { link, ..Configuration::default() }, store, notice), PAPER)?,
-            Some(vehicle) => with_rotors!(vehicle.rotors.len(), N => {
-                let table = loaded::<N>(Configuration { link, ..vehicle.configuration()? }, store, notice);
-                Self::image(table, &vehicle.name)
-            })?,
+        let (configuration, name) = match vehicle {
+            None => (Configuration::default(), PAPER),
+            Some(vehicle) => (vehicle.configuration()?, vehicle.name.as_str()),
         };
+        let mut host = Self::image(loaded(Configuration { link, ..configuration }, store, notice), name)?;
         host.comms.set_signing(signing);
         Ok(host)
     }
 
     /// Creates a host that corresponds to a firmware image.
-    fn image<const N: usize>(table: ParameterTable<N>, vehicle: &str) -> Result<Self, OutOfRange> {
+    fn image(table: ParameterTable, vehicle: &str) -> Result<Self, OutOfRange> {
         Self::of(table, FlownLaw(None), [vehicle, ControllerKind::Afbc.name()])
     }
 
-    fn of<const N: usize>(table: ParameterTable<N>, law: FlownLaw, names: [&str; 2]) -> Result<Self, OutOfRange> {
+    fn of(table: ParameterTable, law: FlownLaw, names: [&str; 2]) -> Result<Self, OutOfRange> {
         let setup = Setup { calibrates: true, ..Setup::of(&table.configuration().link) };
-        let flight = Flight::of(law.prepare(table.configuration())?);
-        let escs = EscReports::new(table.configuration());
         Ok(Host {
+            flight: Box::new(AnyFlight::new(&law, table.configuration())?),
+            law,
+            esc_reports: EscReports::new(table.configuration()),
             escs: Vec::new(),
             asks_esc: None,
             answers_rev_min: [None; ROTORS_MAX],
             simulated_escs: SimulatedEscs::new(table.configuration().escs.poles),
-            flight: Box::new(Aircraft { flight, table, law, escs }),
+            table,
             setup,
             comms: Comms::with(setup),
             inputs: ControlInputs::EMPTY,
@@ -228,7 +232,8 @@ impl Host {
     /// # Errors
     /// The first gain out of range. Then nothing has changed.
     pub fn change_law(&mut self, law: Option<Law>) -> Result<(), OutOfRange> {
-        self.flight.change_law(FlownLaw(law))?;
+        self.flight.change_law(&FlownLaw(law), self.table.configuration())?;
+        self.law = FlownLaw(law);
         let [_, name] = &mut self.names;
         law.map_or(ControllerKind::Afbc, |law| law.kind()).name().clone_into(name);
         Ok(())
@@ -236,39 +241,48 @@ impl Host {
 
     /// Returns name and value of every parameter.
     pub fn parameter_values(&self) -> Vec<(RecordName, f32)> {
-        self.flight.parameter_values()
+        self.table.iter().map(|parameter| (parameter.name, parameter.value)).collect()
     }
 
     /// Returns the parameters' metadata files, as stations download them.
     pub fn metadata(&self) -> MetadataFiles {
         let [vehicle, _] = &self.names;
-        self.flight.metadata(vehicle)
+        MetadataFiles::new(vehicle, &self.table)
     }
 
     /// Starts an exact log ([`afbc_log::exact`]). Call it before the first tick. `write` gets the log's bytes.
     pub fn record(&mut self, write: impl FnMut(&[u8]) + 'static) {
         let mut log = ExactLog { recorder: Recorder::default(), write: Box::new(write) };
-        self.flight.record(&mut log, &self.names, None);
+        let [vehicle, law] = &self.names;
+        log.recorder.start([vehicle, law], &self.as_built(), &mut log.write);
         self.log = Some(log);
+    }
+
+    /// Returns the parameters relative to a firmware image whose link has the declared defaults.
+    fn as_built(&self) -> ParameterTable {
+        let mut image = self.table.clone();
+        image.restore();
+        let image = Configuration { link: Link::DEFAULT, ..image.configuration().clone() };
+        let mut table = ParameterTable::new(image);
+        for parameter in self.table.iter() {
+            // Accepted, because the values are in their ranges already.
+            let _ = table.put(parameter.name, parameter.value);
+        }
+        table
     }
 
     /// Starts a black box ([`afbc_log::ulog`]). Call it before the first tick. `write` gets the log's bytes. `origin`
     /// is the geographic origin of GNSS fixes, if it is known.
     pub fn log(&mut self, origin: Option<Origin>, write: impl FnMut(&[u8]) + 'static) {
         self.origin = origin;
-        self.black_box = Some(self.new_black_box(Some(Box::new(write))));
-    }
-
-    fn new_black_box(&self, write: Option<Sink>) -> HostBlackBox {
-        new_black_box(&*self.flight, &self.names, self.origin, write)
+        self.black_box = Some(new_black_box(&self.table, &self.names, origin, Some(Box::new(write))));
     }
 
     /// Starts to serve files to stations: the metadata, these logs, and a black box streamed as it is written. `origin`
     /// is as for [`log`](Self::log).
     pub fn serve_files(&mut self, origin: Option<Origin>, logs: Option<StoredLogs>) {
         self.origin = origin;
-        let [vehicle, _] = &self.names;
-        let MetadataFiles { files, general } = self.flight.metadata(vehicle);
+        let MetadataFiles { files, general } = self.metadata();
         self.files = Some(Box::new((Transfers::new(Some(general)), ServedFiles::new(logs, files))));
     }
 
@@ -297,7 +311,7 @@ impl Host {
 
     /// Receives bytes from a radio receiver for the next tick.
     pub fn hear_radio(&mut self, bytes: &[u8]) {
-        if let Some(news) = self.flight.pilot(&mut self.comms, &mut self.radio, bytes) {
+        if let Some(news) = self.comms.pilot(&mut self.radio, bytes, &self.table.configuration().radio) {
             self.merge(&news);
         }
     }
@@ -340,8 +354,11 @@ impl Host {
         let mut send = |frame: &[u8]| bytes.extend_from_slice(frame);
         let escs = core::mem::take(&mut self.escs);
         let heard = EscsHeard { bytes: &escs, speeds_rev_min: core::mem::take(&mut self.answers_rev_min) };
-        let exchange = Exchange { comms: &mut self.comms, tick_us, send: &mut send, escs: heard };
-        let (report, action) = self.flight.tick(time_us, &mut self.taken, &readings, exchange);
+        let report = self.flight.tick(time_us, &mut self.taken, &readings);
+        self.comms.report(&report, tick_us, &mut send);
+        let action = self.comms.escs(&mut self.esc_reports, &heard, &report);
+        // Applied between two ticks, as on the board: the next tick is the first with the new notch.
+        action.notch.iter().for_each(|notch| self.flight.move_notch(notch));
         // Taken before anything changes that the details contain.
         let details = (self.black_box.is_some() || self.files.is_some()).then(|| self.details());
         if let Some(ExactLog { recorder, write }) = &mut self.log {
@@ -355,24 +372,30 @@ impl Host {
         } else {
             self.raw = RawReadings::NONE;
         }
-        self.flight.calibrate(&mut self.comms, &mut self.calibrator, self.raw.take(), &mut send);
-        let change = self.flight.parameters(&mut self.comms, &mut send);
+        self.comms.calibrate(&mut self.calibrator, self.raw.take(), &self.table, &mut send);
+        let change = self.comms.parameters(&mut self.table, &mut send);
+        if change.is_some() {
+            self.esc_reports.adopt(self.table.configuration());
+            // Adopted at once, because the vehicle is disarmed and each change has been checked.
+            let adopted = self.flight.adopt(&self.law, self.table.configuration());
+            debug_assert_eq!(adopted, Ok(true), "a change that is not flown");
+        }
         if let Some(files) = &mut self.files {
             let (transfers, store) = &mut **files;
             self.comms.transfer(transfers, store, &mut send);
         }
-        if let (Some(log), true) = (&mut self.log, change.is_some()) {
-            self.next.adopted = self.flight.record(log, &self.names, change);
+        if let (Some(ExactLog { recorder, write }), Some(change)) = (&mut self.log, change) {
+            self.next.adopted = Some(recorder.change(&self.table, change, write));
         }
         let tick = details.as_ref().map(|details| TickRecord { report: &report, details });
         if let (Some(black_box), Some(tick)) = (&mut self.black_box, &tick) {
-            self.flight.log(black_box, tick, self.comms.esc_telemetry(), change);
+            black_box.tick(tick, self.comms.esc_telemetry(), &self.table, change);
             black_box.sent(time_us, &bytes);
         }
         if let (Some(files), Some(tick)) = (&mut self.files, &tick)
-            && let Some(stream) = files.1.streamed(|| new_black_box(&*self.flight, &self.names, self.origin, None))
+            && let Some(stream) = files.1.streamed(|| new_black_box(&self.table, &self.names, self.origin, None))
         {
-            self.flight.log(stream, tick, self.comms.esc_telemetry(), change);
+            stream.tick(tick, self.comms.esc_telemetry(), &self.table, change);
             stream.sent(time_us, &bytes);
         }
         // Incremented before the following inputs are merged, which belong to the next tick.
@@ -392,18 +415,18 @@ impl Host {
     }
 }
 
-fn new_black_box(flight: &dyn Core, names: &[String; 2], origin: Option<Origin>, write: Option<Sink>) -> HostBlackBox {
-    let [vehicle, law] = names;
-    let log = flight.black_box(&LogStart { vehicle, law, hardware: HARDWARE, ..LogStart::default() });
+fn new_black_box(
+    table: &ParameterTable,
+    [vehicle, law]: &[String; 2],
+    origin: Option<Origin>,
+    write: Option<Sink>,
+) -> HostBlackBox {
+    let log = BlackBox::new(&LogStart { vehicle, law, hardware: HARDWARE, ..LogStart::default() }, table);
     HostBlackBox::new(log, origin, write)
 }
 
 /// Returns the parameters with the values in `store`.
-fn loaded<const N: usize>(
-    image: Configuration<N>,
-    store: &mut Store<Flash>,
-    notice: &mut dyn FnMut(&str),
-) -> ParameterTable<N> {
+fn loaded(image: Configuration, store: &mut Store<Flash>, notice: &mut dyn FnMut(&str)) -> ParameterTable {
     let mut table = ParameterTable::new(image);
     let loaded = Kept::NOW.load(&mut table, store, |unused: Reason| notice(unused.as_str()));
     loaded.unwrap_or_else(|error| notice(error.reason()));

@@ -5,7 +5,6 @@ use afbc_log::ulog::{BesideTick, BlackBox, LogRing};
 use afbc_mavlink::{Address, Decoder, Downlink};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{EscTelemetry, TickRecord};
-use afbc_types::ROTORS_MAX;
 
 /// Size of the ring: more than a log's beginning and one tick.
 const RING: usize = 1 << 16;
@@ -32,20 +31,19 @@ impl HostBlackBox {
         HostBlackBox { log, ring: Box::default(), write, origin, decoder: Decoder::new(LISTENER) }
     }
 
-    /// Logs a tick.
-    pub(crate) fn tick<const N: usize>(
+    /// Logs a tick, and a parameter change after it.
+    pub(crate) fn tick(
         &mut self,
-        tick: &TickRecord<'_, ROTORS_MAX>,
+        tick: &TickRecord<'_>,
         escs: &EscTelemetry,
-        table: &ParameterTable<N>,
+        table: &ParameterTable,
+        change: Option<RecordChange>,
     ) {
         let beside = BesideTick { escs: Some(escs), origin: self.origin };
         self.log.tick(tick, &beside, table, &mut self.ring);
-    }
-
-    /// Logs a parameter change.
-    pub(crate) fn change<const N: usize>(&mut self, table: &ParameterTable<N>, change: RecordChange) {
-        self.log.change(table, change, &mut self.ring);
+        if let Some(change) = change {
+            self.log.change(table, change, &mut self.ring);
+        }
     }
 
     /// Logs the texts among the bytes sent after a tick, and hands over all waiting bytes.

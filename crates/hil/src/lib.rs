@@ -13,7 +13,6 @@
 //! refused ([`check`]). Plant, gusts, true parameters, start and trajectory come from the scenario.
 #![forbid(unsafe_code)]
 
-mod aircraft;
 mod autopilot;
 mod error;
 mod extremes;

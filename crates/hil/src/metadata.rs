@@ -26,7 +26,7 @@ const DIGITS: i32 = 4;
 
 impl MetadataFiles {
     /// Returns the metadata of a vehicle with this name and these parameters.
-    pub fn new<const N: usize>(vehicle: &str, table: &ParameterTable<N>) -> Self {
+    pub fn new(vehicle: &str, table: &ParameterTable) -> Self {
         let parameters = parameters(table).to_string().into_bytes();
         let general = json!({
             "version": 1,
@@ -46,7 +46,7 @@ fn uri(file: &str) -> String {
 }
 
 /// Returns the parameters' metadata, from their declarations.
-fn parameters<const N: usize>(table: &ParameterTable<N>) -> Value {
+fn parameters(table: &ParameterTable) -> Value {
     let mut declared = Vec::new();
     table.show_declarations(|declaration, words| declared.push((*declaration, words)));
     let all = table.iter().zip(&declared).map(|(parameter, (declaration, words))| {

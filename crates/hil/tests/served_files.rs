@@ -112,7 +112,7 @@ fn a_files_starts_are_served() {
 /// The metadata follow the published schemas and QGroundControl's needs, with each number as declared.
 #[test]
 fn metadata_describes_every_parameter() {
-    let table = ParameterTable::<4>::new(Configuration::default());
+    let table = ParameterTable::new(Configuration::default());
     let MetadataFiles { files, general } = MetadataFiles::new("paper", &table);
     let [(general_name, general_bytes), (name, bytes)] = files.as_slice() else { panic!("two files") };
     assert_eq!(general.crc, crc32(0, general_bytes));

@@ -8,12 +8,12 @@ use afbc_log::exact::{
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{Configuration, ControlInputs, Flight, Readings, Report, TickInputs};
 use afbc_store::RecordName;
-use afbc_types::{RotorSpeeds, State};
+use afbc_types::{PLUS, Rotor, RotorSpeeds, Rotors, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
 fn start(version: u16, name: &str) -> Record {
-    let table = ParameterTable::new(Configuration::<4>::default());
+    let table = ParameterTable::new(Configuration::default());
     Record::Start(StartRecord { version, ..StartRecord::of(name, "afbc", &table) })
 }
 
@@ -143,7 +143,7 @@ proptest! {
     /// A name is written up to the last whole letter that fits.
     #[test]
     fn a_name_or_its_beginning_is_written(vehicle in "\\PC{0,30}", law in "[a-z]{0,40}") {
-        let table = ParameterTable::new(Configuration::<4>::default());
+        let table = ParameterTable::new(Configuration::default());
         let written = StartRecord::of(&vehicle, &law, &table);
         for (name, word) in [(&vehicle, &written.vehicle), (&law, &written.law)] {
             prop_assert!(name.starts_with(word.as_str()));
@@ -160,7 +160,7 @@ proptest! {
         places in prop::collection::vec(any::<prop::sample::Index>(), 0..8),
         share in 0.0..1.0_f32,
     ) {
-        let image = ParameterTable::new(Configuration::<4>::default());
+        let image = ParameterTable::new(Configuration::default());
         let mut table = image.clone();
         for place in &places {
             let parameter = image.at(place.index(usize::from(image.count())) as u16).unwrap();
@@ -208,14 +208,15 @@ proptest! {
             &mut ControlInputs::EMPTY.clone(),
             &Readings::NONE,
         );
-        let motors = RotorSpeeds(speeds.into());
+        let motors = RotorSpeeds::<4>(speeds.into()).padded();
+        let throttles = std::array::from_fn(|rotor: usize| throttles.get(rotor).copied().unwrap_or_default());
         let report = Report { estimate: estimates.then_some(state), motors, throttles, ..report };
         let bytes = |values: &[f32]| values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<_>>();
         let given = Given::of(&report);
         prop_assert_eq!(given.estimate, if estimates { crc32(bytes(&values)) as u16 } else { 0 });
         // The checksum covers the largest number of rotors; missing rotors have speed 0.
         prop_assert_eq!(given.speeds, crc32(bytes(&[speeds, [0.0; 4]].concat())) as u16);
-        prop_assert_eq!(&given.throttles, &[throttles, [0; 4]].concat()[..]);
+        prop_assert_eq!(given.throttles, throttles);
         prop_assert_eq!(given.mode, report.mode as u8);
     }
 }
@@ -224,7 +225,7 @@ proptest! {
 #[test]
 fn changes_are_numbered_and_nothing_is_not_recorded() {
     let (mut recorder, mut records) = (Recorder::default(), Vec::new());
-    let mut table = ParameterTable::new(Configuration::<4>::default());
+    let mut table = ParameterTable::new(Configuration::default());
     let mut send = |frame: &[u8]| records.push(decode(&mut frame[..frame.len() - 1].to_vec()).unwrap());
     let name = RecordName::new("EST_GATE").unwrap();
     let value = table.set(name, 4.0).unwrap().value;
@@ -249,16 +250,17 @@ fn changes_are_numbered_and_nothing_is_not_recorded() {
 /// Each rotor's position and direction of rotation changes the digest.
 #[test]
 fn the_digest_is_of_the_rotors_too() {
-    let digest = |change: fn(&mut Configuration<4>)| {
-        let mut configuration = Configuration::<4>::default();
-        change(&mut configuration);
+    let digest = |change: fn(&mut Rotor)| {
+        let mut rotors = PLUS;
+        change(&mut rotors[2]);
+        let configuration = Configuration { rotors: Rotors::new(&rotors), ..Configuration::default() };
         StartRecord::of("x", "afbc", &ParameterTable::new(configuration)).digest
     };
     let all = [
         digest(|_| ()),
-        digest(|configuration| configuration.airframe.rotors[2].x += 1e-3),
-        digest(|configuration| configuration.airframe.rotors[2].y += 1e-3),
-        digest(|configuration| configuration.airframe.rotors[2].pushes_left ^= true),
+        digest(|rotor| rotor.x += 1e-3),
+        digest(|rotor| rotor.y += 1e-3),
+        digest(|rotor| rotor.pushes_left ^= true),
     ];
     assert!((1..4).all(|k| !all[..k].contains(&all[k])), "{all:?}");
 }

@@ -162,7 +162,7 @@ fn adds_up(log: &StrictLog) {
 }
 
 /// Checks that the last parameter values in the log are the vehicle's.
-fn parameters_agree<const N: usize>(log: &StrictLog, table: &ParameterTable<N>) {
+fn parameters_agree(log: &StrictLog, table: &ParameterTable) {
     for parameter in table.iter() {
         let last = log.parameters.iter().rev().find(|(name, _)| name == parameter.name.as_str());
         assert_eq!(last.unwrap().1, f64::from(parameter.value), "{}", parameter.name);
@@ -442,8 +442,8 @@ fn values_are_px4s() {
         ..Setpoint::default()
     });
     // The paper's rotors lie on the axes, so that output n drives rotor n.
-    report.motors = RotorSpeeds(SVector::from([100.0, 200.0, 300.0, 400.0]));
-    report.throttles = [100, 200, 300, 400];
+    report.motors = RotorSpeeds::<4>(SVector::from([100.0, 200.0, 300.0, 400.0])).padded();
+    report.throttles = [100, 200, 300, 400, 0, 0, 0, 0];
     details.estimate = None;
     details.state = Some(State {
         position_m: Vector3::new(4.0, 5.0, 6.0),
@@ -539,7 +539,7 @@ fn values_are_px4s() {
 }
 
 fn logged_force_max() -> f32 {
-    Configuration::<4>::default().settings.common.rotor_force_max_n
+    Configuration::default().settings.common.rotor_force_max_n
 }
 
 /// The log contains the information, the parameters at the start, the defaults of changed ones, and each later change.

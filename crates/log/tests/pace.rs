@@ -31,7 +31,7 @@ fn logged(pace: Option<u16>, ticks: u64, [restored, changed]: [u64; 2]) -> (Vec<
     let log = BlackBox::new(&start, &table);
     let mut log = pace.map_or(log.clone(), |pace| log.paced(pace));
     let mut ring = Box::new(LogRing::<65_536>::new());
-    let mut flight = Flight::new(&configuration).unwrap();
+    let mut flight = Flight::<4>::new(&configuration).unwrap();
     let (mut kept, mut most) = (Vec::new(), 0);
     for number in 1..=ticks {
         let imu = Some(Aged { value: [Vector3::zeros(), Vector3::new(0.0, 0.0, 9.81)], age_us: 0 });

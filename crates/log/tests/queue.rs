@@ -133,7 +133,7 @@ impl Vehicle {
 
 /// Replays a log. Returns the number of matching ticks, and the first difference.
 fn replay(log: &[u8]) -> (u32, Option<ReplayDifference>) {
-    let mut replayer = Replayer::new(Configuration::<4>::default()).unwrap();
+    let mut replayer = Replayer::new(Configuration::default()).unwrap();
     let mut frames = Frames::default();
     let (mut same, mut first) = (0, None);
     for record in log.iter().filter_map(|byte| frames.take(*byte)) {

@@ -9,7 +9,7 @@ use afbc_log::exact::{Given, Record, Recorder, ReplayDifference, ReplayStep, Rep
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Prepared, Readings, Report, TickInputs};
 use afbc_store::RecordName;
-use afbc_types::{Rotor, State};
+use afbc_types::{PLUS, Rotors, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
@@ -141,12 +141,12 @@ fn seen_to_stand(ms: u32) -> Readings {
     Readings { aids: [pose, None], ..stands(ms) }
 }
 
-fn replayer() -> Replayer<4> {
+fn replayer() -> Replayer {
     Replayer::new(Configuration::default()).unwrap()
 }
 
 /// Replays records. Returns the number of matching ticks, and the differences.
-fn replay(replayer: &mut Replayer<4>, records: &[Record]) -> (usize, Vec<ReplayDifference>) {
+fn replay(replayer: &mut Replayer, records: &[Record]) -> (usize, Vec<ReplayDifference>) {
     let (mut same, mut differences) = (0, Vec::new());
     for record in records {
         match replayer.take(record) {
@@ -220,7 +220,7 @@ proptest! {
 }
 
 /// Replays records. Returns all replayed reports, whether they match or not.
-fn reports(replayer: &mut Replayer<4>, records: &[Record]) -> Vec<Report> {
+fn reports(replayer: &mut Replayer, records: &[Record]) -> Vec<Report> {
     let report = |record: &Record| match replayer.take(record) {
         ReplayStep::Same(report) | ReplayStep::Differs(_, Some(report)) => Some(report),
         ReplayStep::Nothing | ReplayStep::Differs(_, None) => None,
@@ -372,9 +372,9 @@ fn a_start_brings_its_parameters() {
     vehicle.set(OFFSET, 0.2);
     vehicle.stand(50);
     assert_eq!(replay(&mut replayer(), &vehicle.records), (100, Vec::new()));
-    let mut moved = Configuration::<4>::default();
-    let Rotor { x, .. } = &mut moved.airframe.rotors[0];
-    *x += 1e-3;
+    let mut rotors = PLUS;
+    rotors[0].x += 1e-3;
+    let moved = Configuration { rotors: Rotors::new(&rotors), ..Configuration::default() };
     let (same, differences) = replay(&mut Replayer::new(moved).unwrap(), &vehicle.records);
     assert!(same == 0 && matches!(differences[..], [ReplayDifference::Parameters(_)]), "{same} {differences:?}");
 }

@@ -46,7 +46,7 @@ impl Tick {
 
 /// Returns a log of these ticks, one millisecond apart.
 fn log_of(ticks: &[Tick], start: &LogStart<'_>) -> StrictLog {
-    let table = ParameterTable::new(Configuration::<4>::default());
+    let table = ParameterTable::new(Configuration::default());
     let (mut log, mut ring) = (BlackBox::new(start, &table), Box::<LogRing<65_536>>::default());
     for (tick, number) in ticks.iter().zip(0..) {
         let Tick { report, details, origin } = tick;
@@ -438,7 +438,7 @@ fn the_laws_signals_are_told() {
     has(&log, "vehicle_attitude_setpoint", &attitude);
     has_all(&log, "vehicle_local_position_setpoint", "acceleration", &[0.1, -0.2, -0.3]);
     has(&log, "vehicle_local_position_setpoint", &[("yaw", -0.3), ("yawspeed", -0.7)]);
-    let most_n = 4.0 * f64::from(Configuration::<4>::default().settings.common.rotor_force_max_n);
+    let most_n = 4.0 * f64::from(Configuration::default().settings.common.rotor_force_max_n);
     let thrust = [0.0, 0.0, -4.0 / most_n];
     has_all(&log, "vehicle_rates_setpoint", "thrust_body", &thrust);
     has_all(&log, "vehicle_attitude_setpoint", "thrust_body", &thrust);

@@ -11,13 +11,15 @@ use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::{Curve, Response};
 use afbc_flight_core::protocol::MotorOutputs;
 use afbc_rc::RadioSettings;
-use afbc_types::{Airframe, Declared, Mounting, OutOfRange, Parameters, PerAxis, SensorCalibration};
+use afbc_types::{Airframe, Declared, Mounting, OutOfRange, PLUS, Parameters, PerAxis, Rotors, SensorCalibration};
 
 /// Everything that the firmware knows about its vehicle. The vehicles' configurations are in `vehicles/`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Configuration<const N: usize = 4> {
-    /// Nominal parameters and rotors.
-    pub airframe: Airframe<N>,
+pub struct Configuration {
+    /// Nominal parameters.
+    pub parameters: Parameters,
+    /// Rotors, in the order of the motor outputs.
+    pub rotors: Rotors,
     /// Settings of AFBC, including the largest force of a rotor.
     pub settings: Settings,
     /// Gains of AFBC.
@@ -46,13 +48,15 @@ pub struct Configuration<const N: usize = 4> {
     pub link: Link,
 }
 
-impl<const N: usize> Configuration<N> {
-    /// Returns the configuration of this airframe with declared defaults for everything else.
+impl Configuration {
+    /// Returns the configuration of a vehicle with these parameters and rotors, and declared defaults for everything
+    /// else.
     #[must_use]
-    pub const fn plain(airframe: Airframe<N>) -> Self {
+    pub const fn plain(parameters: Parameters, rotors: Rotors) -> Self {
         const GAINS: Gains = Gains::DEFAULT;
         Configuration {
-            airframe,
+            parameters,
+            rotors,
             settings: Settings::DEFAULT,
             gains: PerAxis { roll: GAINS, pitch: GAINS, yaw: GAINS, z: GAINS, x: GAINS, y: GAINS },
             curve: Curve::DEFAULT,
@@ -69,21 +73,28 @@ impl<const N: usize> Configuration<N> {
         }
     }
 
+    /// Returns the airframe of a vehicle with `N` rotors.
+    ///
+    /// # Errors
+    /// If there are not `N` rotors.
+    pub fn airframe<const N: usize>(&self) -> Result<Airframe<N>, OutOfRange> {
+        Ok(Airframe { parameters: self.parameters, rotors: self.rotors.array()? })
+    }
+
     /// Returns the firmware's own law for this vehicle: AFBC with its monitor.
     ///
     /// # Errors
-    /// The first parameter, setting or gain out of range.
+    /// The first parameter, setting or gain out of range. Also if there are not `N` rotors.
     // Always inlined: otherwise the controller is on the stack of the firmware's start-up twice.
     #[inline(always)]
-    pub fn controller(&self) -> Result<Guarded<N>, OutOfRange> {
-        let Configuration { airframe, settings, gains, .. } = self;
-        let parameters = &airframe.parameters;
+    pub fn controller<const N: usize>(&self) -> Result<Guarded<N>, OutOfRange> {
+        let Configuration { parameters, settings, gains, .. } = self;
         // The controller only checks combinations, and assumes that each value is in its own range.
         parameters.validate()?;
         settings.validate()?;
         gains.validate()?;
         let bounds = Bounds::new(gains, parameters, settings);
-        Guarded::new(*airframe, *settings, *gains, bounds)
+        Guarded::new(self.airframe()?, *settings, *gains, bounds)
     }
 }
 
@@ -93,7 +104,7 @@ impl Default for Configuration {
         Configuration {
             settings: Profile::Flight.settings().with_drag(KnownDrag::PAPER),
             gains: Profile::Flight.gains(),
-            ..Configuration::plain(Parameters::PAPER.to_f32().into())
+            ..Configuration::plain(Parameters::PAPER.to_f32(), Rotors::new(&PLUS))
         }
     }
 }

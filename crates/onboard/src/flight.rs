@@ -9,11 +9,11 @@ use crate::law::FlightLaw;
 use crate::readings::Readings;
 use crate::sensor_timeouts::SensorTimeouts;
 use crate::tick_record::{Report, TickBefore, TickDetails, TickInputs};
-use afbc::Guarded;
+use afbc::{AdaptiveEstimate, Guarded};
 use afbc_control::Trace;
 use afbc_estimator::{Estimator, OutputFilter, VelocityNotch};
 use afbc_flight_core::{FlightCore, FlightCoreMemory, Motor};
-use afbc_types::{Declared, OutOfRange};
+use afbc_types::{Declared, OutOfRange, PerAxis, ROTORS_MAX};
 
 /// A vehicle under a law: AFBC with its monitor, unless it is simulated or replayed under another one.
 #[derive(Clone, Debug)]
@@ -46,8 +46,9 @@ impl<const N: usize> Prepared<N> {
     /// Prepares a flight.
     ///
     /// # Errors
-    /// The first parameter, setting or gain that is out of range or leaves the vehicle without a margin to hover.
-    pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
+    /// The first parameter, setting or gain that is out of range or leaves the vehicle without a margin to hover. Also
+    /// if there are not `N` rotors.
+    pub fn new(configuration: &Configuration) -> Result<Self, OutOfRange> {
         configuration.imu.validate()?;
         configuration.calibration.validate()?;
         Self::around(configuration, configuration.controller()?)
@@ -59,7 +60,7 @@ impl<const N: usize, C: FlightLaw<N>> Prepared<N, C> {
     ///
     /// # Errors
     /// The first of the other parameters and settings that is out of range.
-    pub fn under(configuration: &Configuration<N>, controller: C) -> Result<Self, OutOfRange> {
+    pub fn under(configuration: &Configuration, controller: C) -> Result<Self, OutOfRange> {
         configuration.imu.validate()?;
         configuration.calibration.validate()?;
         Self::around(configuration, controller)
@@ -68,11 +69,10 @@ impl<const N: usize, C: FlightLaw<N>> Prepared<N, C> {
     /// Adds everything else to a controller. Always inlined: otherwise its result is on the stack of the firmware's
     /// start-up twice.
     #[inline(always)]
-    fn around(configuration: &Configuration<N>, controller: C) -> Result<Self, OutOfRange> {
-        let Configuration { airframe, curve, response, imu, calibration, estimation, arming, radio, .. } =
+    fn around(configuration: &Configuration, controller: C) -> Result<Self, OutOfRange> {
+        let Configuration { parameters, curve, response, imu, calibration, estimation, arming, radio, .. } =
             configuration;
         radio.validate()?;
-        let parameters = &airframe.parameters;
         Ok(Prepared {
             vehicle: FlightCore::with_rotors(*parameters, response, *arming, controller)?,
             estimator: Estimator::new(*estimation)?,
@@ -84,33 +84,12 @@ impl<const N: usize, C: FlightLaw<N>> Prepared<N, C> {
     }
 }
 
-/// Builds a flight from a configuration, under a law of its choice.
-pub trait Prepare<const N: usize> {
-    /// The law.
-    type Law: FlightLaw<N>;
-
-    /// Prepares a flight.
-    ///
-    /// # Errors
-    /// The first parameter out of range.
-    fn prepare(&self, configuration: &Configuration<N>) -> Result<Prepared<N, Self::Law>, OutOfRange>;
-}
-
-/// Prepares flights under the firmware's own law.
-impl<const N: usize> Prepare<N> for () {
-    type Law = Guarded<N>;
-
-    fn prepare(&self, configuration: &Configuration<N>) -> Result<Prepared<N>, OutOfRange> {
-        Prepared::new(configuration)
-    }
-}
-
 impl<const N: usize> Flight<N> {
     /// Creates the vehicle, disarmed.
     ///
     /// # Errors
     /// The errors of [`Prepared::new`].
-    pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
+    pub fn new(configuration: &Configuration) -> Result<Self, OutOfRange> {
         Ok(Self::of(Prepared::new(configuration)?))
     }
 }
@@ -156,9 +135,9 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
         self.memory.forget_law();
     }
 
-    /// Returns the law's memory in the present or last flight, or none before the first flight.
-    pub fn law_memory(&self) -> Option<&C::Memory> {
-        self.memory.control()
+    /// Returns AFBC's estimates in the present or last flight; none before the first flight or under another law.
+    pub fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>> {
+        C::estimates(self.memory.control()?)
     }
 
     /// Moves the notch filter in the law's velocity, from the next tick on. Call it between ticks. Does nothing if the
@@ -219,7 +198,7 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
     /// vehicle's own sensors. `now_us` is the time since power-up. Cannot fail.
     // Always inlined: copying the report out of a call costs a hundred instructions.
     #[inline(always)]
-    pub fn tick(&mut self, now_us: u64, inputs: &mut ControlInputs, readings: &Readings) -> Report<N> {
+    pub fn tick(&mut self, now_us: u64, inputs: &mut ControlInputs, readings: &Readings) -> Report {
         // Comes before the front end, which removes the pose from the inbox.
         let mut sensors = self.timeouts.tick(now_us, readings, inputs.inbox.pose().is_some());
         // While the observer flies, the inertial sensor counts as failed even if it still sends samples, as a stuck
@@ -240,11 +219,17 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
             self.saturated_ticks = self.saturated_ticks.saturating_add(1);
         }
         let observed = if outcome.health.observed { self.memory.state().copied() } else { None };
+        // Report, logs and telemetry have room for the largest number of rotors: from here on, the code is the same for
+        // every vehicle.
+        let mut throttles = [0; ROTORS_MAX];
+        let used = self.motor.throttles(outcome.mode.armed(), &outcome.motors);
+        throttles.iter_mut().zip(used).for_each(|(to, from)| *to = from);
         Report {
             time_us: now_us,
             mode: outcome.mode,
-            motors: outcome.motors,
-            throttles: self.motor.throttles(outcome.mode.armed(), &outcome.motors),
+            rotors: N as u8,
+            motors: outcome.motors.padded(),
+            throttles,
             estimate: observed.or(estimate.map(|estimate| estimate.state)),
             health: outcome.health,
             saturated_ticks: self.saturated_ticks,

@@ -36,10 +36,9 @@ impl Guide {
     ///
     /// # Errors
     /// The first setting out of range.
-    pub(crate) fn new<const N: usize>(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
-        let Configuration { airframe, settings, guidance, .. } = configuration;
-        let parameters = &airframe.parameters;
-        let most_m_s2 = N as f32 * settings.common.rotor_force_max_n / parameters.mass_kg;
+    pub(crate) fn new(configuration: &Configuration) -> Result<Self, OutOfRange> {
+        let Configuration { parameters, rotors, settings, guidance, .. } = configuration;
+        let most_m_s2 = rotors.count() as f32 * settings.common.rotor_force_max_n / parameters.mass_kg;
         Ok(Guide {
             guidance: Guidance::new(*guidance)?,
             lift: Lift { most_m_s2, gravity_m_s2: parameters.gravity_m_s2, given_m_s2: None },

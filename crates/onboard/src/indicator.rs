@@ -57,7 +57,7 @@ impl Indication {
     ];
 
     /// Returns the indication for a tick's report.
-    pub fn of<const N: usize>(report: &Report<N>) -> Self {
+    pub fn of(report: &Report) -> Self {
         let clock_failed = report.health.rate.clock_failed;
         if report.mode.armed() {
             let takes_over = report.mode != Mode::Flying || report.health.observed || report.guided.failsafe.is_some();
@@ -123,7 +123,7 @@ mod tests {
 
     /// Returns the report of a disarmed vehicle.
     fn report() -> Report {
-        let mut flight = Flight::new(&Configuration::default()).expect("valid");
+        let mut flight = Flight::<4>::new(&Configuration::default()).expect("valid");
         flight.tick(1_000, &mut ControlInputs::EMPTY.clone(), &Readings::NONE)
     }
 

@@ -9,13 +9,14 @@
 //! ```
 //! use afbc_onboard::{Configuration, ControlInputs, Flight, Readings};
 //!
-//! let mut flight = Flight::new(&Configuration::default())?;
+//! let mut flight = Flight::<4>::new(&Configuration::default())?;
 //! let report = flight.tick(1_000, &mut ControlInputs::EMPTY.clone(), &Readings::NONE);
-//! assert_eq!(report.throttles, [0; 4]); // disarmed
+//! assert_eq!(report.throttles, [0; 8]); // disarmed
 //! # Ok::<(), afbc_types::OutOfRange>(())
 //! ```
 #![no_std]
 
+mod any_flight;
 mod configuration;
 mod control_inputs;
 mod esc_settings;
@@ -41,11 +42,12 @@ pub mod vibration;
 
 pub use afbc_estimator::Settings as Estimation;
 pub use afbc_flight_core::ArmingLimits;
+pub use any_flight::{AnyFlight, Prepare};
 pub use configuration::Configuration;
 pub use control_inputs::{ControlInputs, give};
 pub use esc_settings::EscSettings;
 pub use esc_telemetry::EscTelemetry;
-pub use flight::{Flight, Prepare, Prepared};
+pub use flight::{Flight, Prepared};
 pub use front_end::{EstimatorFrontEnd, tracker_aid};
 pub use imu_lanes::OtherSensors;
 pub use imu_selector::{ImuPair, ImuSelector};

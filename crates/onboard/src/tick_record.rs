@@ -8,20 +8,21 @@ use afbc_estimator::{Aids, Estimate, ImuSample, Measurement};
 use afbc_flight_core::{EndReason, Mode, Reasons, RequestAnswer, TickHealth};
 use afbc_guidance::{BatteryReading, Guided, Sticks};
 use afbc_types::{Axis, Pose, ROTORS_MAX, RotorSpeeds, Stamped, State};
-use core::array;
 use nalgebra::Vector3;
 
 /// Outputs of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Report<const N: usize = 4> {
+pub struct Report {
     /// Start of the tick, since power-up \[us\].
     pub time_us: u64,
     /// Flight core's mode.
     pub mode: Mode,
-    /// Commanded rotor speeds \[rad/s\]; zero while disarmed.
-    pub motors: RotorSpeeds<N>,
-    /// DSHOT throttles of the motors: 0 while disarmed, otherwise 48 to 2047.
-    pub throttles: [u16; N],
+    /// Number of rotors.
+    pub rotors: u8,
+    /// Commanded rotor speeds \[rad/s\]; zero while disarmed, and for rotors that the vehicle does not have.
+    pub motors: RotorSpeeds<ROTORS_MAX>,
+    /// DSHOT throttles of the motors: 0 while disarmed, otherwise 48 to 2047; 0 where there is no motor.
+    pub throttles: [u16; ROTORS_MAX],
     /// Estimated state, or the pose observer's state after the inertial sensor has failed
     /// ([`TickHealth::observed`](afbc_flight_core::TickHealth::observed)); none without an inertial sensor.
     pub estimate: Option<State>,
@@ -41,32 +42,6 @@ pub struct Report<const N: usize = 4> {
     pub against: Reasons,
     /// The guidance's decisions.
     pub guided: Guided,
-}
-
-impl<const N: usize> Report<N> {
-    /// Returns the report padded with zeros to the largest number of rotors.
-    #[must_use]
-    pub fn padded(&self) -> Report<ROTORS_MAX> {
-        let Report { time_us, mode, motors, throttles, estimate, health, saturated_ticks, norms, answer, .. } = *self;
-        let throttles = array::from_fn(|i| throttles.get(i).copied().unwrap_or_default());
-        let motors = motors.padded();
-        let (ended, against, guided, shaken) = (self.ended, self.against, self.guided, self.shaken);
-        Report {
-            time_us,
-            mode,
-            motors,
-            throttles,
-            estimate,
-            health,
-            saturated_ticks,
-            norms,
-            shaken,
-            answer,
-            ended,
-            against,
-            guided,
-        }
-    }
 }
 
 /// Inputs of a tick, apart from messages.
@@ -132,9 +107,9 @@ pub struct TickDetails {
 
 /// Record of a tick. It has two parts, because the details of most ticks are not needed.
 #[derive(Clone, Copy, Debug)]
-pub struct TickRecord<'a, const N: usize = 4> {
+pub struct TickRecord<'a> {
     /// Outputs of the tick.
-    pub report: &'a Report<N>,
+    pub report: &'a Report,
     /// Inputs and decisions of the tick.
     pub details: &'a TickDetails,
 }

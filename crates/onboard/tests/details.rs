@@ -44,7 +44,7 @@ fn fix(position_m: Vector3<f32>, horizontal_sigma_m: f32) -> Measurement {
 /// vehicle's position, and an unusable fix stays as it is.
 #[test]
 fn a_fix_at_rest_is_where_the_vehicle_stands() {
-    let configuration = Configuration::<4>::default();
+    let configuration = Configuration::default();
     let most_m = configuration.estimation.position_sigma_max_m;
     let mut vehicle = Standing { flight: Flight::new(&configuration).unwrap(), time_us: 0, senses: false };
     let first_m = Vector3::new(110.0, 220.0, 30.0);
@@ -76,7 +76,7 @@ fn a_fix_at_rest_is_where_the_vehicle_stands() {
 /// A magnetometer's reading is corrected.
 #[test]
 fn a_field_is_corrected() {
-    let mut configuration = Configuration::<4>::default();
+    let mut configuration = Configuration::default();
     configuration.calibration.mag_offset_ut = Vector3::new(1.0, -2.0, 3.0);
     let mut vehicle = Standing { flight: Flight::new(&configuration).unwrap(), time_us: 0, senses: true };
     let read = Measurement::MagneticField { field: Vector3::new(20.0, 5.0, -40.0), sigma: 1.0 };

@@ -57,12 +57,12 @@ pub struct Reach {
     /// Shortest chain of calls to each double-precision function, outermost first. This processor has no
     /// double-precision instructions.
     pub doubles: Vec<Vec<String>>,
-    /// Names of functions that call through a pointer.
+    /// Names of functions that call through a pointer; not the parameters' table, whose pointer is known.
     pub indirect: Vec<String>,
 }
 
 /// Functions of the executors' wakers. They are the targets of all calls through a pointer, except for those in
-/// [`EXECUTORS`] and by [`USB_CALLERS`].
+/// [`EXECUTORS`], and by [`USB_CALLERS`] and [`CHECK`].
 const WAKER: [&str; 3] =
     ["embassy_executor::raw::waker::wake", "embassy_executor::raw::waker::clone", "embassy_executor::raw::waker::drop"];
 
@@ -84,6 +84,9 @@ const EXECUTORS: [(&str, &[&str]); 3] = [
 /// Functions that call a USB class's request handlers through a pointer, and names of these handlers.
 const USB_CALLERS: [&str; 2] = ["chip_stm32::usb::", "embassy_usb::"];
 const USB_CLASS: [&str; 2] = ["embassy_usb::class::cdc_acm::Control", "embassy_usb::Handler::"];
+/// The function of the parameters' table that prepares a flight through a pointer, and the function at the pointer.
+const CHECK: [&str; 2] =
+    ["afbc_onboard::parameters::table::ParameterTable::could_fly", "afbc_onboard::parameters::table::check_rotors"];
 /// Name of every task's poll function.
 const POLL: &str = "embassy_executor::raw::TaskStorage<F>::poll";
 
@@ -173,7 +176,10 @@ impl Linked {
         let mut walk = Walk { linked: self, omitted, depths: BTreeMap::new(), open: BTreeSet::new() };
         let (stack_bytes, deepest) = walk.depth(root)?;
         let reached = walk.depths.keys().filter_map(|address| self.functions.get(address));
-        let indirect = reached.filter(|function| function.is_indirect).map(|function| function.name.clone()).collect();
+        let indirect = reached
+            .filter(|function| function.is_indirect && function.name != CHECK[0])
+            .map(|function| function.name.clone())
+            .collect();
         Ok(Reach {
             stack_bytes,
             deepest,
@@ -216,7 +222,11 @@ impl Linked {
     fn callees(&self, address: u32) -> Result<BTreeSet<u32>, Error> {
         let function = self.function(address)?;
         let mut callees = function.calls.clone();
-        if function.is_indirect {
+        let [checker, check] = CHECK;
+        if function.is_indirect && function.name == checker {
+            let check = self.functions.iter().find(|(_, function)| function.name.starts_with(check));
+            callees.extend(check.map(|(address, _)| *address));
+        } else if function.is_indirect {
             callees.extend(WAKER.iter().filter_map(|name| self.find(name)));
             for (_, marks) in EXECUTORS.iter().filter(|(interrupt, _)| *interrupt == function.name) {
                 for mark in *marks {

@@ -5,24 +5,27 @@ use crate::laws::{AnyController, AnyControllerMemory};
 use afbc::monitor::Norm;
 use afbc::{AdaptiveEstimate, Guarded};
 use afbc_control::{Action, FlightController};
-use afbc_onboard::{Configuration, FlightLaw, Prepare, Prepared};
+use afbc_onboard::{AnyFlight, Configuration, ControlInputs, FlightLaw, Readings, Report};
 use afbc_types::{Axis, OutOfRange, PerAxis, Setpoint, State};
 
-/// Functions that make a controller for the firmware's code and that compute its decision.
-type Compiled<const N: usize> = (
-    fn(&FlownLaw, &Configuration<N>) -> Result<Prepared<N, AnyController<N>>, OutOfRange>,
-    fn(&AnyController<N>, &mut AnyControllerMemory<N>, &State, &Setpoint, bool) -> Action<N>,
-);
+/// A function that computes a controller's decision.
+type Decide<const N: usize> = fn(&AnyController<N>, &mut AnyControllerMemory<N>, &State, &Setpoint, bool) -> Action<N>;
 
-const fn compiled<const N: usize>() -> Compiled<N> {
-    (<FlownLaw as Prepare<N>>::prepare, <AnyController<N> as FlightController<N>>::decide)
+const fn decide<const N: usize>() -> Decide<N> {
+    <AnyController<N> as FlightController<N>>::decide
 }
+
+/// Functions that make and fly a vehicle with any number of rotors.
+type Fly = (
+    fn(&FlownLaw, &Configuration) -> Result<AnyFlight<FlownLaw>, OutOfRange>,
+    fn(&mut AnyFlight<FlownLaw>, u64, &mut ControlInputs, &Readings) -> Report,
+);
 
 /// Makes the compiler compile these functions here for every number of rotors; other crates then share them, since they
 /// are not inlined. Otherwise each crate would have its own copies, with 40 KB of `decide` for each number of rotors.
 #[used]
-static COMPILED: (Compiled<4>, Compiled<5>, Compiled<6>, Compiled<7>, Compiled<8>) =
-    (compiled(), compiled(), compiled(), compiled(), compiled());
+static COMPILED: (Fly, Decide<4>, Decide<5>, Decide<6>, Decide<7>, Decide<8>) =
+    ((AnyFlight::new, AnyFlight::tick), decide(), decide(), decide(), decide(), decide());
 
 impl<const N: usize> AnyControllerMemory<N> {
     /// Returns AFBC's adaptive estimates, with or without its monitor; none for another law.
@@ -42,5 +45,9 @@ impl<const N: usize> FlightLaw<N> for AnyController<N> {
             AnyControllerMemory::Monitored(memory) => Guarded::norms(memory),
             _ => None,
         }
+    }
+
+    fn estimates(memory: &AnyControllerMemory<N>) -> Option<PerAxis<AdaptiveEstimate>> {
+        memory.estimates()
     }
 }

@@ -10,19 +10,22 @@ use afbc_types::{Declared, OutOfRange};
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlownLaw(pub Option<Law>);
 
-impl<const N: usize> Prepare<N> for FlownLaw {
-    type Law = AnyController<N>;
+impl Prepare for FlownLaw {
+    type Law<const N: usize> = AnyController<N>;
 
     // Not inlined, like the control step.
     #[inline(never)]
-    fn prepare(&self, configuration: &Configuration<N>) -> Result<Prepared<N, AnyController<N>>, OutOfRange> {
-        let Configuration { airframe, settings, .. } = configuration;
+    fn prepare<const N: usize>(
+        &self,
+        configuration: &Configuration,
+    ) -> Result<Prepared<N, AnyController<N>>, OutOfRange> {
+        let Configuration { parameters, settings, .. } = configuration;
         let controller = match self.0 {
             None => AnyController::Monitored(configuration.controller()?),
             Some(law) => {
-                airframe.parameters.validate()?;
+                parameters.validate()?;
                 settings.validate()?;
-                law.controller(*airframe, *settings)?
+                law.controller(configuration.airframe()?, *settings)?
             }
         };
         Prepared::under(configuration, controller)

@@ -20,7 +20,7 @@ use afbc_onboard::{Link, Readings, Report};
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_sim::flight::World;
-use afbc_types::{OutOfRange, ROTORS_MAX};
+use afbc_types::OutOfRange;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -47,7 +47,7 @@ pub struct ServedVehicle {
     wired: bool,
     mode: Mode,
     /// Report of the last tick.
-    report: Option<Report<ROTORS_MAX>>,
+    report: Option<Report>,
     /// The law that flies.
     law: ControllerKind,
     reported: ReportedSensors,
@@ -307,7 +307,7 @@ impl ServedVehicle {
     }
 
     /// Returns the report of the last tick; `None` before the first.
-    pub fn report(&self) -> Option<&Report<ROTORS_MAX>> {
+    pub fn report(&self) -> Option<&Report> {
         self.report.as_ref()
     }
 

@@ -54,6 +54,75 @@ impl Rotor<f64> {
     }
 }
 
+/// Rotors of a vehicle with any accepted number of them, in the order of the motor outputs.
+// By coordinate: eight `Rotor`s with their count would take 32 bytes more in each copy of a configuration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rotors {
+    x: [f32; ROTORS_MAX],
+    y: [f32; ROTORS_MAX],
+    /// A bit for each rotor, the first rotor's lowest.
+    pushes_left: u8,
+    count: u8,
+}
+
+impl Rotors {
+    /// Takes these rotors.
+    #[must_use]
+    #[expect(clippy::indexing_slicing, reason = "within both lengths, as the compiler checks")]
+    pub const fn new<const N: usize>(rotors: &[Rotor; N]) -> Self {
+        const { assert!(N <= ROTORS_MAX, "more rotors than a vehicle may have") };
+        let mut all = Rotors { x: [0.0; ROTORS_MAX], y: [0.0; ROTORS_MAX], pushes_left: 0, count: N as u8 };
+        let mut index = 0;
+        while index < N {
+            let Rotor { x, y, pushes_left } = rotors[index];
+            (all.x[index], all.y[index]) = (x, y);
+            all.pushes_left |= (pushes_left as u8) << index;
+            index += 1;
+        }
+        all
+    }
+
+    /// Returns the number of rotors.
+    #[must_use]
+    pub const fn count(&self) -> usize {
+        self.count as usize
+    }
+
+    /// Returns each rotor in turn.
+    pub fn iter(&self) -> impl Iterator<Item = Rotor> + use<> {
+        let Rotors { x, y, pushes_left, count } = *self;
+        let all = x.into_iter().zip(y).zip(0..u32::from(count));
+        all.map(move |((x, y), index)| Rotor { x, y, pushes_left: pushes_left.wrapping_shr(index) & 1 == 1 })
+    }
+
+    /// Returns the rotors of a vehicle that has `N`.
+    ///
+    /// # Errors
+    /// If there are not `N` rotors.
+    pub fn array<const N: usize>(&self) -> Result<[Rotor; N], OutOfRange> {
+        taken(self.count(), self.iter())
+    }
+}
+
+impl TryFrom<&[Rotor<f64>]> for Rotors {
+    type Error = OutOfRange;
+
+    /// Rounds the rotors to single precision, for a controller. Fails if a vehicle may not have that many.
+    fn try_from(rotors: &[Rotor<f64>]) -> Result<Self, OutOfRange> {
+        ROTORS.check(rotors.len() as f64)?;
+        crate::with_rotors!(rotors.len(), N => Ok(Rotors::new::<N>(&taken(N, rotors.iter().map(Rotor::to_f32))?)))
+    }
+}
+
+/// Returns `count` rotors, if that is `N`.
+fn taken<const N: usize>(count: usize, mut rotors: impl Iterator<Item = Rotor>) -> Result<[Rotor; N], OutOfRange> {
+    Range { min: N as f64, max: N as f64, ..ROTORS }.check(count as f64)?;
+    Ok([(); N].map(|()| rotors.next().unwrap_or(NO_ROTOR)))
+}
+
+/// A rotor at the centre of mass, in place of one that is missing.
+const NO_ROTOR: Rotor = Rotor { x: 0.0, y: 0.0, pushes_left: false };
+
 /// A vehicle as controllers know it: nominal parameters and the positions of its `N` rotors.
 ///
 /// [`Parameters`] alone convert to a vehicle with the paper's frame.
@@ -77,10 +146,8 @@ impl<const N: usize> Airframe<N> {
     /// # Errors
     /// If there are not `N` rotors.
     pub fn new(parameters: &Parameters<f64>, rotors: &[Rotor<f64>]) -> Result<Self, OutOfRange> {
-        let exactly = Range { min: N as f64, max: N as f64, ..ROTORS };
-        let rotors: &[Rotor<f64>; N] =
-            rotors.try_into().map_err(|_| OutOfRange { value: rotors.len() as f64, range: exactly })?;
-        Ok(Airframe { parameters: parameters.to_f32(), rotors: rotors.map(|rotor| rotor.to_f32()) })
+        let rotors = taken(rotors.len(), rotors.iter().map(Rotor::to_f32))?;
+        Ok(Airframe { parameters: parameters.to_f32(), rotors })
     }
 }
 

@@ -46,7 +46,7 @@ pub use axes::{Axis, PerAxis};
 pub use declared::{Choice, Declaration, Declared, Field, Name, Number, Value, ValueMut, Visit, VisitMut};
 #[doc(hidden)]
 pub use declared::{numbers, show_in_group};
-pub use frame::{Airframe, PLUS, ROTOR_POSITION, ROTORS, ROTORS_MAX, Rotor};
+pub use frame::{Airframe, PLUS, ROTOR_POSITION, ROTORS, ROTORS_MAX, Rotor, Rotors};
 pub use motion::{ResetDelta, Setpoint, State};
 pub use mounting::Mounting;
 pub use nalgebra;

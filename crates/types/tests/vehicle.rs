@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
 use afbc_types::{
-    Airframe, Axis, Inputs, Mounting, PLUS, Parameters, PerAxis, ROTORS_MAX, Rotor, RotorForces, RotorSpeeds,
+    Airframe, Axis, Inputs, Mounting, PLUS, Parameters, PerAxis, ROTORS_MAX, Rotor, RotorForces, RotorSpeeds, Rotors,
 };
 use nalgebra::{Rotation3, Vector3};
 use proptest::prelude::*;
@@ -101,6 +101,22 @@ proptest! {
                 prop_assert!(rotors.len() != 6);
                 let (is, must) = (error.value, [error.range.min, error.range.max]);
                 prop_assert_eq!((is, must), (rotors.len() as f64, [6.0; 2]));
+            }
+        }
+    }
+
+    /// The rotors of a vehicle that has any number of them are its airframe's, bit by bit.
+    #[test]
+    fn any_number_of_rotors_is_kept(rotors in prop::collection::vec(rotor(), 0..10)) {
+        let all = Rotors::try_from(rotors.as_slice());
+        prop_assert_eq!(all.is_ok(), (4..=ROTORS_MAX).contains(&rotors.len()));
+        if let Ok(all) = all {
+            prop_assert_eq!(all.count(), rotors.len());
+            prop_assert_eq!(all.iter().collect::<Vec<_>>(), rotors.iter().map(Rotor::to_f32).collect::<Vec<_>>());
+            let six = all.array::<6>();
+            prop_assert_eq!(six.is_ok(), rotors.len() == 6);
+            if let Ok(six) = six {
+                prop_assert_eq!((six.to_vec(), Rotors::new(&six)), (all.iter().collect::<Vec<_>>(), all));
             }
         }
     }

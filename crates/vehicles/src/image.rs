@@ -2,7 +2,7 @@
 
 use crate::vehicle::Vehicle;
 use afbc_onboard::Configuration;
-use afbc_types::{Airframe, with_rotors};
+use afbc_types::Rotor;
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -11,23 +11,26 @@ impl Vehicle {
     /// [configuration](Self::configuration). The link keeps its defaults, since it belongs to the board.
     pub fn image(&self) -> String {
         let (name, count) = (&self.name, self.rotors.len());
+        let frame: Vec<_> = self.rotors.iter().map(Rotor::to_f32).collect();
         let mut text = format!(
             "/// Name of the vehicle.\npub const NAME: &str = {name:?};\n\
              /// Number of its rotors.\npub const ROTORS: usize = {count};\n\
+             /// Its rotors.\nconst FRAME: [Rotor; ROTORS] = {frame:?};\n\
              /// What its file says.\npub const CONFIGURATION: Configuration = {{\n    let mut it = PLAIN;\n"
         );
-        each_value("it", &with_rotors!(count, N => self.values::<N>()), &mut text);
+        each_value("it", &self.values(), &mut text);
         text + "    it\n};\n"
     }
 
     /// Returns the values of the configuration as a JSON object, by field.
-    fn values<const N: usize>(&self) -> Value {
-        // Cannot fail: `with_rotors!` passes the vehicle's own number of rotors.
-        let Ok(configuration) = self.configuration::<N>() else { return Value::Null };
+    fn values(&self) -> Value {
+        // Cannot fail: the file's reader has checked the number of rotors.
+        let Ok(configuration) = self.configuration() else { return Value::Null };
         // Left out: sensor calibration and motor controllers, which belong to an individual vehicle, and link and
         // radio, which belong to the board.
         let Configuration {
-            airframe,
+            parameters,
+            rotors: _,
             settings,
             gains,
             curve,
@@ -42,10 +45,8 @@ impl Vehicle {
             radio: _,
             link: _,
         } = configuration;
-        let Airframe { parameters, rotors } = airframe;
         json!({
-            "airframe": { "parameters": parameters, "rotors": rotors.as_slice() },
-            "settings": settings, "gains": gains, "curve": curve, "response": response, "imu": imu,
+            "parameters": parameters, "settings": settings, "gains": gains, "curve": curve, "response": response, "imu": imu,
             "estimation": estimation, "arming": arming, "guidance": guidance,
         })
     }

@@ -124,10 +124,11 @@ impl Vehicle {
     /// station's parameter file use it.
     ///
     /// # Errors
-    /// If it does not have `N` rotors.
-    pub fn configuration<const N: usize>(&self) -> Result<Configuration<N>, OutOfRange> {
+    /// If it does not have four to eight rotors, which its file would not be read with.
+    pub fn configuration(&self) -> Result<Configuration, OutOfRange> {
         Ok(Configuration {
-            airframe: Airframe::new(&self.parameters, &self.rotors)?,
+            parameters: self.parameters.to_f32(),
+            rotors: self.rotors.as_slice().try_into()?,
             settings: self.settings(Profile::Flight),
             gains: self.gains(Profile::Flight),
             curve: self.curve,

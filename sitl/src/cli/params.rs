@@ -8,7 +8,6 @@ use afbc_files::{Flash, Output};
 use afbc_onboard::parameters::{Kept, Parameter, ParameterTable, RecordChange};
 use afbc_scenario::vehicle_named;
 use afbc_store::{Error, RecordName, Store, hash};
-use afbc_types::with_rotors;
 use afbc_vehicles::Vehicle;
 use clap::{Args, Subcommand, ValueEnum};
 use std::fs;
@@ -78,13 +77,13 @@ impl Params {
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let (Action::Export { of, .. } | Action::Import { of, .. } | Action::Diff { of, .. }) = &self.action;
         let vehicle = vehicle_named(&of.vehicle)?;
-        with_rotors!(vehicle.rotors.len(), N => act::<N>(&self.action, &vehicle))?;
+        act(&self.action, &vehicle)?;
         Ok(ExitCode::SUCCESS)
     }
 }
 
-fn act<const N: usize>(action: &Action, vehicle: &Vehicle) -> Result<(), Failure> {
-    let mut table = ParameterTable::<N>::new(vehicle.configuration()?);
+fn act(action: &Action, vehicle: &Vehicle) -> Result<(), Failure> {
+    let mut table = ParameterTable::new(vehicle.configuration()?);
     match action {
         Action::Export { of, out, force, format } => {
             if let Some(path) = &of.store {
@@ -133,7 +132,7 @@ fn act<const N: usize>(action: &Action, vehicle: &Vehicle) -> Result<(), Failure
 }
 
 /// Stores the current value of a parameter.
-fn keep<const N: usize>(table: &ParameterTable<N>, store: &mut Store<Flash>, name: RecordName) -> Result<(), Unkept> {
+fn keep(table: &ParameterTable, store: &mut Store<Flash>, name: RecordName) -> Result<(), Unkept> {
     let (Some(now), Some(image)) = (table.get(name), table.default_of(name)) else { return Ok(()) };
     let change = RecordChange::Set(name, (now.value.to_bits() != image.value.to_bits()).then_some(now.value));
     match Kept::NOW.keep(store, change) {
@@ -158,13 +157,13 @@ fn open(path: &Path, vehicle: &Vehicle, flash: fn(&Path) -> std::io::Result<Flas
 }
 
 /// Sets `table` to the stored values; prints a notice about values that are not used.
-fn load<const N: usize>(table: &mut ParameterTable<N>, store: &mut Store<Flash>, path: &Path) -> Result<(), Failure> {
+fn load(table: &mut ParameterTable, store: &mut Store<Flash>, path: &Path) -> Result<(), Failure> {
     let notice = |notice| say(&format!("{}: {notice}", path.display()));
     Ok(Kept::NOW.load(table, store, notice).map_err(|error| failed(path, &error))?)
 }
 
 /// Sets `table` to the values in a file; returns their names.
-fn take<const N: usize>(table: &mut ParameterTable<N>, file: &Path) -> Result<Vec<RecordName>, Failure> {
+fn take(table: &mut ParameterTable, file: &Path) -> Result<Vec<RecordName>, Failure> {
     let shown = file.display().to_string();
     let text = fs::read_to_string(file).map_err(|error| format!("{shown}: cannot be read ({error})"))?;
     let source = Source { file: &shown, text: &text };
@@ -182,7 +181,7 @@ fn take<const N: usize>(table: &mut ParameterTable<N>, file: &Path) -> Result<Ve
 }
 
 /// Returns the parameters that differ from their defaults, with the defaults.
-fn differing<const N: usize>(table: &ParameterTable<N>) -> Vec<(Parameter, f32)> {
+fn differing(table: &ParameterTable) -> Vec<(Parameter, f32)> {
     let image = |parameter: &Parameter| table.default_of(parameter.name).map_or(f32::NAN, |image| image.value);
     let both = table.iter().map(|parameter| (parameter, image(&parameter)));
     both.filter(|(now, image)| now.value.to_bits() != image.to_bits()).collect()

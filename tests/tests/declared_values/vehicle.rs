@@ -11,7 +11,7 @@ use afbc_mavlink::{Decoder, Downlink, FRAME_MAX, ParameterRequest, Sender, Uplin
 use afbc_onboard::parameters::ParameterTable;
 use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_scenario::{Scenario, built_in};
-use afbc_types::{Axis, with_rotors};
+use afbc_types::Axis;
 use afbc_vehicles::Vehicle;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, OnceLock};
@@ -304,9 +304,8 @@ fn every_parameter_of_a_station_is_in_the_file() {
             Some(case.declaration?.name(prefix, case.coordinate).to_string())
         })
         .collect();
-    let seen: BTreeSet<String> = with_rotors!(base.rotors.len(), N => {
-        ParameterTable::<N>::new(base.configuration().unwrap()).iter().map(|it| it.name.to_string()).collect()
-    });
+    let seen: BTreeSet<String> =
+        ParameterTable::new(base.configuration().unwrap()).iter().map(|it| it.name.to_string()).collect();
     let groups = ["CAL_", "COM_FLTMODE", "COM_RC_", "RC"];
     let mut missing: Vec<&str> = seen
         .difference(&in_file)

@@ -41,12 +41,7 @@ impl Dispatcher {
     }
 
     /// Advances the calibration that a station has asked for.
-    pub(crate) fn calibrate<const N: usize>(
-        &mut self,
-        calibrator: &mut Calibrator,
-        sample: Option<RawSample>,
-        table: &ParameterTable<N>,
-    ) {
+    pub(crate) fn calibrate(&mut self, calibrator: &mut Calibrator, sample: Option<RawSample>, table: &ParameterTable) {
         let Some(what) = self.calibration.active else { return calibrator.stop() };
         if self.status.mode.armed() {
             return self.end_calibration(calibrator, Err("armed"));

@@ -31,7 +31,7 @@ impl Dispatcher {
     }
 
     /// Handles queued parameter requests until one changes `table`. Returns that change.
-    pub(crate) fn grant<const N: usize>(&mut self, table: &mut ParameterTable<N>) -> Option<RecordChange> {
+    pub(crate) fn grant(&mut self, table: &mut ParameterTable) -> Option<RecordChange> {
         let disarmed = !self.status.mode.armed();
         while let Some(wish) = self.wishes.pop_front() {
             let (change, refused) = match wish {

@@ -75,7 +75,7 @@ impl Calibrator {
     }
 
     /// Begins a calibration.
-    fn begin<const N: usize>(&mut self, what: CalibrationRequest, configuration: &Configuration<N>, now_us: u64) {
+    fn begin(&mut self, what: CalibrationRequest, configuration: &Configuration, now_us: u64) {
         self.stop();
         self.heard_us = now_us;
         let Configuration { imu, calibration, estimation, .. } = configuration;
@@ -93,11 +93,11 @@ impl Calibrator {
     }
 
     /// Advances calibration `what`, numbered `number`, with the sensors' next sample, if there is one.
-    pub(crate) fn step<const N: usize>(
+    pub(crate) fn step(
         &mut self,
         (number, what): (u8, CalibrationRequest),
         sample: Option<RawSample>,
-        (configuration, now_us): (&Configuration<N>, u64),
+        (configuration, now_us): (&Configuration, u64),
         say: impl FnMut(&Words),
     ) -> Step {
         if number != self.number {

@@ -97,13 +97,12 @@ pub struct RadioStatus {
 
 impl VehicleStatus {
     /// Updates everything but the state from a tick's report.
-    pub(crate) fn update<const N: usize>(&mut self, report: &Report<N>, tick_us: f32) {
+    pub(crate) fn update(&mut self, report: &Report, tick_us: f32) {
         self.time_us = report.time_us;
         (self.mode, self.guided, self.health) = (report.mode, report.guided, report.health);
         self.against = Some(report.against);
         self.senses = report.estimate.is_some();
-        self.throttles.iter_mut().zip(report.throttles).for_each(|(to, from)| *to = from);
-        (self.rotors, self.tick_us) = (N as u8, tick_us);
+        (self.throttles, self.rotors, self.tick_us) = (report.throttles, report.rotors, tick_us);
     }
 
     /// Returns the time since power-up \[ms\].

@@ -43,7 +43,7 @@ pub(crate) struct Flier {
     pub(crate) every_ms: u64,
     pub(crate) ms: u64,
     pub(crate) random: Xoshiro256PlusPlus,
-    pub(crate) report: Option<Report<ROTORS_MAX>>,
+    pub(crate) report: Option<Report>,
     pub(crate) sender: Sender,
     pub(crate) texts: Vec<u8>,
 }

@@ -34,13 +34,13 @@ struct Waiting {
 
 impl RecordQueue {
     /// Records the start ([`Recorder::start`]).
-    pub fn start<const N: usize>(&mut self, names: [&str; 2], table: &ParameterTable<N>) {
+    pub fn start(&mut self, names: [&str; 2], table: &ParameterTable) {
         let RecordQueue { recorder, waiting, .. } = self;
         recorder.start(names, table, &mut |frame| waiting.append(frame));
     }
 
     /// Records a change of the parameter table ([`Recorder::change`]). Returns the number of the new configuration.
-    pub fn change<const N: usize>(&mut self, table: &ParameterTable<N>, change: RecordChange) -> u16 {
+    pub fn change(&mut self, table: &ParameterTable, change: RecordChange) -> u16 {
         let RecordQueue { recorder, waiting, .. } = self;
         recorder.change(table, change, &mut |frame| waiting.append(frame))
     }
@@ -52,7 +52,7 @@ impl RecordQueue {
     }
 
     /// Records a tick, or drops it if one of the frames before it was dropped.
-    pub fn tick<const N: usize>(&mut self, tick: &TickRecord<'_, N>) {
+    pub fn tick(&mut self, tick: &TickRecord<'_>) {
         let RecordQueue { recorder, waiting, .. } = self;
         if !core::mem::take(&mut waiting.lacks) {
             recorder.tick(&tick.details.inputs, tick.report, &mut |frame| waiting.append(frame));

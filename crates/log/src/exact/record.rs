@@ -67,17 +67,18 @@ pub struct StartRecord {
 
 impl StartRecord {
     /// Returns the start record of a vehicle with these names and parameters.
-    pub fn of<const N: usize>(vehicle: &str, law: &str, table: &ParameterTable<N>) -> Self {
+    pub fn of(vehicle: &str, law: &str, table: &ParameterTable) -> Self {
         let mut digest = CRC.digest();
         table.iter().for_each(|parameter| digest.update(&parameter.value.to_le_bytes()));
-        for rotor in &table.configuration().airframe.rotors {
+        let rotors = &table.configuration().rotors;
+        for rotor in rotors.iter() {
             digest.update(&rotor.x.to_le_bytes());
             digest.update(&rotor.y.to_le_bytes());
             digest.update(&[u8::from(rotor.pushes_left)]);
         }
         StartRecord {
             version: VERSION,
-            rotors: u8::try_from(N).unwrap_or(u8::MAX),
+            rotors: rotors.count() as u8,
             parameters: table.count(),
             digest: digest.finalize(),
             vehicle: word(vehicle),
@@ -108,15 +109,13 @@ pub struct Given {
 
 impl Given {
     /// Returns the outputs that a report contains.
-    pub fn of<const N: usize>(report: &Report<N>) -> Self {
-        let mut throttles = [0; ROTORS_MAX];
-        throttles.iter_mut().zip(report.throttles).for_each(|(to, from)| *to = from);
+    pub fn of(report: &Report) -> Self {
         let state = report.estimate.as_ref();
         let vectors =
             state.map(|state| [&state.position_m, &state.velocity_m_s, &state.attitude_rad, &state.rates_rad_s]);
         let estimate = half_crc(vectors.into_iter().flatten().flatten());
-        let speeds = half_crc(report.motors.padded().0.iter());
-        Given { throttles, mode: report.mode as u8, estimate, speeds }
+        let speeds = half_crc(report.motors.0.iter());
+        Given { throttles: report.throttles, mode: report.mode as u8, estimate, speeds }
     }
 }
 

@@ -21,12 +21,7 @@ impl Default for Recorder {
 impl Recorder {
     /// Records the start of a processor that flies this vehicle and law, and all parameters that differ from the
     /// firmware image. Calls `send` with each frame.
-    pub fn start<const N: usize>(
-        &mut self,
-        [vehicle, law]: [&str; 2],
-        table: &ParameterTable<N>,
-        send: &mut dyn FnMut(&[u8]),
-    ) {
+    pub fn start(&mut self, [vehicle, law]: [&str; 2], table: &ParameterTable, send: &mut dyn FnMut(&[u8])) {
         self.configuration = 0;
         self.frame(&Record::Start(StartRecord::of(vehicle, law, table)), send);
         for parameter in table.iter() {
@@ -39,12 +34,7 @@ impl Recorder {
     }
 
     /// Records a change of the parameter table. Returns the number of the new configuration.
-    pub fn change<const N: usize>(
-        &mut self,
-        table: &ParameterTable<N>,
-        change: RecordChange,
-        send: &mut dyn FnMut(&[u8]),
-    ) -> u16 {
+    pub fn change(&mut self, table: &ParameterTable, change: RecordChange, send: &mut dyn FnMut(&[u8])) -> u16 {
         self.configuration = self.configuration.wrapping_add(1);
         let configuration = self.configuration;
         match change {
@@ -69,7 +59,7 @@ impl Recorder {
     }
 
     /// Records a tick with its inputs and outputs.
-    pub fn tick<const N: usize>(&mut self, took: &TickInputs, gave: &Report<N>, send: &mut dyn FnMut(&[u8])) {
+    pub fn tick(&mut self, took: &TickInputs, gave: &Report, send: &mut dyn FnMut(&[u8])) {
         self.frame(&Record::Tick(*took, Given::of(gave)), send);
     }
 

@@ -4,7 +4,7 @@ use crate::exact::record::{Given, Record, StartRecord};
 use afbc_control::Trace;
 use afbc_estimator::VelocityNotch;
 use afbc_onboard::parameters::{ParameterTable, Reason};
-use afbc_onboard::{Configuration, ControlInputs, Flight, Prepare, Report, TickInputs};
+use afbc_onboard::{AnyFlight, Configuration, ControlInputs, Prepare, Report, TickInputs};
 use afbc_store::RecordName;
 use afbc_types::OutOfRange;
 use heapless::{Deque, Vec};
@@ -15,20 +15,19 @@ const WAITING: usize = 16;
 const CHANGES_MAX: usize = 64;
 
 /// Flies the ticks of a log again, under the firmware's law or the law of `P`.
-#[derive(Debug)]
-pub struct Replayer<const N: usize, P: Prepare<N> = ()> {
+pub struct Replayer<P: Prepare = ()> {
     prepare: P,
-    image: Configuration<N>,
-    table: ParameterTable<N>,
+    image: Configuration,
+    table: ParameterTable,
     /// Parameters that the caller changed from the log's values.
     changes: Vec<(RecordName, f32), CHANGES_MAX>,
     /// Start record whose parameters are still being read.
     start: Option<StartRecord>,
-    flight: Flight<N, P::Law>,
+    flight: AnyFlight<P>,
     inputs: ControlInputs,
     taken: ControlInputs,
     /// Configurations by number that are recorded but not flown yet.
-    waiting: Deque<(u16, Configuration<N>), WAITING>,
+    waiting: Deque<(u16, Configuration), WAITING>,
     /// Inputs with the number of the tick that took them.
     coming: Deque<(u32, ControlInputs), WAITING>,
     /// True from a valid start record to the first gap. `next` is the number of the next tick.
@@ -39,13 +38,13 @@ pub struct Replayer<const N: usize, P: Prepare<N> = ()> {
 /// Result of replaying one record.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "one at a time")]
-pub enum ReplayStep<const N: usize> {
+pub enum ReplayStep {
     /// The record is no tick, or a tick that cannot be flown because no valid start or a gap precedes it.
     Nothing,
     /// The tick has the same outputs as in the log.
-    Same(Report<N>),
+    Same(Report),
     /// The outputs differ from the log's, or the tick cannot be flown.
-    Differs(ReplayDifference, Option<Report<N>>),
+    Differs(ReplayDifference, Option<Report>),
 }
 
 /// The way in which a replay differs from the log.
@@ -72,24 +71,24 @@ pub enum ReplayDifference {
     },
 }
 
-impl<const N: usize> Replayer<N> {
+impl Replayer {
     /// Creates a replayer for the firmware's law. A log records its parameters as differences from the image's
     /// configuration.
     ///
     /// # Errors
     /// The first parameter out of range.
-    pub fn new(image: Configuration<N>) -> Result<Self, OutOfRange> {
+    pub fn new(image: Configuration) -> Result<Self, OutOfRange> {
         Self::under((), image)
     }
 }
 
-impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
+impl<P: Prepare> Replayer<P> {
     /// Creates a replayer for the law of `prepare`.
     ///
     /// # Errors
     /// The first parameter out of range.
-    pub fn under(prepare: P, image: Configuration<N>) -> Result<Self, OutOfRange> {
-        let flight = Flight::of(prepare.prepare(&image)?);
+    pub fn under(prepare: P, image: Configuration) -> Result<Self, OutOfRange> {
+        let flight = AnyFlight::new(&prepare, &image)?;
         Ok(Replayer {
             table: ParameterTable::new(image.clone()),
             prepare,
@@ -121,12 +120,12 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
     }
 
     /// Returns the log's parameters, without the caller's changes.
-    pub fn parameters(&self) -> &ParameterTable<N> {
+    pub fn parameters(&self) -> &ParameterTable {
         &self.table
     }
 
     /// Returns the configuration with the caller's changes.
-    fn configuration(&self) -> Configuration<N> {
+    fn configuration(&self) -> Configuration {
         if self.changes.is_empty() {
             return self.table.configuration().clone();
         }
@@ -139,7 +138,7 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
     }
 
     /// Takes the next record of the log. If the record is a tick, flies the tick again.
-    pub fn take(&mut self, record: &Record) -> ReplayStep<N> {
+    pub fn take(&mut self, record: &Record) -> ReplayStep {
         match record {
             Record::Start(start) => match self.start(start) {
                 Ok(()) => ReplayStep::Nothing,
@@ -167,7 +166,7 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
 
     fn start(&mut self, start: &StartRecord) -> Result<(), ReplayDifference> {
         self.table = ParameterTable::new(self.image.clone());
-        let is_mine = usize::from(start.rotors) == N && start.parameters == self.table.count();
+        let is_mine = usize::from(start.rotors) == self.image.rotors.count() && start.parameters == self.table.count();
         (self.inputs, self.taken) = (ControlInputs::EMPTY, ControlInputs::EMPTY);
         self.waiting.clear();
         self.coming.clear();
@@ -177,7 +176,7 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
     }
 
     /// Stores a configuration until a tick flies it. The start's configuration is flown by the first tick in any case.
-    fn configured(&mut self, number: u16, known: bool) -> ReplayStep<N> {
+    fn configured(&mut self, number: u16, known: bool) -> ReplayStep {
         if self.waiting.is_full() {
             self.waiting.pop_front();
         }
@@ -185,7 +184,7 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
         if known { ReplayStep::Nothing } else { ReplayStep::Differs(ReplayDifference::Parameter, None) }
     }
 
-    fn tick(&mut self, tick: &TickInputs, then: Given) -> ReplayStep<N> {
+    fn tick(&mut self, tick: &TickInputs, then: Given) -> ReplayStep {
         if !self.began {
             return ReplayStep::Nothing;
         }
@@ -200,8 +199,8 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
                 self.began = false;
                 return ReplayStep::Differs(ReplayDifference::Parameters(start), None);
             }
-            match self.prepare.prepare(&self.configuration()) {
-                Ok(prepared) => self.flight = Flight::of(prepared),
+            match AnyFlight::new(&self.prepare, &self.configuration()) {
+                Ok(flight) => self.flight = flight,
                 Err(_) => {
                     self.began = false;
                     return ReplayStep::Differs(ReplayDifference::Parameter, None);
@@ -242,10 +241,10 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
     fn adopt(&mut self, number: u16) -> bool {
         while let Some((waiting, configuration)) = self.waiting.pop_front() {
             if waiting == number {
-                let prepared = self.prepare.prepare(&configuration);
+                let adopted = self.flight.adopt(&self.prepare, &configuration);
                 // With the caller's changes the vehicle may be armed where it was disarmed in flight, so `adopt` may
                 // refuse.
-                return prepared.is_ok_and(|prepared| self.flight.adopt(&prepared) || !self.changes.is_empty());
+                return adopted.is_ok_and(|adopted| adopted || !self.changes.is_empty());
             }
         }
         false

@@ -70,10 +70,10 @@ impl LogWriter {
 
     /// Writes a tick into the log. Begins a log, described by `start`, if the storage is ready and there is none. A gap
     /// of more than one and a half `period_us` since the last tick is logged as a dropout.
-    pub fn tick<const M: usize, const N: usize>(
+    pub fn tick(
         &mut self,
-        (tick, beside): (&TickRecord<'_, M>, &BesideTick<'_>),
-        table: &ParameterTable<N>,
+        (tick, beside): (&TickRecord<'_>, &BesideTick<'_>),
+        table: &ParameterTable,
         start: &LogStart<'_>,
         storage: StorageState,
         period_us: u64,
@@ -98,7 +98,7 @@ impl LogWriter {
     }
 
     /// Writes a parameter change. Call it after the table has changed.
-    pub fn change<const N: usize>(&mut self, table: &ParameterTable<N>, change: RecordChange) {
+    pub fn change(&mut self, table: &ParameterTable, change: RecordChange) {
         if let Some(log) = &mut self.log {
             log.change(table, change, &mut self.ring);
         }

@@ -16,7 +16,7 @@ use afbc_estimator::Measurement;
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{Aged, TickRecord, tracker_aid};
 use afbc_store::RecordName;
-use afbc_types::{PerAxis, ROTORS_MAX, Stamped};
+use afbc_types::{PerAxis, Stamped};
 
 /// Bytes from which a reader resumes in a damaged log, and the time between two such marks \[us\].
 const SYNC: [u8; 8] = [0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
@@ -73,7 +73,7 @@ struct Last {
 
 impl BlackBox {
     /// Creates a log with nothing written yet, for a vehicle with these parameters.
-    pub fn new<const N: usize>(start: &LogStart<'_>, table: &ParameterTable<N>) -> Self {
+    pub fn new(start: &LogStart<'_>, table: &ParameterTable) -> Self {
         BlackBox {
             known: Known::of(table.configuration()),
             definitions: Definitions::new(start),
@@ -104,12 +104,7 @@ impl BlackBox {
     }
 
     /// Writes a parameter change. Call it after the table has changed.
-    pub fn change<const N: usize, const R: usize>(
-        &mut self,
-        table: &ParameterTable<N>,
-        change: RecordChange,
-        ring: &mut LogRing<R>,
-    ) {
+    pub fn change<const R: usize>(&mut self, table: &ParameterTable, change: RecordChange, ring: &mut LogRing<R>) {
         self.known = Known::of(table.configuration());
         self.unwritten = match (self.unwritten, change) {
             (Unwritten::None, RecordChange::Set(name, _)) => Unwritten::One(name),
@@ -148,11 +143,11 @@ impl BlackBox {
 
     /// Writes the rest of the log's beginning, if any, then the tick. The tick is left out until the beginning is
     /// complete.
-    pub fn tick<const M: usize, const N: usize, const R: usize>(
+    pub fn tick<const R: usize>(
         &mut self,
-        tick: &TickRecord<'_, M>,
+        tick: &TickRecord<'_>,
         beside: &BesideTick<'_>,
-        table: &ParameterTable<N>,
+        table: &ParameterTable,
         ring: &mut LogRing<R>,
     ) {
         let now_us = tick.report.time_us;
@@ -166,20 +161,13 @@ impl BlackBox {
                 self.synced_us = now_us;
             }
         }
-        let report = tick.report.padded();
-        self.topics(&TickRecord { report: &report, details: tick.details }, beside, writes, &mut ring);
+        self.topics(tick, beside, writes, &mut ring);
     }
 
-    /// Writes a tick's topics, or only updates the state carried between ticks. Not generic, so that it is compiled
-    /// once for all numbers of rotors.
+    /// Writes a tick's topics, or only updates the state carried between ticks. Not generic in the ring, so that it is
+    /// compiled once.
     #[inline(never)]
-    fn topics(
-        &mut self,
-        tick: &TickRecord<'_, ROTORS_MAX>,
-        beside: &BesideTick<'_>,
-        writes: bool,
-        ring: &mut RingView<'_>,
-    ) {
+    fn topics(&mut self, tick: &TickRecord<'_>, beside: &BesideTick<'_>, writes: bool, ring: &mut RingView<'_>) {
         let TickRecord { report, details } = *tick;
         let moment = Moment { report, details, beside: *beside, known: &self.known };
         let now_us = report.time_us;
@@ -191,7 +179,7 @@ impl BlackBox {
     }
 
     /// Writes changed parameters, as far as room and pace allow.
-    fn write_parameters<const N: usize>(&mut self, table: &ParameterTable<N>, ring: &mut RingView<'_>) {
+    fn write_parameters(&mut self, table: &ParameterTable, ring: &mut RingView<'_>) {
         for _ in 0..self.pace {
             let (found, next) = match self.unwritten {
                 Unwritten::None => return,

@@ -91,13 +91,7 @@ impl Definitions {
 
     /// Writes at most `pace` entries, as far as there is room. An entry that needs no record counts as well.
     #[inline(never)]
-    pub(crate) fn write<const N: usize>(
-        &mut self,
-        now_us: u64,
-        table: &ParameterTable<N>,
-        pace: u16,
-        ring: &mut RingView<'_>,
-    ) {
+    pub(crate) fn write(&mut self, now_us: u64, table: &ParameterTable, pace: u16, ring: &mut RingView<'_>) {
         let mut left = pace;
         while self.part != Part::Done && left > 0 {
             match self.one(now_us, table, ring) {
@@ -109,7 +103,7 @@ impl Definitions {
     }
 
     /// Writes the part's next entry. Returns none after the last entry, and false if there is no room.
-    fn one<const N: usize>(&self, now_us: u64, table: &ParameterTable<N>, ring: &mut RingView<'_>) -> Option<bool> {
+    fn one(&self, now_us: u64, table: &ParameterTable, ring: &mut RingView<'_>) -> Option<bool> {
         let index = usize::from(self.next);
         Some(match self.part {
             Part::Header => match index {

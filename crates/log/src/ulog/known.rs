@@ -22,14 +22,14 @@ pub(crate) struct Known {
 }
 
 impl Known {
-    pub(crate) fn of<const N: usize>(configuration: &Configuration<N>) -> Self {
-        let Configuration { airframe, settings, link, .. } = configuration;
+    pub(crate) fn of(configuration: &Configuration) -> Self {
+        let Configuration { parameters, rotors, settings, link, .. } = configuration;
         let force_max_n = settings.common.rotor_force_max_n;
         Known {
-            rotor_of_motor: rotors_of_outputs(ARDUPILOT, &airframe.rotors),
-            rotors: N,
-            share_per_speed_squared: airframe.parameters.thrust_factor_n_s2 / force_max_n,
-            thrust_max_n: force_max_n * N as f32,
+            rotor_of_motor: rotors_of_outputs(ARDUPILOT, rotors),
+            rotors: rotors.count(),
+            share_per_speed_squared: parameters.thrust_factor_n_s2 / force_max_n,
+            thrust_max_n: force_max_n * rotors.count() as f32,
             system: u8::try_from(link.system).unwrap_or(1),
         }
     }

@@ -170,9 +170,9 @@ mod tests {
     /// One more line in a topic adds one signal to its format and to its messages.
     #[test]
     fn a_signal_more_is_one_line_more() {
-        let configuration = Configuration::<4>::default();
-        let Ok(mut flight) = Flight::new(&configuration) else { unreachable!("of an image") };
-        let mut report = flight.tick(7, &mut ControlInputs::EMPTY.clone(), &Readings::NONE).padded();
+        let configuration = Configuration::default();
+        let Ok(mut flight) = Flight::<4>::new(&configuration) else { unreachable!("of an image") };
+        let mut report = flight.tick(7, &mut ControlInputs::EMPTY.clone(), &Readings::NONE);
         (report.saturated_ticks, report.guided.wanted) = (5, 0x0203);
         let (known, details) = (&Known::of(&configuration), &TickDetails::default());
         let moment = Moment { report: &report, details, beside: BesideTick::default(), known };

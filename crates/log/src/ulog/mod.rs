@@ -15,7 +15,7 @@
 //! use afbc_onboard::{Configuration, ControlInputs, Flight, TickInputs, TickRecord, parameters::ParameterTable};
 //!
 //! let configuration = Configuration::default();
-//! let (table, mut flight) = (ParameterTable::new(configuration.clone()), Flight::new(&configuration)?);
+//! let (table, mut flight) = (ParameterTable::new(configuration.clone()), Flight::<4>::new(&configuration)?);
 //! let mut ring = LogRing::<32_768>::new();
 //! let mut log = BlackBox::new(&LogStart::default(), &table);
 //! let (mut messages, inputs) = (ControlInputs::EMPTY, TickInputs { time_us: 1_000, ..TickInputs::default() });

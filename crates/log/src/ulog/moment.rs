@@ -3,7 +3,7 @@
 use crate::ulog::known::Known;
 use afbc_estimator::Origin;
 use afbc_onboard::{EscTelemetry, Report, TickDetails};
-use afbc_types::{ROTORS_MAX, State};
+use afbc_types::State;
 use nalgebra::Vector3;
 
 /// Data that is logged with a tick but unknown to the control task.
@@ -18,7 +18,7 @@ pub struct BesideTick<'a> {
 /// A tick of a vehicle with any number of rotors.
 #[derive(Clone, Copy)]
 pub(crate) struct Moment<'a> {
-    pub(crate) report: &'a Report<ROTORS_MAX>,
+    pub(crate) report: &'a Report,
     pub(crate) details: &'a TickDetails,
     pub(crate) beside: BesideTick<'a>,
     pub(crate) known: &'a Known,

@@ -4,7 +4,7 @@ use super::encoding::Kind;
 use super::reason::Reason;
 use crate::configuration::Configuration;
 use afbc_store::RecordName;
-use afbc_types::{Airframe, Declaration, Declared, Range, Value, ValueMut};
+use afbc_types::{Declaration, Declared, Range, Value, ValueMut};
 use core::convert::Infallible;
 
 /// A parameter: one number of a configuration.
@@ -46,7 +46,8 @@ struct Found;
 macro_rules! each_group {
     ($configuration:expr, |$prefix:pat_param, $group:ident| $show:expr) => {{
         let Configuration {
-            airframe,
+            parameters,
+            rotors: _,
             settings,
             gains,
             curve,
@@ -61,7 +62,6 @@ macro_rules! each_group {
             radio,
             link,
         } = $configuration;
-        let Airframe { parameters, rotors: _ } = airframe;
         each_group!(@ $prefix, $group, $show, ["V_" parameters, "MOT_" curve, "MOT_" response,
             "MOT_" outputs, "" escs, "IMU_" imu, "CAL_" calibration, "ARM_" arming, "EST_" estimation, "" guidance,
             "" radio, "" link, "C_" settings, "A_" gains]);
@@ -74,7 +74,7 @@ macro_rules! each_group {
     };
 }
 
-impl<const N: usize> Configuration<N> {
+impl Configuration {
     /// Walks over all parameters, in the order of the list and of the declarations. An index may change with the
     /// firmware image; a name does not.
     #[inline(never)]
@@ -143,7 +143,7 @@ impl<const N: usize> Configuration<N> {
     }
 }
 
-impl<const N: usize> Configuration<N> {
+impl Configuration {
     /// Shows the declaration of every parameter in the order of the list, with the words of a choice. A vector's
     /// declaration is shown three times. Used to describe parameters to stations; no firmware image needs it.
     pub(crate) fn show_declarations(&self, show: &mut dyn FnMut(&Declaration, &'static [&'static str])) {

@@ -44,9 +44,9 @@ impl Kept {
     ///
     /// # Errors
     /// A failure of the flash. Then all parameters have the image's values.
-    pub fn load<F: NorFlash, const N: usize>(
+    pub fn load<F: NorFlash>(
         &self,
-        table: &mut ParameterTable<N>,
+        table: &mut ParameterTable,
         store: &mut Store<F>,
         mut notice: impl FnMut(Reason),
     ) -> Result<(), Error<F::Error>> {
@@ -73,9 +73,9 @@ impl Kept {
     }
 
     /// Sets values one by one until no more can be set. Calls `notice` with a line for each of the rest.
-    fn load_singly<F: NorFlash, const N: usize>(
+    fn load_singly<F: NorFlash>(
         &self,
-        table: &mut ParameterTable<N>,
+        table: &mut ParameterTable,
         store: &mut Store<F>,
         mut notice: impl FnMut(Reason),
     ) -> Result<(), Error<F::Error>> {

@@ -5,27 +5,39 @@ use super::reason::Reason;
 use crate::configuration::Configuration;
 use crate::flight::Prepared;
 use afbc_store::RecordName;
-use afbc_types::{Declaration, OutOfRange};
+use afbc_types::{Declaration, OutOfRange, with_rotors};
 
 /// Parameters of a vehicle, with the firmware image's values and the present values.
 ///
 /// A value is an `f32`. An `f32` in the configuration keeps every bit of the value that was set. An `f64` gets exactly
 /// this value, and is read as the nearest `f32`. A switch is 0 or 1.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ParameterTable<const N: usize = 4> {
-    image: Configuration<N>,
-    now: Configuration<N>,
+#[derive(Clone, Debug)]
+pub struct ParameterTable {
+    image: Configuration,
+    now: Configuration,
     count: u16,
+    /// Prepares a flight, to find out whether the vehicle could fly.
+    prepare: fn(&Configuration) -> Result<(), OutOfRange>,
 }
 
-impl<const N: usize> ParameterTable<N> {
-    /// Creates a table with the image's values.
-    pub fn new(image: Configuration<N>) -> Self {
-        ParameterTable { count: image.parameters(), now: image.clone(), image }
+impl ParameterTable {
+    /// Creates a table with the image's values, for a vehicle with any number of rotors.
+    pub fn new(image: Configuration) -> Self {
+        Self::checked_by(check, image)
+    }
+
+    /// Creates a table with the image's values, for a vehicle with `N` rotors. A firmware image then needs the flight
+    /// for no other number.
+    pub fn with_rotors<const N: usize>(image: Configuration) -> Self {
+        Self::checked_by(check_rotors::<N>, image)
+    }
+
+    fn checked_by(prepare: fn(&Configuration) -> Result<(), OutOfRange>, image: Configuration) -> Self {
+        ParameterTable { count: image.parameters(), now: image.clone(), image, prepare }
     }
 
     /// Returns the configuration to fly. A [`Flight`](crate::Flight) accepts it if it accepts the image's.
-    pub fn configuration(&self) -> &Configuration<N> {
+    pub fn configuration(&self) -> &Configuration {
         &self.now
     }
 
@@ -73,7 +85,7 @@ impl<const N: usize> ParameterTable<N> {
     pub fn set(&mut self, name: RecordName, value: f32) -> Result<Parameter, Reason> {
         let mut candidate = self.now.clone();
         let parameter = candidate.put(name, value)?;
-        Prepared::new(&candidate).map_err(|error| Reason::together(name, &error))?;
+        self.could_fly(&candidate).map_err(|error| Reason::together(name, &error))?;
         self.now = candidate;
         Ok(parameter)
     }
@@ -92,11 +104,37 @@ impl<const N: usize> ParameterTable<N> {
     /// # Errors
     /// The errors of [`Prepared::new`].
     pub fn check(&self) -> Result<(), OutOfRange> {
-        Prepared::new(&self.now).map(drop)
+        self.could_fly(&self.now)
+    }
+
+    /// Checks that the vehicle could fly with `candidate`. Out of line, since the firmware's budgets follow this call
+    /// through a pointer by name.
+    #[inline(never)]
+    fn could_fly(&self, candidate: &Configuration) -> Result<(), OutOfRange> {
+        (self.prepare)(candidate)
     }
 
     /// Resets all parameters to the image's values.
     pub fn restore(&mut self) {
         self.now.clone_from(&self.image);
     }
+}
+
+impl PartialEq for ParameterTable {
+    /// Compares the values.
+    fn eq(&self, other: &Self) -> bool {
+        (&self.image, &self.now) == (&other.image, &other.now)
+    }
+}
+
+/// Checks that a vehicle with `N` rotors could fly. Out of line, since the firmware's budgets follow the call of it by
+/// name.
+#[inline(never)]
+fn check_rotors<const N: usize>(configuration: &Configuration) -> Result<(), OutOfRange> {
+    Prepared::<N>::new(configuration).map(drop)
+}
+
+/// Checks that a vehicle could fly.
+fn check(configuration: &Configuration) -> Result<(), OutOfRange> {
+    with_rotors!(configuration.rotors.count(), N => check_rotors::<N>(configuration))
 }

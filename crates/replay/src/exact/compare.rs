@@ -4,7 +4,6 @@ use super::change::SettingChange;
 use super::quantities::{QUANTITIES, ReplayQuantity, Values, values};
 use afbc_control::Trace;
 use afbc_onboard::Report;
-use afbc_types::ROTORS_MAX;
 use core::f64::consts::{PI, TAU};
 
 /// Ticks per row: rows have 100 Hz.
@@ -79,12 +78,7 @@ impl ChangeComparison {
     }
 
     /// Adds one tick of both flights.
-    pub(super) fn add(
-        &mut self,
-        time_s: f64,
-        flown: (&Report<ROTORS_MAX>, &Trace),
-        changed: (&Report<ROTORS_MAX>, &Trace),
-    ) {
+    pub(super) fn add(&mut self, time_s: f64, flown: (&Report, &Trace), changed: (&Report, &Trace)) {
         let row = ChangeRow { time_s, flown: values(flown.0, flown.1), changed: values(changed.0, changed.1) };
         if flown.0.mode != changed.0.mode {
             self.other_mode += 1;

@@ -1,56 +1,20 @@
-//! Runs the firmware's code for a vehicle with any number of rotors and under any law.
+//! Makes the replayers of a log: the flight as logged, and perhaps the same flight under changed settings.
 
 use super::change::SettingChange;
 use afbc::Profile;
-use afbc_control::Trace;
 use afbc_files::read::FileError;
 use afbc_files::read::words::out_of_range;
-use afbc_log::exact::{Record, ReplayStep, Replayer, StartRecord};
+use afbc_log::exact::{Replayer, StartRecord};
 use afbc_scenario::FlownLaw;
 use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_store::RecordName;
-use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
+use afbc_types::OutOfRange;
 use afbc_vehicles::Vehicle;
-
-/// Runs the ticks of a log.
-pub(super) trait Player {
-    /// Runs the next record.
-    fn take(&mut self, record: &Record) -> ReplayStep<ROTORS_MAX>;
-
-    /// Returns the law's internal signals at the last tick.
-    fn trace(&self) -> Trace;
-
-    /// Sets a parameter to another value for the whole flight.
-    fn change(&mut self, name: RecordName, value: f32) -> Result<(), String>;
-}
-
-impl<const N: usize> Player for Replayer<N, FlownLaw> {
-    fn take(&mut self, record: &Record) -> ReplayStep<ROTORS_MAX> {
-        match Replayer::take(self, record) {
-            ReplayStep::Nothing => ReplayStep::Nothing,
-            ReplayStep::Same(report) => ReplayStep::Same(report.padded()),
-            ReplayStep::Differs(difference, report) => {
-                ReplayStep::Differs(difference, report.map(|report| report.padded()))
-            }
-        }
-    }
-
-    fn trace(&self) -> Trace {
-        Replayer::trace(self)
-    }
-
-    fn change(&mut self, name: RecordName, value: f32) -> Result<(), String> {
-        if self.parameters().get(name).is_none() {
-            return Err(format!("--change {name}: no such parameter; `sitl params export` lists them"));
-        }
-        Replayer::change(self, name, value).map_err(|reason| format!("--change {reason}"))
-    }
-}
 
 /// The flight as logged, and the same flight under changed settings.
 pub(super) struct Players {
-    pub(super) flown: Box<dyn Player>,
-    pub(super) changed: Option<Box<dyn Player>>,
+    pub(super) flown: Box<Replayer<FlownLaw>>,
+    pub(super) changed: Option<Box<Replayer<FlownLaw>>>,
     pub(super) changes: Vec<SettingChange>,
 }
 
@@ -106,7 +70,7 @@ impl Players {
             let mut player = player(vehicle, law.next_back().unwrap_or(flown))?;
             for change in changes {
                 if let SettingChange::Parameter(name, value) = change {
-                    player.change(*name, *value).map_err(Refusal::Whole)?;
+                    set(&mut player, *name, *value).map_err(Refusal::Whole)?;
                 }
             }
             Some(player)
@@ -116,14 +80,20 @@ impl Players {
 }
 
 /// Makes the player for a vehicle under a law.
-fn player(vehicle: &Vehicle, kind: ControllerKind) -> Result<Box<dyn Player>, Refusal> {
+fn player(vehicle: &Vehicle, kind: ControllerKind) -> Result<Box<Replayer<FlownLaw>>, Refusal> {
     let refused = |error: OutOfRange| Refusal::Log(format!("the vehicle {}: {}", vehicle.name, out_of_range(&error)));
     let law = match kind {
         ControllerKind::Afbc => None,
         kind => Some(Law::on(kind, vehicle, Profile::Flight).map_err(Refusal::File)?),
     };
-    with_rotors!(vehicle.rotors.len(), N => {
-        let image = vehicle.configuration::<N>().map_err(refused)?;
-        Ok(Box::new(Replayer::<N, _>::under(FlownLaw(law), image).map_err(refused)?))
-    })
+    let image = vehicle.configuration().map_err(refused)?;
+    Ok(Box::new(Replayer::under(FlownLaw(law), image).map_err(refused)?))
+}
+
+/// Sets a parameter to another value for the whole flight.
+fn set(player: &mut Replayer<FlownLaw>, name: RecordName, value: f32) -> Result<(), String> {
+    if player.parameters().get(name).is_none() {
+        return Err(format!("--change {name}: no such parameter; `sitl params export` lists them"));
+    }
+    player.change(name, value).map_err(|reason| format!("--change {reason}"))
 }

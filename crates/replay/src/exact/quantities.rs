@@ -77,7 +77,7 @@ pub const QUANTITIES: [ReplayQuantity; COUNT] = [
 ];
 
 /// Returns the values of all quantities at a tick.
-pub(super) fn values(report: &Report<ROTORS_MAX>, trace: &Trace) -> Values {
+pub(super) fn values(report: &Report, trace: &Trace) -> Values {
     const NONE: [f32; 3] = [f32::NAN; 3];
     let (inputs, [roll, pitch]) = (&trace.inputs, trace.desired_rad);
     let setpoint = report.guided.setpoint;

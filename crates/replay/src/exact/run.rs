@@ -6,7 +6,6 @@ use super::outcome::{ExactReplay, FirstDifference, GivenSignal, LoggedParameter,
 use super::player::Players;
 use afbc_log::exact::{FrameError, Given, Record, ReplayDifference, ReplayStep, StartRecord, decode};
 use afbc_onboard::{Report, TickInputs};
-use afbc_types::ROTORS_MAX;
 
 /// Number of bytes between two calls of `progress`.
 const PROGRESS_BYTES: usize = 1 << 20;
@@ -176,7 +175,7 @@ impl Run {
         self.began_us.saturating_add(time_us.saturating_sub(first_us).try_into().unwrap_or(i64::MAX))
     }
 
-    fn compare(&mut self, tick: &TickInputs, flown: &Report<ROTORS_MAX>, other: &Report<ROTORS_MAX>) {
+    fn compare(&mut self, tick: &TickInputs, flown: &Report, other: &Report) {
         let time_s = self.now_us(tick.time_us) as f64 * 1e-6;
         let Players { flown: player, changed: Some(changed), .. } = &self.players else { return };
         let (trace, other_trace) = (player.trace(), changed.trace());

@@ -64,7 +64,7 @@ pub(super) fn recording(tables: &Tables) -> Result<Option<Recording>, String> {
 
 /// Returns the estimator's settings from the log's parameters.
 fn settings(tables: &Tables) -> Settings {
-    let mut table = ParameterTable::<4>::new(Configuration::default());
+    let mut table = ParameterTable::new(Configuration::default());
     for (name, value) in tables.parameters().filter(|(name, _)| name.starts_with(ESTIMATOR)) {
         // A parameter that this version does not have is ignored.
         let _ = RecordName::new(name).map(|name| table.put(name, value as f32));

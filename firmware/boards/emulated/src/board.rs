@@ -17,7 +17,6 @@ use firmware::board::{self, Board, BoardLink, Parts};
 use firmware::housekeeping;
 use firmware::samples::{self, NoSensors, SampleTime, SampleValue};
 use firmware::ticks::Tick;
-use firmware::vehicle::ROTORS;
 use semihosting::fs::File;
 use semihosting::io::{Read, Write};
 use semihosting::process::exit;
@@ -87,10 +86,8 @@ impl Board for Emulated {
     }
 
     /// Stores the throttles for the reply.
-    fn drive(&mut self, throttles: [u16; ROTORS]) {
-        let mut all = [0; ROTORS_MAX];
-        all.iter_mut().zip(throttles).for_each(|(to, from)| *to = from);
-        THROTTLES.lock(|cell| cell.set(all));
+    fn drive(&mut self, throttles: &[u16; ROTORS_MAX]) {
+        THROTTLES.lock(|cell| cell.set(*throttles));
     }
 
     /// There is no watchdog.

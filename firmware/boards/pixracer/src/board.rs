@@ -61,9 +61,9 @@ use embassy_stm32::spi::Spi;
 use embassy_stm32::usart::{self, BufferedUart};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma, exti, pac, rcc};
-use firmware::board::{Board, BoardLink, Parts};
+use firmware::board::{Board, BoardLink, Parts, ROTORS_MAX};
 use firmware::executors::{self, priority};
-use firmware::vehicle::{CONFIGURATION, ROTORS};
+use firmware::vehicle::CONFIGURATION;
 use static_cell::StaticCell;
 
 /// Frequency of the crystal \[Hz\].
@@ -244,7 +244,7 @@ impl Board for Pixracer {
 
         // While a debugger halts the core, the watchdog is halted too.
         pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));
-        let rotors = rotors_of_outputs(numbering::ARDUPILOT, &CONFIGURATION.airframe.rotors);
+        let rotors = rotors_of_outputs(numbering::ARDUPILOT, &CONFIGURATION.rotors);
         Parts {
             board: Pixracer { watchdog: watchdog(p.IWDG), rotors, _held: held },
             sampler,
@@ -272,8 +272,8 @@ impl Board for Pixracer {
         faults::task_has_failed()
     }
 
-    fn drive(&mut self, throttles: [u16; ROTORS]) {
-        let outputs = of_outputs(&self.rotors, &throttles);
+    fn drive(&mut self, throttles: &[u16; ROTORS_MAX]) {
+        let outputs = of_outputs(&self.rotors, throttles);
         let [main, auxiliary] = &THROTTLES;
         main.signal(of_channels(CHANNELS_OF_TIM1, &outputs));
         auxiliary.signal(of_channels(CHANNELS_OF_TIM4, &outputs));

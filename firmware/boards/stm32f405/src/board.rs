@@ -21,10 +21,9 @@ use embassy_stm32::peripherals::{DMA2_CH1, IWDG, TIM8, USART1, USB_OTG_FS};
 use embassy_stm32::usart::{self, BufferedUart};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma, pac};
-use firmware::board::{Board, BoardLink, Parts};
+use firmware::board::{Board, BoardLink, Parts, ROTORS_MAX};
 use firmware::executors::{self, priority};
 use firmware::samples::NoSensors;
-use firmware::vehicle::ROTORS;
 use static_cell::StaticCell;
 
 /// Frequency of the crystal \[Hz\].
@@ -110,10 +109,10 @@ impl Board for Stm32f405 {
         faults::task_has_failed()
     }
 
-    fn drive(&mut self, throttles: [u16; ROTORS]) {
+    fn drive(&mut self, throttles: &[u16; ROTORS_MAX]) {
         // Outputs without a motor stay at 0.
         let mut outputs = [0; CHANNELS];
-        outputs.iter_mut().zip(throttles).for_each(|(output, throttle)| *output = throttle);
+        outputs.iter_mut().zip(throttles).for_each(|(output, throttle)| *output = *throttle);
         THROTTLES.signal(outputs);
     }
 

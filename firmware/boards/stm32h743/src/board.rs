@@ -53,9 +53,8 @@ use embassy_stm32::spi::Spi;
 use embassy_stm32::usart::{self, BufferedUart};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma, exti, pac};
-use firmware::board::{Board, BoardLink, Parts};
+use firmware::board::{Board, BoardLink, Parts, ROTORS_MAX};
 use firmware::executors::{self, priority};
-use firmware::vehicle::ROTORS;
 use static_cell::StaticCell;
 
 /// Frequency of the crystal \[Hz\].
@@ -247,10 +246,10 @@ impl Board for Stm32h743 {
         faults::task_has_failed()
     }
 
-    fn drive(&mut self, throttles: [u16; ROTORS]) {
+    fn drive(&mut self, throttles: &[u16; ROTORS_MAX]) {
         // Outputs without a motor stay at 0.
         let mut outputs = [[0; CHANNELS]; 2];
-        outputs.as_flattened_mut().iter_mut().zip(throttles).for_each(|(output, throttle)| *output = throttle);
+        outputs.as_flattened_mut().iter_mut().zip(throttles).for_each(|(output, throttle)| *output = *throttle);
         THROTTLES.iter().zip(outputs).for_each(|(throttles, outputs)| throttles.signal(outputs));
     }
 

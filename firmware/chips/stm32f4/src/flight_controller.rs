@@ -246,7 +246,7 @@ macro_rules! flight_controller {
                 pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));
                 let rotors = chip_stm32::motors::rotors_of_outputs(
                     chip_stm32::motors::numbering::$numbering,
-                    &firmware::vehicle::CONFIGURATION.airframe.rotors,
+                    &firmware::vehicle::CONFIGURATION.rotors,
                 );
                 firmware::board::Parts {
                     board: FlightController { watchdog: chip_stm32::watchdog(p.IWDG), rotors },
@@ -293,8 +293,8 @@ macro_rules! flight_controller {
                 chip_stm32::faults::task_has_failed()
             }
 
-            fn drive(&mut self, throttles: [u16; firmware::vehicle::ROTORS]) {
-                let throttles = chip_stm32::motors::of_outputs(&self.rotors, &throttles);
+            fn drive(&mut self, throttles: &[u16; firmware::board::ROTORS_MAX]) {
+                let throttles = chip_stm32::motors::of_outputs(&self.rotors, throttles);
                 $(
                     let motors = [$(chip_stm32f4::flight_controller!(@motor $channel)),+];
                     $task::THROTTLES.signal(chip_stm32::motors::of_channels(motors, &throttles));
@@ -318,7 +318,7 @@ macro_rules! flight_controller {
                     let numbers = [$(chip_stm32f4::flight_controller!(@motor $channel)),+];
                     let rotors: [usize; $outputs] = chip_stm32::motors::rotors_of_outputs(
                         chip_stm32::motors::numbering::$numbering,
-                        &firmware::vehicle::CONFIGURATION.airframe.rotors,
+                        &firmware::vehicle::CONFIGURATION.rotors,
                     );
                     motors.run(&THROTTLES, chip_stm32::motors::rotors_of_channels(numbers, &rotors)).await
                 }
