@@ -105,7 +105,7 @@ proptest! {
                 }
                 let changed = bits(&table).into_iter().filter(|(name, bits)| before[name] != *bits).count();
                 prop_assert_eq!(changed, usize::from(set.value.to_bits() != before[&parameter.name]));
-                prop_assert!(Flight::new(table.configuration()).is_ok());
+                prop_assert!(Flight::<4>::new(table.configuration()).is_ok());
             }
             Err(reason) => {
                 prop_assert_eq!(&bits(&table), before);
@@ -182,7 +182,7 @@ fn a_disarmed_vehicle_flies_what_is_set() {
     let flown = |adopts: bool| {
         let mut bench = Bench::new();
         if !adopts {
-            bench.flight = Flight::new(table.configuration()).unwrap();
+            bench.flight = Flight::<4>::new(table.configuration()).unwrap();
         }
         let mut reports = Vec::new();
         for tick in 0..2500_u32 {
@@ -398,7 +398,7 @@ proptest! {
                 answers += values.take(3).count() as u32;
             }
         }
-        prop_assert!(Flight::new(table.configuration()).is_ok());
+        prop_assert!(Flight::<4>::new(table.configuration()).is_ok());
         answers += core::iter::from_fn(|| service.next_value(now_us, 0, &table)).count() as u32;
         prop_assert!(answers + service.dropped() >= sets, "{answers} answers to {sets} sets");
     }
