@@ -17,6 +17,7 @@ use afbc_comms::services::imus::{self, ImuNews};
 use afbc_comms::services::signing::Signing;
 use afbc_comms::services::status::SensorBits;
 use afbc_comms::{AuxSensors, Calibrator, EscAction, EscReports, EscsHeard, REPORT_MAX, Reboot, Setup};
+use afbc_mavlink::{Decoder, Uplink};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{ControlInputs, EscTelemetry, TickRecord};
 use afbc_types::ROTORS_MAX;
@@ -86,15 +87,12 @@ pub async fn run<B: Board, const OTHERS: usize>(
     (comms, table, log, radio, black_box): &mut CommsParts,
     links: &mut B::Links,
 ) -> ! {
-    // The decoder of the first link is in `comms`.
+    // Each link has its own decoder, because frames arrive in pieces and pieces of two links must not mix.
+    let mut decoder = comms.decoder();
     let mut decoders: [_; OTHERS] = array::from_fn(|_| comms.decoder());
     let wired = links.each().iter().position(|link| link.receiver.is_wired()).unwrap_or(0);
     // The first signing key is accepted over a wired link only, because it locks out everyone who lacks it.
-    let decoder = comms.decoder().wired();
-    match wired.checked_sub(1).and_then(|other| decoders.get_mut(other)) {
-        Some(other) => *other = decoder,
-        None => comms.exchange(&mut { decoder }),
-    }
+    *of_link(&mut decoder, &mut decoders, wired) = comms.decoder().wired();
     let mut incoming = [0; READ_MAX];
     let mut outgoing = Vec::<u8, REPORT_MAX>::new();
     let mut leaving = 0;
@@ -114,11 +112,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
                     // A radio receiver does not send MAVLink.
                     continue;
                 }
-                // Each link has its own decoder, because frames arrive in pieces and pieces of two links must not mix.
-                let mut other = link.checked_sub(1).and_then(|other| decoders.get_mut(other));
-                other.iter_mut().for_each(|decoder| comms.exchange(decoder));
-                let news = hear::<B>(comms, black_box, bytes);
-                other.iter_mut().for_each(|decoder| comms.exchange(decoder));
+                let news = hear::<B>(comms, of_link(&mut decoder, &mut decoders, link), black_box, bytes);
                 pass_on::<B>(&news, log);
                 BAD_FRAMES.store(comms.bad_frames(), Ordering::Relaxed);
             }
@@ -243,13 +237,27 @@ fn reboot<B: Board>(comms: &Comms) -> ! {
     cortex_m::peripheral::SCB::sys_reset()
 }
 
+/// Returns the decoder of a link: `first` of link 0, or one of `others`.
+fn of_link<'a>(
+    first: &'a mut Decoder<Uplink>,
+    others: &'a mut [Decoder<Uplink>],
+    link: usize,
+) -> &'a mut Decoder<Uplink> {
+    link.checked_sub(1).and_then(|other| others.get_mut(other)).unwrap_or(first)
+}
+
 /// Decodes received bytes, including requests for stored logs.
-fn hear<B: Board>(comms: &mut Comms, black_box: &mut Option<&'static mut LinkLog>, bytes: &[u8]) -> ControlInputs {
+fn hear<B: Board>(
+    comms: &mut Comms,
+    decoder: &mut Decoder<Uplink>,
+    black_box: &mut Option<&'static mut LinkLog>,
+    bytes: &[u8],
+) -> ControlInputs {
     match black_box {
-        Some(black_box) if B::HAS_LOG => comms.receive_with_logs(bytes, &mut black_box.server),
+        Some(black_box) if B::HAS_LOG => comms.receive_with_logs(decoder, bytes, &mut black_box.server),
         // Unreachable on a board with logs; spares its image a second copy of the receiver.
         _ if B::HAS_LOG => ControlInputs::EMPTY,
-        _ => comms.receive(bytes),
+        _ => comms.receive(decoder, bytes),
     }
 }
 

@@ -88,7 +88,7 @@ impl Comms {
         let EscSettings { serial, answers, poles, follows, detects, .. } = reports.settings;
         let hears = serial || answers;
         let mut action = EscAction::default();
-        self.dispatcher.status.escs.poles = u16::try_from(poles).unwrap_or(u16::MAX);
+        self.status.escs.poles = u16::try_from(poles).unwrap_or(u16::MAX);
         // Without telemetry there is nothing to compare, so the monitor is told that the vehicle is disarmed.
         reports.monitor.commanded(now_us, armed && hears, speeds);
         // If serial telemetry is off, no ESC has been asked, and the line drops all bytes.
@@ -101,14 +101,14 @@ impl Comms {
         let rotors = if answers { speeds.len() } else { 0 };
         for (rotor, speed) in (0_u8..).zip(heard.speeds_rev_min).take(rotors) {
             let Some(speed) = speed else { continue };
-            let last = self.dispatcher.status.escs.readings.get(usize::from(rotor)).copied().flatten();
+            let last = self.status.escs.readings.get(usize::from(rotor)).copied().flatten();
             let erpm_hundreds = u16::try_from(speed / 100).unwrap_or(u16::MAX);
             // The other values of the reading come over the serial line, if it is connected.
             let value = EscReading { erpm_hundreds, ..last.map_or_else(EscReading::default, |last| last.value) };
             let rad_s = Stamped { value: rotor_rad_s(speed, poles), at_us: now_us };
             self.take_reading(reports, Turning { rotor, rad_s }, value, airborne, &mut action);
         }
-        let escs = &mut self.dispatcher.status.escs;
+        let escs = &mut self.status.escs;
         escs.failures = if detects { reports.monitor.failures() } else { Default::default() };
         action.notch = reports.follower.look(now_us, armed && hears && follows, escs.speeds().take(speeds.len()));
         action.ask = if serial { reports.line.ask(now_us) } else { None };
@@ -124,15 +124,14 @@ impl Comms {
         airborne: bool,
         action: &mut EscAction,
     ) {
-        let dispatcher = &mut self.dispatcher;
-        let escs = &mut dispatcher.status.escs;
+        let escs = &mut self.status.escs;
         if let Some(place) = escs.readings.get_mut(usize::from(rotor)) {
             *place = Some(Stamped { value, at_us: rad_s.at_us });
         }
         escs.counter = escs.counter.wrapping_add(1);
         let Some(news) = monitor.measured(rotor, rad_s).filter(|_| settings.detects) else { return };
         let (severity, words) = words(news);
-        dispatcher.texts.say(severity, &words);
+        self.texts.say(severity, &words);
         if let Some(mode) = mode_after(settings.action).filter(|_| news.failure.is_some() && airborne) {
             let update = action.inputs.get_or_insert(ControlInputs::EMPTY);
             give(update.order(), Ticketed { value: Order::Select(mode), ticket: FAILURE });

@@ -20,7 +20,6 @@
 #![no_std]
 
 mod comms;
-mod dispatcher;
 mod escs;
 mod failsafes;
 mod link_share;

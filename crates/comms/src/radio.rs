@@ -152,13 +152,12 @@ impl Comms {
     /// Processes the radio receiver's bytes since the last tick. To be called after each tick, even without bytes.
     /// Returns new inputs for the control tick, if any, to be [merged](ControlInputs::merge).
     pub fn pilot(&mut self, radio: &mut RadioControl, bytes: &[u8], settings: &RadioSettings) -> Option<ControlInputs> {
-        let dispatcher = &mut self.dispatcher;
-        let (now_us, status) = (dispatcher.now_us, &dispatcher.status);
+        let (now_us, status) = (self.now_us, &self.status);
         let inputs = PilotInputs { now_us, armed: status.mode.armed(), mode: status.guided.mode };
         let faulty = sensors::faulty(&status.aux);
         let mut update = None;
-        let news = dispatcher.overrides.take();
-        let (texts, radio_us) = (&mut dispatcher.texts, &mut dispatcher.radio_us);
+        let news = self.overrides.take();
+        let (texts, radio_us) = (&mut self.texts, &mut self.radio_us);
         let mut act = |output: PilotOutput| {
             let PilotOutput { sticks, request, order, notice } = output;
             let sticks = sticks.map(|sticks| settings.curves.shape(inputs.mode, &sticks));
@@ -199,14 +198,14 @@ impl Comms {
         };
         radio.receive(bytes, settings, &inputs, &mut act);
         radio.relay(news, settings, &inputs, &mut act);
-        dispatcher.status.radio = radio.status(settings, now_us);
+        self.status.radio = radio.status(settings, now_us);
         update
     }
 
     /// Returns the next telemetry frame for the pilot's transmitter, if one is due: battery, attitude, mode, position
     /// in turn.
     pub fn radio_telemetry(&self, radio: &mut RadioControl) -> Option<Vec<u8, RADIO_FRAME_MAX>> {
-        let status = &self.dispatcher.status;
+        let status = &self.status;
         if status.time_us < radio.next_us {
             return None;
         }

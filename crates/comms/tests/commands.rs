@@ -214,7 +214,7 @@ fn the_wanted_item_is_handed_over_once() {
     assert_eq!((bench.comms.has_mail(), bench.inputs.orders.leg), (false, None));
     assert_eq!(upload(&mut bench, &[item(0, 22), item(1, 21)]), Some(MissionResult::ACCEPTED));
     let legs = |bench: &mut Bench| {
-        let inputs = bench.comms.receive(&[]);
+        let inputs = bench.receive(&[]);
         bench.inputs.merge(&inputs);
         inputs.orders.leg
     };
@@ -520,7 +520,7 @@ fn what_the_shell_says_is_reported() {
         let battery =
             BatteryStatus { voltage_mv: 11_100, current_ca, remaining_percent: -1, consumed_mah: -1, charge: 0 };
         bench.comms.set_aux_sensors(AuxSensors { battery: Some(battery), ..AuxSensors::default() });
-        let reading = bench.comms.receive(&[]).battery.expect("measured");
+        let reading = bench.receive(&[]).battery.expect("measured");
         assert!((reading.voltage_v - 11.1).abs() < 1e-5 && (reading.current_a - current_a).abs() < 1e-5, "{reading:?}");
     }
 }

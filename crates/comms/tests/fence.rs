@@ -67,7 +67,7 @@ impl Vehicle {
 
     fn hear(&mut self, message: &Uplink) {
         let mut buffer = [0; FRAME_MAX];
-        let update = self.bench.comms.receive(Sender::new(STATION).send(message, &mut buffer));
+        let update = self.bench.receive(Sender::new(STATION).send(message, &mut buffer));
         self.inputs.merge(&update);
     }
 

@@ -126,6 +126,7 @@ fn every_command_is_answered_once_to_its_sender() {
     let mut flight: Flight = Flight::new(&Configuration::default()).expect("valid");
     let mut idle = flight.tick(1_000, &mut taken, &Readings::NONE);
     let mut comms = Comms::new();
+    let mut decoder = comms.decoder();
     let mut table: ParameterTable = ParameterTable::new(Configuration::default());
     comms.set_aux_sensors(AuxSensors { origin: EarthOrigin::new(EarthOrigin::SIMULATED), ..AuxSensors::default() });
     let mut orders: VecDeque<Ticketed<Order>> = VecDeque::new();
@@ -189,7 +190,7 @@ fn every_command_is_answered_once_to_its_sender() {
                 assert!([sticks.roll, sticks.pitch, sticks.throttle, sticks.yaw].iter().all(|it| it.abs() <= 1.0));
             }
         });
-        let update = comms.receive(&stream);
+        let update = comms.receive(&mut decoder, &stream);
         if !may {
             let heard_only = afbc_guidance::Orders { heard_us: update.orders.heard_us, ..Default::default() };
             assert_eq!(update.orders, heard_only, "after {sent} frames");
@@ -273,11 +274,9 @@ fn nothing_commands_without_the_key() {
         .collect();
     let (key, other, mut time_10us) = (Key([1; 32]), Key([2; 32]), 37_000_000_000_000);
     let mut comms = Comms::new();
-    let mut wired = comms.decoder().wired();
-    comms.exchange(&mut wired);
+    let (mut wired, mut decoder) = (comms.decoder().wired(), comms.decoder());
     let setup = Uplink::Signing(SetupSigning { key: Some(key), time_10us });
-    let _ = comms.receive(Sender::new(STATIONS[0]).send(&setup, &mut [0; FRAME_MAX]));
-    comms.exchange(&mut wired);
+    let _ = comms.receive(&mut wired, Sender::new(STATIONS[0]).send(&setup, &mut [0; FRAME_MAX]));
     let mut table: ParameterTable = ParameterTable::new(Configuration::default());
     let mut flight: Flight = Flight::new(&Configuration::default()).expect("valid");
     let mut taken = ControlInputs::EMPTY;
@@ -291,7 +290,7 @@ fn nothing_commands_without_the_key() {
             let stamp = Stamp { link: 0, time_10us };
             let mut buffer = [0; SIGNED_FRAME_MAX];
             let frame = Sender::new(from).send_signed(&Uplink::Heartbeat, Some((&key, stamp)), &mut buffer).to_vec();
-            let _ = comms.receive(&frame);
+            let _ = comms.receive(&mut decoder, &frame);
             captured.push(frame);
         }
     }
@@ -316,7 +315,7 @@ fn nothing_commands_without_the_key() {
             }
             _ => captured[random.below(captured.len())].clone(),
         };
-        let update = comms.receive(&bytes);
+        let update = comms.receive(&mut decoder, &bytes);
         assert_eq!(update.orders, afbc_guidance::Orders::default(), "frame {sent}");
         assert!(update.inbox.setpoint().is_none() && update.inbox.asked().is_none(), "frame {sent}");
         assert!(update.inbox.pose().is_none(), "frame {sent}");

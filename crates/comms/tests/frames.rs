@@ -160,7 +160,7 @@ proptest! {
     fn a_station_that_is_not_in_control_changes_nothing(frames in prop::collection::vec(sent(), 1..80)) {
         let mut bench = Bench::new();
         let say = |bench: &mut Bench, from, message| {
-            bench.comms.receive(Sender::new(from).send(&message, &mut [0; FRAME_MAX]))
+            bench.receive(Sender::new(from).send(&message, &mut [0; FRAME_MAX]))
         };
         say(&mut bench, STATION, Uplink::Command(Command::Land));
         bench.step();
@@ -169,7 +169,7 @@ proptest! {
             if sent.from == STATION || [102, 138, 331].contains(&sent.id) {
                 continue;
             }
-            let update = bench.comms.receive(&frame(sent.from, sent.id, &sent.payload));
+            let update = bench.receive(&frame(sent.from, sent.id, &sent.payload));
             prop_assert_eq!(update.orders, Orders::default(), "{:?}", sent);
             prop_assert_eq!(update.inbox.setpoint(), None);
             if let Some(asked) = update.inbox.asked() {

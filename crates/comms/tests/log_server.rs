@@ -54,7 +54,8 @@ impl Vehicle {
     fn hear(&mut self, message: &impl Message) {
         let mut buffer = [0; FRAME_MAX];
         let frame = Sender::new(STATION).send(message, &mut buffer);
-        self.bench.comms.receive_with_logs(frame, &mut self.server);
+        let Bench { comms, uplink, .. } = &mut self.bench;
+        comms.receive_with_logs(uplink, frame, &mut self.server);
     }
 
     fn ask(&mut self, request: LogRequest) -> Vec<Sent> {

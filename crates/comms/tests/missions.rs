@@ -12,7 +12,7 @@ use afbc_mavlink::{
 /// Returns the mission item that the guidance was given last.
 fn leg(bench: &mut Bench) -> Option<afbc_guidance::Leg> {
     (0..3).for_each(|_| drop(step(bench)));
-    let inputs = bench.comms.receive(&[]);
+    let inputs = bench.receive(&[]);
     bench.inputs.merge(&inputs);
     step(bench);
     bench.taken.orders.leg

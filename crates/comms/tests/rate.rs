@@ -12,6 +12,7 @@ const STATION: Address = Address { system: 255, component: 190 };
 struct Bench {
     flight: Flight,
     comms: Comms,
+    uplink: Decoder<Uplink>,
     inputs: ControlInputs,
     taken: ControlInputs,
     sender: Sender,
@@ -28,6 +29,7 @@ impl Bench {
         Bench {
             flight: Flight::new(&Configuration::default()).expect("valid"),
             comms: Comms::new(),
+            uplink: Comms::new().decoder(),
             inputs: ControlInputs::EMPTY,
             taken: ControlInputs::EMPTY,
             sender: Sender::new(STATION),
@@ -40,7 +42,7 @@ impl Bench {
     }
 
     fn hear(&mut self, message: Uplink) {
-        let update = self.comms.receive(self.sender.send(&message, &mut [0; FRAME_MAX]));
+        let update = self.comms.receive(&mut self.uplink, self.sender.send(&message, &mut [0; FRAME_MAX]));
         self.inputs.merge(&update);
     }
 

@@ -49,9 +49,8 @@ impl Locked {
         let frame = self.sender.send(&Uplink::Signing(setup), &mut [0; FRAME_MAX]).to_vec();
         let mut decoder = self.bench.comms.decoder();
         decoder = if wired { decoder.wired() } else { decoder };
-        self.bench.comms.exchange(&mut decoder);
-        self.bench.hear_bytes(&frame);
-        self.bench.comms.exchange(&mut decoder);
+        let update = self.bench.comms.receive(&mut decoder, &frame);
+        self.bench.inputs.merge(&update);
     }
 
     /// Stores the records of this many ticks.
@@ -215,9 +214,8 @@ fn a_key_is_set_over_a_wire_or_signed_and_never_while_armed() {
     let setup = SetupSigning { key: Some(KEY), time_10us: TODAY_10US };
     let frame = Sender::new(STATION).send(&Uplink::Signing(setup), &mut [0; FRAME_MAX]).to_vec();
     let mut decoder = armed.comms.decoder().wired();
-    armed.comms.exchange(&mut decoder);
-    armed.hear_bytes(&frame);
-    armed.comms.exchange(&mut decoder);
+    let update = armed.comms.receive(&mut decoder, &frame);
+    armed.inputs.merge(&update);
     armed.hear(command());
     let (_, said) = armed.tick(&State::default());
     assert!(said.iter().any(|it| matches!(it, Downlink::Answer { .. })), "still unsigned: {said:?}");

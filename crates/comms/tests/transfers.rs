@@ -73,7 +73,8 @@ impl Vehicle {
     fn hear(&mut self, from: Address, message: &impl Message) {
         let mut buffer = [0; FRAME_MAX];
         let frame = Sender::new(from).send(message, &mut buffer);
-        let update = self.bench.comms.receive_beside(frame, &mut self.transfers);
+        let Bench { comms, uplink, .. } = &mut self.bench;
+        let update = comms.receive_beside(uplink, frame, &mut self.transfers);
         self.bench.inputs.merge(&update);
     }
 

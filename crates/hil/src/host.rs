@@ -42,6 +42,8 @@ pub struct Host {
     esc_reports: EscReports,
     setup: Setup,
     comms: Comms,
+    /// Decoder of the host's own stream.
+    decoder: Decoder<Uplink>,
     inputs: ControlInputs,
     /// Inputs that the last tick took from messages, and the state before that tick, for logs.
     taken: ControlInputs,
@@ -160,6 +162,7 @@ impl Host {
 
     fn of(table: ParameterTable, law: FlownLaw, names: [&str; 2]) -> Result<Self, OutOfRange> {
         let setup = Setup { calibrates: true, ..Setup::of(&table.configuration().link) };
+        let comms = Comms::with(setup);
         Ok(Host {
             flight: Box::new(AnyFlight::new(&law, table.configuration())?),
             law,
@@ -170,7 +173,8 @@ impl Host {
             simulated_escs: SimulatedEscs::new(table.configuration().escs.poles),
             table,
             setup,
-            comms: Comms::with(setup),
+            decoder: comms.decoder(),
+            comms,
             inputs: ControlInputs::EMPTY,
             taken: ControlInputs::EMPTY,
             before: TickBefore::default(),
@@ -198,7 +202,7 @@ impl Host {
     pub fn with(self, setup: Setup) -> Self {
         let mut comms = Comms::with(setup);
         comms.set_signing(self.comms.signing().clone());
-        Host { setup, comms, ..self }
+        Host { setup, decoder: comms.decoder(), comms, ..self }
     }
 
     /// Returns true if messages need a signature.
@@ -296,17 +300,8 @@ impl Host {
 
     /// Receives bytes for the next tick from one of several streams. Each stream has its own decoder.
     pub fn hear(&mut self, decoder: &mut Decoder<Uplink>, bytes: &[u8]) {
-        self.comms.exchange(decoder);
-        let news = self.receive(bytes);
+        let news = received(&mut self.comms, decoder, bytes, self.files.as_deref_mut());
         self.merge(&news);
-        self.comms.exchange(decoder);
-    }
-
-    fn receive(&mut self, bytes: &[u8]) -> ControlInputs {
-        match &mut self.files {
-            Some(files) => self.comms.receive_beside(bytes, &mut files.0),
-            None => self.comms.receive(bytes),
-        }
     }
 
     /// Receives bytes from a radio receiver for the next tick.
@@ -344,7 +339,7 @@ impl Host {
     /// Runs one control tick at `time_us` since power-up, after the link has received `uplink`. The tick reports a
     /// duration of `tick_us`.
     pub fn tick(&mut self, uplink: &[u8], time_us: u64, tick_us: f32) -> HostTick {
-        let news = self.receive(uplink);
+        let news = received(&mut self.comms, &mut self.decoder, uplink, self.files.as_deref_mut());
         self.merge(&news);
         self.inputs.take_into(&mut self.taken);
         let (readings, battery) = (core::mem::take(&mut self.readings), self.taken.battery);
@@ -412,6 +407,19 @@ impl Host {
     /// Runs the tick one millisecond after the previous one, with a reported duration of zero.
     pub fn next_tick(&mut self, uplink: &[u8]) -> HostTick {
         self.tick(uplink, self.took.time_us + PERIOD_US, 0.0)
+    }
+}
+
+/// Receives bytes of one stream, including requests for served files.
+fn received(
+    comms: &mut Comms,
+    decoder: &mut Decoder<Uplink>,
+    bytes: &[u8],
+    files: Option<&mut (Transfers<OpenFile>, ServedFiles)>,
+) -> ControlInputs {
+    match files {
+        Some((transfers, _)) => comms.receive_beside(decoder, bytes, transfers),
+        None => comms.receive(decoder, bytes),
     }
 }
 

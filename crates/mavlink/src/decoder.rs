@@ -56,6 +56,15 @@ impl Counters {
         }
     }
 
+    /// Adds what a decoder has counted, whose counts were `before` and are `now`.
+    pub fn add_since(&mut self, before: &Counters, now: &Counters) {
+        let mut counts = self.to_array();
+        for (count, (before, now)) in counts.iter_mut().zip(before.to_array().into_iter().zip(now.to_array())) {
+            add(count, now.saturating_sub(before));
+        }
+        *self = Self::from_array(counts);
+    }
+
     fn count(&mut self, fault: Fault) {
         let counter = match fault {
             Fault::BadChecksum => &mut self.bad_checksum,
@@ -141,6 +150,27 @@ enum Front<M> {
     Intact { skipped: usize, header: Header, message: Result<M, Fault> },
 }
 
+/// Handler of the frames that a [`Decoder`] finds in its stream.
+pub trait FrameHandler<M> {
+    /// Returns true if the frame is accepted. Called once for each valid frame that the direction carries; refused ones
+    /// count as [`Fault::Unsupported`].
+    fn accepts(&mut self, frame: &ReceivedFrame<'_>) -> bool;
+
+    /// Handles an accepted frame's message, with the address of its sender and its payload.
+    fn handle(&mut self, from: Address, message: M, payload: &[u8]);
+}
+
+/// A pair of closures handles frames by the first, which accepts them, and the second, which gets the message.
+impl<M, A: FnMut(&ReceivedFrame<'_>) -> bool, H: FnMut(Address, M, &[u8])> FrameHandler<M> for (A, H) {
+    fn accepts(&mut self, frame: &ReceivedFrame<'_>) -> bool {
+        (self.0)(frame)
+    }
+
+    fn handle(&mut self, from: Address, message: M, payload: &[u8]) {
+        (self.1)(from, message, payload);
+    }
+}
+
 impl<M: Message> Decoder<M> {
     /// Creates a decoder of messages to `receiver`.
     pub fn new(receiver: Address) -> Self {
@@ -182,16 +212,12 @@ impl<M: Message> Decoder<M> {
         accept: impl FnMut(&ReceivedFrame<'_>) -> bool,
         mut deliver: impl FnMut(Address, M),
     ) {
-        self.feed_whole(bytes, accept, |from, message, _| deliver(from, message));
+        self.feed_to(&mut (accept, |from, message, _: &[u8]| deliver(from, message)), bytes);
     }
 
-    /// Takes bytes like [`feed_accepted`](Self::feed_accepted); delivers the payload with each message.
-    pub fn feed_whole(
-        &mut self,
-        bytes: &[u8],
-        mut accept: impl FnMut(&ReceivedFrame<'_>) -> bool,
-        mut deliver: impl FnMut(Address, M, &[u8]),
-    ) {
+    /// Takes bytes like [`feed_accepted`](Self::feed_accepted); `handler` decides about each frame and gets the message
+    /// with its payload.
+    pub fn feed_to(&mut self, handler: &mut impl FrameHandler<M>, bytes: &[u8]) {
         for &byte in bytes {
             // Cannot overflow: `advance` always removes something from a full buffer.
             if let Some(next) = self.buffer.get_mut(self.length) {
@@ -199,7 +225,7 @@ impl<M: Message> Decoder<M> {
                 self.length += 1;
             }
             if self.length >= self.needed {
-                self.advance(&mut accept, &mut deliver);
+                self.advance(handler);
             }
         }
     }
@@ -210,11 +236,7 @@ impl<M: Message> Decoder<M> {
     }
 
     /// Processes everything in the buffer that can be decided.
-    fn advance(
-        &mut self,
-        accept: &mut impl FnMut(&ReceivedFrame<'_>) -> bool,
-        deliver: &mut impl FnMut(Address, M, &[u8]),
-    ) {
+    fn advance(&mut self, handler: &mut impl FrameHandler<M>) {
         loop {
             match self.front() {
                 Front::Incomplete(needed) => {
@@ -232,11 +254,11 @@ impl<M: Message> Decoder<M> {
                 }
                 Front::Intact { skipped, header, message } => {
                     add(&mut self.counters.skipped_bytes, skipped as u32);
-                    // `accept` may check the signature, which costs a hash, so it is called only for valid messages.
+                    // `accepts` may check the signature, which costs a hash, so it is called only for valid messages.
                     let message = message.and_then(|message| {
                         let frame = self.buffer.get(skipped..skipped + header.frame_length()).unwrap_or_default();
                         let frame = ReceivedFrame::new(header.from, header.id, frame, header.unsigned_length());
-                        if accept(&frame) { Ok(message) } else { Err(Fault::Unsupported) }
+                        if handler.accepts(&frame) { Ok(message) } else { Err(Fault::Unsupported) }
                     });
                     self.count_lost(&header);
                     match message {
@@ -244,7 +266,7 @@ impl<M: Message> Decoder<M> {
                             add(&mut self.counters.received, 1);
                             let begin = skipped + HEADER;
                             let payload = self.buffer.get(begin..begin + usize::from(header.length));
-                            deliver(header.from, message, payload.unwrap_or_default());
+                            handler.handle(header.from, message, payload.unwrap_or_default());
                         }
                         Err(fault) => self.counters.count(fault),
                     }

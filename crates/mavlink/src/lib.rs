@@ -61,7 +61,7 @@ pub use answer::Answer;
 pub use channels::{ChannelsOverride, RADIO_CHANNELS, RadioChannels};
 pub use clocks::Clock;
 pub use command::{CalibrationRequest, Command, Reboot, Storage};
-pub use decoder::{Counters, Decoder};
+pub use decoder::{Counters, Decoder, FrameHandler};
 pub use downlink::{Downlink, Text};
 pub use framing::{FRAME_MAX, SIGNED_FRAME_MAX, Sender};
 pub use health::{HealthArray, StatesRefused};

@@ -2,7 +2,7 @@
 
 use afbc_mavlink::{
     Address, ComponentMetadata, Decoder, FRAME_MAX, FileOpcode, FilePacket, LogData, LogEntry, LogMessage, LogRequest,
-    Question, Sender, Transfer, Uplink,
+    Question, ReceivedFrame, Sender, Transfer, Uplink,
 };
 use mavlink::dialects::common::{MavCmd, MavMessage};
 use mavlink::{MavlinkVersion, Message as _};
@@ -104,7 +104,9 @@ proptest! {
         let mut decoder = Decoder::<Uplink>::new(VEHICLE);
         let mut heard = Vec::new();
         for piece in stream.chunks(usize::from(cut).max(1)) {
-            decoder.feed_whole(piece, |_| true, |_, message, payload| heard.push((message, payload.to_vec())));
+            let accepts = |_: &ReceivedFrame<'_>| true;
+            let handle = |_, message, payload: &[u8]| heard.push((message, payload.to_vec()));
+            decoder.feed_to(&mut (accepts, handle), piece);
         }
         prop_assert_eq!(heard.len(), 4);
         for (message, payload) in &heard {

@@ -13,6 +13,8 @@ pub const STATION: Address = Address { system: 255, component: 190 };
 pub struct Bench {
     pub flight: Flight,
     pub comms: Comms,
+    /// Decoder of the stations' stream to the vehicle.
+    pub uplink: Decoder<Uplink>,
     pub table: ParameterTable,
     /// Changes of the table so far.
     pub changes: Vec<RecordChange>,
@@ -27,6 +29,7 @@ impl Bench {
         Bench {
             flight: Flight::new(&Configuration::default()).expect("valid"),
             comms: Comms::new(),
+            uplink: Comms::new().decoder(),
             table: ParameterTable::new(Configuration::default()),
             changes: Vec::new(),
             inputs: ControlInputs::EMPTY,
@@ -59,8 +62,13 @@ impl Bench {
         self.hear_bytes(Sender::new(from).send(&message, &mut [0; FRAME_MAX]));
     }
 
+    /// Receives bytes, and returns the new inputs.
+    pub fn receive(&mut self, bytes: &[u8]) -> ControlInputs {
+        self.comms.receive(&mut self.uplink, bytes)
+    }
+
     pub fn hear_bytes(&mut self, bytes: &[u8]) {
-        let update = self.comms.receive(bytes);
+        let update = self.receive(bytes);
         self.inputs.merge(&update);
     }
 

@@ -1,4 +1,4 @@
-//! Passes each received message to its service.
+//! Receiving: each message is passed to its service.
 
 mod calibration;
 mod commands;
@@ -6,43 +6,38 @@ mod fence;
 mod parameters;
 mod targets;
 
-use crate::parameters::Service;
-use crate::services::calibration::CalibrationState;
-use crate::services::commands::{BUSY, Commands};
-use crate::services::control::{ControlClaim, OperatorControl};
-use crate::services::fence::FenceWatch;
-use crate::services::mission::Missions;
-use crate::services::status::VehicleStatus;
-use crate::services::streams::{Requested, Streams, id};
-use crate::services::texts::{Texts, Words};
-use crate::services::unanswered::Unanswered;
+use super::{Comms, KEY_OVER_WIRE};
+use crate::log_server::LogServer;
+use crate::services::commands::BUSY;
+use crate::services::control::ControlClaim;
+use crate::services::streams::{Requested, id};
+use crate::services::texts::Words;
 use crate::services::{events, extended, files, logs, serial, timesync};
-use crate::setup::Setup;
 use crate::transferring::TransferRequests;
 use crate::transfers::is_change;
-use afbc_guidance::fence::Braking;
-use afbc_guidance::{FenceView, Item, Leg, Limits, Order};
+use afbc_flight_core::Stamped;
+use afbc_flight_core::supervisor::COAST_US;
+use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Sighting};
+use afbc_guidance::{Item, Leg, Order};
 use afbc_mavlink::telemetry::OrbitStatus;
 use afbc_mavlink::{
-    Address, Answer, ChannelsOverride, Clock, Command, ControlAnswer, DataStream, Downlink, Interval, MavSeverity,
-    Mission, ParameterError, ParameterRequest, Question, QuestionRefusal, Reboot, Telemetry, Uplink,
+    Address, Answer, Clock, Command, ControlAnswer, DataStream, Decoder, Downlink, FrameHandler, Interval, MavSeverity,
+    Mission, ParameterError, ParameterRequest, Question, QuestionRefusal, ReceivedFrame, SetupSigning, Telemetry,
+    Uplink,
 };
 use afbc_onboard::ControlInputs;
-use afbc_rc::StickCurves;
-use afbc_types::Setpoint;
-use heapless::Deque;
-use nalgebra::{Vector2, Vector3};
+use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 
 /// Most queued replies, besides answers to commands. Further replies are dropped, since stations repeat requests.
-const REPLIES_MAX: usize = 16;
+pub(super) const REPLIES_MAX: usize = 16;
 /// Most parameter requests queued until the end of the tick. Further ones are dropped, since stations repeat them.
-const WISHES_MAX: usize = 32;
+pub(super) const PARAMETER_TASKS_MAX: usize = 32;
 /// Shortest time between two reports to the guidance that the station in control was heard \[us\].
 const HEARD_EVERY_US: u64 = 50_000;
 
 /// A reply to a message other than a command.
 #[derive(Clone, Copy, Debug)]
-enum Reply {
+pub(super) enum Reply {
     Clock(Clock),
     Control(ControlAnswer),
     Interval(Interval),
@@ -54,106 +49,119 @@ enum Reply {
 
 /// A queued request about parameters.
 #[derive(Clone, Copy, Debug)]
-enum ParameterTask {
+pub(super) enum ParameterTask {
     Ask(ParameterRequest, Address),
     Restore,
 }
 
-/// All services, and the state that they share.
-pub(crate) struct Dispatcher {
-    pub(crate) me: Address,
-    /// Start of the last tick \[us\]. Messages that arrive before the next tick get this time stamp.
-    pub(crate) now_us: u64,
-    pub(crate) status: VehicleStatus,
-    pub(crate) commands: Commands,
-    pub(crate) control: OperatorControl,
-    pub(crate) missions: Missions,
-    /// State of the geofence. `braking` has the limits with which stopping paths are computed.
-    fence: FenceWatch,
-    pub(crate) braking: Braking,
-    /// Radius and height of the cylindrical geofence around home \[m\]; 0 for none.
-    pub(crate) cylinder_m: [f32; 2],
-    /// Response curves of a station's joystick, and whether a joystick is accepted.
-    pub(crate) curves: StickCurves,
-    pub(crate) takes_joystick: bool,
-    /// Channels of RC_CHANNELS_OVERRIDE, until radio control takes them.
-    pub(crate) overrides: Option<ChannelsOverride>,
-    fence_given: FenceView,
-    /// Nearest safe place for a return \[m\], the one that the guidance knows, and the time of the last search \[us\].
-    safe_m: Option<Vector2<f32>>,
-    safe_given_m: Option<Vector2<f32>>,
-    safe_us: u64,
-    /// Centre and radius of the orbit ordered last \[m\].
-    orbit_m: Option<(Vector3<f32>, f32)>,
-    pub(crate) streams: Streams,
-    pub(crate) texts: Texts,
-    unanswered: Unanswered,
-    replies: Deque<Reply, REPLIES_MAX>,
-    /// Queued parameter requests.
-    wishes: Deque<ParameterTask, WISHES_MAX>,
-    pub(crate) parameters: Service,
-    pub(crate) calibration: CalibrationState,
-    /// True if the shell supports calibration.
-    calibrates: bool,
-    /// True if a station has asked for the sensors' self-tests.
-    pub(crate) tests: bool,
-    /// Item and upload number of the mission item last given to the guidance.
-    given: Option<(u16, u16)>,
-    /// Mission item reached last.
-    reached: Option<u16>,
-    /// Last time at which the guidance was told that the station in control was heard \[us\].
-    heard_us: Option<u64>,
-    /// Time of the last stick input from the radio receiver \[us\].
-    pub(crate) radio_us: Option<u64>,
-    /// Set if a station has requested the arming checks. True if one of these stations may arm.
-    checks: Option<bool>,
-    /// Kinds of reboot that the shell supports.
-    reboots: &'static [Reboot],
-    /// Kind of reboot that a station has requested.
-    pub(crate) reboot: Option<Reboot>,
+/// Handler of the frames in received bytes.
+struct Frames<'a, R> {
+    comms: &'a mut Comms,
+    requests: &'a mut R,
+    /// True if the bytes came over a wire.
+    wired: bool,
+    /// New inputs for the control tick.
+    inputs: ControlInputs,
+    /// Request for a signing key.
+    setup: Option<SetupSigning>,
 }
 
-impl Dispatcher {
-    pub(crate) fn new(me: Address, setup: &Setup) -> Self {
-        Dispatcher {
-            me,
-            now_us: 0,
-            status: VehicleStatus::default(),
-            commands: Commands::default(),
-            control: OperatorControl::default(),
-            missions: Missions::default(),
-            fence: FenceWatch::default(),
-            braking: Limits::DEFAULT.braking(),
-            cylinder_m: [0.0; 2],
-            curves: StickCurves::DEFAULT,
-            takes_joystick: true,
-            overrides: None,
-            fence_given: FenceView::default(),
-            safe_m: None,
-            safe_given_m: None,
-            safe_us: 0,
-            orbit_m: None,
-            streams: Streams::new(setup.bytes_per_s),
-            texts: Texts::default(),
-            unanswered: Unanswered::default(),
-            replies: Deque::new(),
-            wishes: Deque::new(),
-            parameters: Service::default(),
-            calibration: CalibrationState::default(),
-            calibrates: setup.calibrates,
-            tests: false,
-            given: None,
-            reached: None,
-            heard_us: None,
-            radio_us: None,
-            checks: None,
-            reboots: setup.reboots,
-            reboot: None,
+impl<R: TransferRequests> FrameHandler<Uplink> for Frames<'_, R> {
+    fn accepts(&mut self, frame: &ReceivedFrame<'_>) -> bool {
+        self.comms.signing.accepts(self.comms.now_us, frame, self.wired)
+    }
+
+    fn handle(&mut self, from: Address, message: Uplink, payload: &[u8]) {
+        let Frames { comms, requests, inputs, setup, .. } = self;
+        match message {
+            Uplink::State { sent_us, state, sigmas } => comms.take_state(from, sent_us, state, sigmas, inputs),
+            Uplink::Pose { sent_us, pose } if comms.status.senses => comms.take_pose(from, sent_us, pose, inputs),
+            Uplink::Signing(wanted) => *setup = Some(wanted),
+            other if requests.wants(&other) => comms.hand_to(*requests, (from, &other, payload), inputs),
+            other => comms.hear(from, other, inputs),
+        }
+    }
+}
+
+impl Comms {
+    /// Processes the next bytes of a stream, whose [decoder](Self::decoder) holds the beginning of an unfinished frame.
+    /// Returns new inputs for the control tick, to be [merged](ControlInputs::merge).
+    ///
+    /// A vehicle that has no estimator ignores poses, because the control law needs velocities and rates too.
+    pub fn receive(&mut self, decoder: &mut Decoder<Uplink>, bytes: &[u8]) -> ControlInputs {
+        self.receive_beside(decoder, bytes, &mut ())
+    }
+
+    /// Does the same as [`receive`](Self::receive) for a vehicle that stores logs but no other files.
+    #[inline(never)]
+    pub fn receive_with_logs(
+        &mut self,
+        decoder: &mut Decoder<Uplink>,
+        bytes: &[u8],
+        server: &mut LogServer,
+    ) -> ControlInputs {
+        self.receive_beside(decoder, bytes, server)
+    }
+
+    /// Does the same as [`receive`](Self::receive); `requests` takes the stations' requests for files and logs.
+    pub fn receive_beside(
+        &mut self,
+        decoder: &mut Decoder<Uplink>,
+        bytes: &[u8],
+        requests: &mut impl TransferRequests,
+    ) -> ControlInputs {
+        let before = *decoder.counters();
+        let wired = decoder.is_wired();
+        let mut frames = Frames { comms: self, requests, wired, inputs: ControlInputs::EMPTY, setup: None };
+        decoder.feed_to(&mut frames, bytes);
+        let Frames { mut inputs, setup, .. } = frames;
+        self.frames.add_since(&before, decoder.counters());
+        // The new key is set after all bytes: the frames beside SETUP_SIGNING are checked with the old key.
+        if let Some(setup) = setup {
+            self.set_key(&setup);
+        }
+        if self.signing.has_refused() {
+            self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, KEY_OVER_WIRE);
+        }
+        self.hand_over(&mut inputs);
+        inputs.battery = self.battery();
+        inputs
+    }
+
+    /// Takes a state that a tracker measured.
+    fn take_state(
+        &mut self,
+        from: Address,
+        sent_us: u64,
+        value: State,
+        sigmas: PoseSigmas,
+        inputs: &mut ControlInputs,
+    ) {
+        let estimates = self.status.senses;
+        let age_max_us = if estimates { POSE_AGE_MAX_US } else { COAST_US.into() };
+        let sighting = Sighting::State(value);
+        if let Some(at_us) = self.tracker.sight(number(from), sent_us, self.now_us, sighting, age_max_us) {
+            // A control law needs a fresh state. An estimator fuses an old pose at the time of the pose.
+            if self.now_us - at_us <= COAST_US.into() {
+                inputs.inbox.put_state(Stamped { value, at_us });
+            }
+            if estimates {
+                inputs.inbox.put_pose(Stamped { value: Pose::of(&value, sigmas), at_us });
+            }
+            (self.status.state, self.state_is_news) = (Some(value), true);
+        }
+    }
+
+    /// Takes a pose that a tracker measured, for the vehicle's estimator.
+    fn take_pose(&mut self, from: Address, sent_us: u64, value: Pose, inputs: &mut ControlInputs) {
+        let sighting = Sighting::Pose(value);
+        if let Some(at_us) = self.tracker.sight(number(from), sent_us, self.now_us, sighting, POSE_AGE_MAX_US) {
+            inputs.inbox.put_pose(Stamped { value, at_us });
         }
     }
 
     /// Handles a message, except states, poses and SETUP_SIGNING.
-    pub(crate) fn hear(&mut self, from: Address, message: Uplink, inputs: &mut ControlInputs) {
+    pub(super) fn hear(&mut self, from: Address, message: Uplink, inputs: &mut ControlInputs) {
         if from == self.me {
             // The vehicle's own message was sent back.
             return;
@@ -192,7 +200,7 @@ impl Dispatcher {
     }
 
     /// Passes a message to `requests`, which handles requests for files and logs.
-    pub(crate) fn hand_to(
+    pub(super) fn hand_to(
         &mut self,
         requests: &mut impl TransferRequests,
         (from, message, payload): (Address, &Uplink, &[u8]),
@@ -218,7 +226,7 @@ impl Dispatcher {
 
     /// Gives the guidance the mission item that it asks for, unless it has it already, and news of geofence and safe
     /// place.
-    pub(crate) fn hand_over(&mut self, inputs: &mut ControlInputs) {
+    pub(super) fn hand_over(&mut self, inputs: &mut ControlInputs) {
         if let Some(leg) = self.wanted_leg() {
             self.given = Some((self.status.guided.wanted, leg.upload));
             inputs.order().leg = Some(leg);
@@ -236,7 +244,7 @@ impl Dispatcher {
     /// Returns the mission item that the guidance asks for, if it does not have it yet. If a new mission is too short
     /// for the item, returns the first item. If the mission was cleared, returns an empty item, to tell the guidance
     /// so.
-    pub(crate) fn wanted_leg(&self) -> Option<Leg> {
+    pub(super) fn wanted_leg(&self) -> Option<Leg> {
         let (wanted, upload) = (self.status.guided.wanted, self.missions.number());
         // The upload's number is compared too: after another upload the same number means another item.
         if self.given == Some((wanted, upload)) {
@@ -253,7 +261,7 @@ impl Dispatcher {
     }
 
     /// Does the work that is due after each tick.
-    pub(crate) fn tick(&mut self) {
+    pub(super) fn tick(&mut self) {
         self.streams.tick();
         self.report_checks();
         self.watch_fence();
@@ -272,7 +280,7 @@ impl Dispatcher {
     }
 
     /// Returns the next queued reply.
-    pub(crate) fn next_reply(&mut self) -> Option<Downlink> {
+    pub(super) fn next_reply(&mut self) -> Option<Downlink> {
         let everyone = Address::default();
         Some(match self.replies.pop_front() {
             Some(Reply::Clock(clock)) => Downlink::Clock(clock),
@@ -290,12 +298,12 @@ impl Dispatcher {
     }
 
     /// Returns the setpoint that the vehicle follows, if it is armed.
-    pub(crate) fn followed(&self) -> Option<&Setpoint> {
+    pub(super) fn followed(&self) -> Option<&Setpoint> {
         self.status.guided.setpoint.as_ref().filter(|_| self.status.mode.armed())
     }
 
     /// Returns MISSION_CURRENT.
-    pub(crate) fn mission_current(&self) -> Downlink {
+    pub(super) fn mission_current(&self) -> Downlink {
         let guided = &self.status.guided;
         let flies = guided.mode == afbc_guidance::FlightMode::Mission && self.status.mode.armed();
         let current = self.missions.current(Some(guided.wanted), self.reached, flies);
@@ -303,7 +311,7 @@ impl Dispatcher {
     }
 
     /// Returns ORBIT_EXECUTION_STATUS while the vehicle flies an ordered orbit.
-    pub(crate) fn orbit_status(&self) -> Option<Downlink> {
+    pub(super) fn orbit_status(&self) -> Option<Downlink> {
         let ((centre_m, radius_m), origin) =
             (self.orbit_m.filter(|_| self.status.guided.orbits)?, self.status.aux.origin?);
         let centre = origin.global(&centre_m);
@@ -397,4 +405,9 @@ impl Dispatcher {
             self.order(Order::Resume(number), None, from, inputs);
         }
     }
+}
+
+/// Returns the number by which the [`Tracker`] tells senders apart.
+fn number(from: Address) -> u16 {
+    u16::from_be_bytes([from.system, from.component])
 }

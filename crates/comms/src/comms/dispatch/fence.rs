@@ -1,6 +1,6 @@
 //! Applies the geofence to commands, the mission and the guidance.
 
-use super::Dispatcher;
+use super::Comms;
 use crate::services::fence::{FenceMotion, contains, holds, holds_circle, is_clear};
 use crate::services::mission::Surroundings;
 use afbc_control::math::sqrt;
@@ -11,7 +11,7 @@ use nalgebra::{Vector2, Vector3};
 /// Time between two searches for the nearest rally point \[us\].
 const SAFE_EVERY_US: u64 = 500_000;
 
-impl Dispatcher {
+impl Comms {
     /// Returns true if the guidance does not have the latest state of the geofence or of the safe place.
     pub(crate) fn has_fence_news(&self) -> bool {
         self.fence.view() != self.fence_given || self.safe_m != self.safe_given_m

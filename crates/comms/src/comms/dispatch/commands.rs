@@ -1,6 +1,6 @@
 //! Handling of COMMAND_LONG and COMMAND_INT.
 
-use super::{Dispatcher, Reply};
+use super::{Comms, Reply};
 use crate::services::commands::{BUSY, CALIBRATES, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN};
 use crate::services::origin::resolve;
 use crate::services::streams::{Requested, Streams, id};
@@ -13,7 +13,7 @@ use afbc_mavlink::{Address, Answer, Command, Height, Interval, MavSeverity, Plac
 use afbc_onboard::{ControlInputs, give};
 use nalgebra::Vector3;
 
-impl Dispatcher {
+impl Comms {
     /// Returns a reason against arming that the flight core does not know of.
     fn against_arming(&self) -> Option<(&'static str, i32)> {
         if self.calibration.active.is_some() {

@@ -1,6 +1,6 @@
 //! Handling of companion computers' setpoints, joysticks and RC overrides.
 
-use super::Dispatcher;
+use super::Comms;
 use afbc_flight_core::Stamped;
 use afbc_guidance::{AttitudeTarget, MotionTarget};
 use afbc_mavlink::{Address, Axes, ExternalTarget, PositionTarget};
@@ -9,7 +9,7 @@ use afbc_rc::SILENT_US;
 use afbc_types::Setpoint;
 use nalgebra::{Quaternion, UnitQuaternion};
 
-impl Dispatcher {
+impl Comms {
     /// Handles a complete setpoint.
     pub(super) fn setpoint(&mut self, setpoint: Setpoint, from: Address, inputs: &mut ControlInputs) {
         if self.may(from, inputs) {

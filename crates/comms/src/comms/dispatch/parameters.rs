@@ -1,6 +1,6 @@
 //! Handling of parameter requests, and who may change parameters.
 
-use super::{Dispatcher, ParameterTask, Reply};
+use super::{Comms, ParameterTask, Reply};
 use crate::services::commands::BUSY;
 use crate::services::texts::Words;
 use afbc_flight_core::Refusal;
@@ -8,7 +8,7 @@ use afbc_mavlink::{Address, Answer, MavSeverity, ParameterRequest, Storage};
 use afbc_onboard::ControlInputs;
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 
-impl Dispatcher {
+impl Comms {
     /// Queues a parameter request. For a station that is not in control, setting becomes reading: it is sent the old
     /// value.
     pub(super) fn parameter(&mut self, request: ParameterRequest, from: Address, inputs: &mut ControlInputs) {
@@ -16,7 +16,7 @@ impl Dispatcher {
             ParameterRequest::Set { name, .. } if !self.may(from, inputs) => ParameterRequest::ReadName(name),
             request => request,
         };
-        self.wishes.push_back(ParameterTask::Ask(request, from)).ok();
+        self.parameter_tasks.push_back(ParameterTask::Ask(request, from)).ok();
     }
 
     /// Answers MAV_CMD_PREFLIGHT_STORAGE. Loading and saving do nothing, since each change is stored and adopted at
@@ -25,7 +25,7 @@ impl Dispatcher {
         match storage {
             Storage::Load | Storage::Save => Answer::Accepted,
             Storage::Reset if self.status.mode.armed() => Answer::Refused(Refusal::AlreadyArmed as i32),
-            Storage::Reset if self.wishes.push_back(ParameterTask::Restore).is_err() => Answer::Refused(BUSY),
+            Storage::Reset if self.parameter_tasks.push_back(ParameterTask::Restore).is_err() => Answer::Refused(BUSY),
             Storage::Reset => Answer::Accepted,
         }
     }
@@ -33,7 +33,7 @@ impl Dispatcher {
     /// Handles queued parameter requests until one changes `table`. Returns that change.
     pub(crate) fn grant(&mut self, table: &mut ParameterTable) -> Option<RecordChange> {
         let disarmed = !self.status.mode.armed();
-        while let Some(wish) = self.wishes.pop_front() {
+        while let Some(wish) = self.parameter_tasks.pop_front() {
             let (change, refused) = match wish {
                 ParameterTask::Ask(request, from) => {
                     let heard = self.parameters.hear(request, table, disarmed);

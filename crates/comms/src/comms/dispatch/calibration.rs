@@ -1,6 +1,6 @@
 //! Handling of calibration commands.
 
-use super::{Dispatcher, ParameterTask};
+use super::{Comms, ParameterTask};
 use crate::services::calibration::{Calibrator, Step, name};
 use crate::services::commands::BUSY;
 use crate::services::texts::Words;
@@ -15,7 +15,7 @@ const DONE: &str = "[cal] calibration done: ";
 const FAILED: &str = "[cal] calibration failed: ";
 const CANCELLED: &str = "[cal] calibration cancelled";
 
-impl Dispatcher {
+impl Comms {
     /// Answers MAV_CMD_PREFLIGHT_CALIBRATION.
     pub(super) fn ask_calibration(&mut self, what: CalibrationRequest) -> Answer {
         let info = MavSeverity::MAV_SEVERITY_INFO;
@@ -41,7 +41,12 @@ impl Dispatcher {
     }
 
     /// Advances the calibration that a station has asked for.
-    pub(crate) fn calibrate(&mut self, calibrator: &mut Calibrator, sample: Option<RawSample>, table: &ParameterTable) {
+    pub(in crate::comms) fn advance_calibration(
+        &mut self,
+        calibrator: &mut Calibrator,
+        sample: Option<RawSample>,
+        table: &ParameterTable,
+    ) {
         let Some(what) = self.calibration.active else { return calibrator.stop() };
         if self.status.mode.armed() {
             return self.end_calibration(calibrator, Err("armed"));
@@ -54,7 +59,7 @@ impl Dispatcher {
                 // The value is set as if by a station: it is checked, stored, adopted and sent to all stations.
                 let kind = Kind::Real32.number();
                 let request = ParameterRequest::Set { name: name.to_bytes(), value: value.to_le_bytes(), kind };
-                self.wishes.push_back(ParameterTask::Ask(request, Address::default())).ok();
+                self.parameter_tasks.push_back(ParameterTask::Ask(request, Address::default())).ok();
             }
             Step::Finished => {
                 // The parameter service may have refused a value, so the table is checked.
