@@ -1,5 +1,5 @@
 //! Faults of the vehicle's own sensors inside the flight core, and their results. Compares the table of
-//! `docs/sensor-faults.md`, or writes it with `WRITE=1`.
+//! `docs/reference/sensor-faults.md`, or writes it with `WRITE=1`.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)] // a failed flight must stop the test
 
 use afbc::Profile;
@@ -12,7 +12,7 @@ use afbc_sim::flight::{LOST_DISTANCE_M, fly};
 use nalgebra::Vector3;
 use std::{env, fs, thread};
 
-const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/sensor-faults.md");
+const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/reference/sensor-faults.md");
 const BEGIN: &str = "<!-- sensor faults: tests/tests/sensor_faults.rs -->\n";
 const END: &str = "<!-- end -->\n";
 

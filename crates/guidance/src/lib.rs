@@ -1,8 +1,8 @@
 //! Guidance: turns flight modes, orders, targets and sticks into a setpoint for the control law.
 //!
 //! A station, a companion computer or a pilot selects a [flight mode](FlightMode) and gives [orders](Order), targets
-//! and sticks. Frames and units are those of [`afbc_types`]. Every mode, transition and failsafe is described in
-//! docs/modes.md.
+//! and sticks. Frames and units are those of [`afbc_types`]. docs/modes.md describes every mode and transition,
+//! docs/failsafes.md every failsafe.
 //!
 //! # Reading order
 //!

@@ -1,4 +1,4 @@
-//! The table of topics in `docs/ulog.md`. `WRITE=1 cargo test -p afbc-log --test page` writes it.
+//! The table of topics in `docs/reference/ulog-topics.md`. `WRITE=1 cargo test -p afbc-log --test page` writes it.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc_log::ulog::{LoggedField, LoggedTopic, TOPICS};
@@ -25,7 +25,7 @@ fn row(topic: &LoggedTopic) -> String {
 
 #[test]
 fn the_page_lists_every_topic() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/ulog.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/ulog-topics.md");
     let page = fs::read_to_string(&path).unwrap();
     let (before, rest) = page.split_once(BEGIN).unwrap();
     let (_, after) = rest.split_once(END).unwrap();
