@@ -1,6 +1,6 @@
 //! Single and combined faults of the server's vehicle: the end of the flight, the announcements, and the rules that
-//! hold at every tick. Compares the table of `docs/reference/safety.md`, or writes it with `WRITE=1`. `CASE=fence` shows
-//! the cases with that name only.
+//! hold at every tick. Compares the table of `docs/reference/safety.md`, or writes it with `WRITE=1`. `CASE=fence`
+//! shows the cases with that name only.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs)] // a failed flight stops it
 
 use crate::airborne::checker::End;

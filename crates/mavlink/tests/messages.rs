@@ -77,7 +77,7 @@ proptest! {
     }
 }
 
-/// Each direction carries exactly the messages that docs/station.md lists; a change must be made in both places.
+/// Each direction carries exactly the messages that docs/reference/mavlink.md lists; change both together.
 #[test]
 fn the_messages_are_these() {
     assert_eq!(

@@ -40,7 +40,7 @@ pub mod id {
     pub const CURRENT_MODE: u32 = 436;
 }
 
-/// Streams with their default intervals \[us\]; 0 for off. `docs/station.md` has the same list.
+/// Streams with their default intervals \[us\]; 0 for off. `docs/reference/mavlink.md` has the same list.
 pub const DEFAULTS: [(u32, u32); 23] = [
     (id::SYS_STATUS, 1_000_000),
     (id::SYSTEM_TIME, 1_000_000),
