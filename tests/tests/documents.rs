@@ -27,12 +27,15 @@ fn is_compared(root: &Path, text: &str, name: &str) -> bool {
 #[test]
 fn every_table_of_figures_is_compared_or_dated() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-    let mut pages: Vec<_> = fs::read_dir(root.join("docs")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let docs = root.join("docs");
+    let folders = [docs.clone(), docs.join("reference")];
+    let entries = folders.iter().flat_map(|folder| fs::read_dir(folder).unwrap());
+    let mut pages: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
     pages.extend(["README.md", "ARCHITECTURE.md"].map(|name| root.join(name)));
     pages.retain(|page| page.extension().is_some_and(|extension| extension == "md"));
     let mut tables = 0;
     for page in pages {
-        let name = page.file_name().unwrap().to_str().unwrap();
+        let name = page.strip_prefix(&docs).or_else(|_| page.strip_prefix(root)).unwrap().to_str().unwrap();
         let text = fs::read_to_string(&page).unwrap();
         for section in text.split("\n## ").filter(|section| section.lines().any(|line| line.contains("--:|"))) {
             let heading = section.lines().next().unwrap();
