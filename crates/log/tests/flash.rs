@@ -1,5 +1,5 @@
 //! Tests logs in flash that fills, fails, holds other data, or loses power while programming or erasing. The logs are
-//! read by the layout in docs/ulog.md and by the specification of ULog.
+//! read by the layout in docs/reference/black-box-storage.md and by the specification of ULog.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
 mod room;

@@ -131,7 +131,8 @@ impl LogStorage for FlashChip {
         self.sectors = (0..SECTORS.saturating_sub(free)).map(|sector| (sector, vec![0xA5; SECTOR])).collect();
     }
 
-    /// Follows the layout in docs/ulog.md: a sector begins with a page that names the log and the sector's part of it.
+    /// Follows the layout in docs/reference/black-box-storage.md: a sector begins with a page that names the log and
+    /// the sector's part of it.
     fn logs(&self) -> Result<Vec<(String, Vec<u8>)>, Box<dyn AnyError>> {
         let word = |sector: &[u8], at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|byte| sector[at + byte]));
         let pair = |sector: &[u8], at: usize, other: usize| {

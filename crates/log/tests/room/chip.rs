@@ -199,7 +199,7 @@ impl Storage for Chip {
     }
 }
 
-/// Returns the logs in these cells, as docs/ulog.md describes them.
+/// Returns the logs in these cells, as docs/reference/black-box-storage.md describes them.
 pub(crate) fn logs(cells: &[u8]) -> Vec<(String, Vec<u8>)> {
     let word = |sector: &[u8], at: usize| u32::from_le_bytes(sector[at..at + 4].try_into().unwrap());
     let pair = |sector: &[u8], at: usize, other: usize| {
