@@ -1,5 +1,5 @@
 //! Every declared parameter is listed in `docs/parameters.md`, with a name that fits ground stations and never changes.
-//! Parameters of scenario files are also listed in `docs/scenarios.md`.
+//! Parameters of scenario files are also listed in `docs/reference/scenario-keys.md`.
 //!
 //! `WRITE=1 cargo test -p flight-tests --test all parameters::` writes the first page, and the parameters' rows of the
 //! second.
@@ -232,7 +232,7 @@ fn keys(parameters: impl Declared) -> Vec<(&'static str, [String; 4])> {
     keys
 }
 
-/// Returns the declared keys of the sections of `docs/scenarios.md`, by heading.
+/// Returns the declared keys of the sections of `docs/reference/scenario-keys.md`, by heading.
 fn sections() -> BTreeMap<String, Vec<(&'static str, [String; 4])>> {
     let settings = Profile::Paper.settings();
     let named = [
@@ -281,7 +281,7 @@ fn with_declared_rows(page: &str) -> String {
     }
     for (heading, keys) in &mut sections {
         keys.retain(|(key, _)| !written.contains(&(heading.as_str(), *key)));
-        assert!(keys.is_empty(), "docs/scenarios.md, {heading}: no row for {keys:?}");
+        assert!(keys.is_empty(), "docs/reference/scenario-keys.md, {heading}: no row for {keys:?}");
     }
     lines.join("\n") + "\n"
 }
@@ -307,7 +307,7 @@ fn the_page_lists_what_is_declared() {
 
 #[test]
 fn scenario_keys_are_documented_as_declared() {
-    compare("scenarios.md", with_declared_rows);
+    compare("reference/scenario-keys.md", with_declared_rows);
 }
 
 #[test]

@@ -294,7 +294,7 @@ fn every_key_of_a_scenario_file_counts() {
                  barometer = { part = \"bmp388\" }\nmagnetometer = { part = \"qmc5883l\" }\n";
     let circle = "[trajectory]\nkind = \"circle\"\ncentre_m = [0, 0, 2]\nradius_m = 2.0\nacceleration_m_s2 = 1.0\n";
     let vehicle = "flight_core = true\n[vehicle]\nname = \"iris\"\n";
-    let page = examples(include_str!("../../../docs/scenarios.md"));
+    let page = examples(include_str!("../../../docs/reference/scenario-keys.md"));
     each_key_counts(page.into_iter().chain([&contenders, &gains, &truth, parts, circle, vehicle]), scenario_file);
 }
 

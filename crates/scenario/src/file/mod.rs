@@ -1,4 +1,4 @@
-//! Reads scenario files. `docs/scenarios.md` describes each key.
+//! Reads scenario files. `docs/reference/scenario-keys.md` describes each key.
 
 mod contenders;
 mod control;

@@ -1,4 +1,4 @@
-//! Compares the built-in scenarios with the code, and `docs/scenarios.md` with both.
+//! Compares the built-in scenarios with the code, and `docs/reference/scenario-keys.md` with both.
 
 #![expect(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
@@ -36,7 +36,7 @@ struct Section {
 }
 
 fn sections() -> Vec<Section> {
-    let page = include_str!("../../../../docs/scenarios.md");
+    let page = include_str!("../../../../docs/reference/scenario-keys.md");
     let mut sections = Vec::new();
     for part in page.split("```toml\n").skip(1) {
         let (example, text) = part.split_once("```").unwrap();
