@@ -112,7 +112,7 @@ fn the_firmware_knows_no_board() {
 #[test]
 fn the_wiring_is_what_the_board_uses() {
     for (board, page, heading, count) in [
-        ("stm32f405", "firmware.md", "\n## Wiring", 8),
+        ("stm32f405", "boards/stm32f405.md", "\n## Wiring", 8),
         ("stm32h743", "boards/stm32h743.md", "\n## Wiring", 42),
         ("pixracer", "boards/pixracer.md", "\n## Wiring", 44),
     ] {

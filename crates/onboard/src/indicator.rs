@@ -173,7 +173,7 @@ mod tests {
         [line(|signals| signals.led), line(|signals| signals.buzzer)]
     }
 
-    /// The patterns match the table of docs/firmware.md, in steps of 1/8 s.
+    /// The patterns match the table of docs/reference/firmware.md, in steps of 1/8 s.
     #[test]
     fn patterns_are_as_documented() {
         for (indication, led, once, again) in [

@@ -1,4 +1,4 @@
-//! Link, motors and watchdog of the STM32F405RG; `docs/firmware.md` shows the wiring.
+//! Link, motors and watchdog of the STM32F405RG; `docs/boards/stm32f405.md` shows the wiring.
 //!
 //! | what | where |
 //! |---|---|
