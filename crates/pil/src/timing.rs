@@ -1,6 +1,6 @@
 //! Computes the firmware's times on each board. Inputs are counted instructions, the cores' cycles per instruction, and
 //! transfers on the buses. The result is the worst response of each interrupt and task, in the tables of
-//! `docs/timing.md`.
+//! `docs/reference/timing-tables.md`.
 
 mod boards;
 mod bus;
@@ -123,7 +123,7 @@ const END: &str = "<!-- end -->\n";
 /// # Errors
 /// Fails if the page has no markers.
 pub fn page(text: &str, reports: &[BoardReport]) -> Result<String, Error> {
-    let unmarked = || Error::Protocol("docs/timing.md lacks the markers of the tables".into());
+    let unmarked = || Error::Protocol("docs/reference/timing-tables.md lacks the markers of the tables".into());
     let (before, rest) = text.split_once(BEGIN).ok_or_else(unmarked)?;
     let (_, after) = rest.split_once(END).ok_or_else(unmarked)?;
     let tables: Vec<_> = reports.iter().map(|report| report.text.as_str()).collect();

@@ -1,5 +1,5 @@
 //! Checks bus times against manual calculations, the boards against `firmware/boards/`, and the tables of
-//! `docs/timing.md`.
+//! `docs/reference/timing-tables.md`.
 #![allow(
     clippy::expect_used,
     clippy::indexing_slicing,
@@ -27,7 +27,7 @@ fn read(path: &str) -> String {
 
 #[test]
 fn the_page_has_the_tables() {
-    let text = read("docs/timing.md");
+    let text = read("docs/reference/timing-tables.md");
     let written = page(&text, &reports(&read("docs/budgets.md")).unwrap()).unwrap();
     assert_eq!(text, written, "cargo run --release -p pil --bin timing");
 }

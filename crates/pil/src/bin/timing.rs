@@ -1,5 +1,5 @@
-//! Computes the worst response times of every board and writes the tables of `docs/timing.md`; with `--check`, compares
-//! them. Fails if a response exceeds its deadline and is not known to, or is later than known.
+//! Computes the worst response times of every board and writes the tables of `docs/reference/timing-tables.md`; with
+//! `--check`, compares them. Fails if a response exceeds its deadline and is not known to, or is later than known.
 
 use pil::Error;
 use pil::timing::{page, reports};
@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 /// Page with the instruction counts, and page with the times.
 const BUDGETS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/budgets.md");
-const DOCUMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/timing.md");
+const DOCUMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reference/timing-tables.md");
 
 fn main() -> ExitCode {
     match run() {
@@ -31,7 +31,7 @@ fn run() -> Result<bool, Error> {
     if !std::env::args().any(|argument| argument == "--check") {
         std::fs::write(path, written)?;
     } else if written != text {
-        wrong.push("docs/timing.md has other tables; cargo run --release -p pil --bin timing writes them".into());
+        wrong.push(format!("{DOCUMENT} has other tables; cargo run --release -p pil --bin timing writes them"));
     }
     for wrong in &wrong {
         eprintln!("timing: {wrong}");
