@@ -3,7 +3,7 @@
 A step is one of 1 ms of a vehicle's physics, whatever the rate of control; a second is one of a processor, all threads
 added up, which other work on the machine does not change much. Of the others those are measured that are installed:
 `pip install rotorpy crazyflow` (Python 3.11 or later), and gym-pybullet-drones from its repository. Prints a table for
-docs/python.md.
+docs/reference/python-figures.md.
 """
 
 import os
