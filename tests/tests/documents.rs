@@ -27,8 +27,10 @@ fn is_compared(root: &Path, text: &str, name: &str) -> bool {
 #[test]
 fn every_table_of_figures_is_compared_or_dated() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-    let folders = ["docs", "docs/reference"].map(|name| fs::read_dir(root.join(name)).unwrap());
-    let mut pages: Vec<_> = folders.into_iter().flatten().map(|entry| entry.unwrap().path()).collect();
+    let docs = root.join("docs");
+    let folders = [docs.clone(), docs.join("reference")];
+    let entries = folders.iter().flat_map(|folder| fs::read_dir(folder).unwrap());
+    let mut pages: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
     pages.extend(["README.md", "ARCHITECTURE.md"].map(|name| root.join(name)));
     pages.retain(|page| page.extension().is_some_and(|extension| extension == "md"));
     let mut tables = 0;

@@ -1,5 +1,5 @@
-//! Flights on the vehicle's own estimate: its accuracy and its consistency in the closed loop. `docs/estimation.md`
-//! shows the figures; `--nocapture` prints them.
+//! Flights on the vehicle's own estimate: its accuracy and its consistency in the closed loop.
+//! `docs/reference/estimation.md` shows the figures; `--nocapture` prints them.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a failed flight must stop the test
 
 use afbc_plant::instruments::{Failure, InstrumentFault};

@@ -1,5 +1,5 @@
 //! Tests the law's memory of aerodynamic forces: a difference from the vehicle's file is learnt lap by lap. Compares
-//! the table of `docs/flight.md`, or writes it with `WRITE=1`.
+//! the table of `docs/reference/flight.md`, or writes it with `WRITE=1`.
 
 use afbc::Profile;
 use afbc_plant::{Environment, Motion, ParameterChange, Payload, PlantParameter, RotorFault};
@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use std::{env, fs};
 
 const LAPS: usize = 5;
-const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/flight.md");
+const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/reference/flight.md");
 const BEGIN: &str = "<!-- laps: written by WRITE=1 cargo test -p flight-tests --test all laps:: -->\n";
 const END: &str = "<!-- laps: end -->";
 

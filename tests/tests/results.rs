@@ -1,4 +1,4 @@
-//! The tables of docs/results.md agree with the code.
+//! The tables of docs/results.md and docs/reference/results.md agree with the code.
 
 use afbc_campaign::compare;
 use afbc_report::results;
@@ -6,6 +6,7 @@ use afbc_scenario::built_in;
 use afbc_sim::run::Run;
 
 const PAGE: &str = include_str!("../../docs/results.md");
+const REFERENCE: &str = include_str!("../../docs/reference/results.md");
 
 /// True if the figures differ by at most the last digit, or by 2 %, by which another host's rounding may change
 /// chatter.
@@ -18,7 +19,7 @@ fn agree(page: &str, code: &str) -> bool {
 
 #[test]
 fn the_results_page_is_what_the_code_does() {
-    let (_, page, _) = results::parts(PAGE).expect("both markers");
+    let (_, page, _) = results::parts(REFERENCE).expect("both markers");
     let scenarios = results::scenarios().expect("the paper's parameters are in range");
     let code = results::markdown(&results::fly(scenarios, &|| ()).expect("parameters in range"));
     assert_eq!(page.lines().count(), 2 + 9 * 2 * 2, "nine scenarios, two models, two laws");
@@ -27,7 +28,8 @@ fn the_results_page_is_what_the_code_does() {
         let cells = |line: &str| line.split('|').map(|cell| cell.trim().to_owned()).collect::<Vec<_>>();
         let (page, code) = (cells(page), cells(code));
         let same = page.len() == code.len() && page.iter().zip(&code).all(|(page, code)| agree(page, code));
-        assert!(same, "run `cargo run --release -- results --write docs/results.md`\npage {page:?}\ncode {code:?}");
+        let cure = "run `cargo run --release -- results --write docs/reference/results.md`";
+        assert!(same, "{cure}\npage {page:?}\ncode {code:?}");
     }
 }
 

@@ -1,4 +1,4 @@
-//! The costs of the flight gains, in the training and the held-out flights, are those in docs/tuning.md.
+//! The costs of the flight gains, in the training and the held-out flights, are those in docs/reference/tuning.md.
 
 use afbc::Profile;
 use afbc_scenario::contender::{Contender, ControllerKind};
@@ -12,7 +12,7 @@ fn found(kind: ControllerKind) -> Contender {
 
 #[test]
 fn the_gains_that_fly_cost_what_is_documented() {
-    let page = include_str!("../../docs/tuning.md");
+    let page = include_str!("../../docs/reference/tuning.md");
     let flights = [training().unwrap(), held_out().unwrap()];
     // Backstepping in this profile flies with AFBC's gains.
     let kinds: Vec<_> = ControllerKind::ALL.into_iter().filter(|kind| *kind != ControllerKind::Backstepping).collect();
@@ -45,7 +45,7 @@ fn the_gains_that_fly_cost_what_is_documented() {
         let costs: String = each_after.iter().map(|[training, _]| format!(" {:.2} |", training[index])).collect();
         expect(format!("| `{}` |", flight.name), costs);
     }
-    assert!(missing.is_empty(), "docs/tuning.md lacks these rows:\n{}", missing.join("\n"));
+    assert!(missing.is_empty(), "docs/reference/tuning.md lacks these rows:\n{}", missing.join("\n"));
 }
 
 /// Backstepping alone does not meet the conditions, since it does not adapt, and a Crazyflie's thrust falls with its
@@ -68,7 +68,7 @@ fn the_gains_that_fly_meet_every_condition() {
 /// documented cost. The documented cost of the paper's vehicle's gains, by rule, is checked too.
 #[test]
 fn every_vehicles_gains_cost_what_is_documented() {
-    let page = include_str!("../../docs/tuning.md");
+    let page = include_str!("../../docs/reference/tuning.md");
     let mut missing = Vec::new();
     for vehicle in BUILT_IN.iter().filter(|known| known.name != "paper").map(|known| known.read().unwrap()) {
         let flights = [training_on(&vehicle).unwrap(), held_out_on(&vehicle).unwrap()];
@@ -90,5 +90,5 @@ fn every_vehicles_gains_cost_what_is_documented() {
             }
         }
     }
-    assert!(missing.is_empty(), "docs/tuning.md lacks these rows:\n{}", missing.join("\n"));
+    assert!(missing.is_empty(), "docs/reference/tuning.md lacks these rows:\n{}", missing.join("\n"));
 }

@@ -98,10 +98,10 @@ fn each_class_is_drawn_within_its_bounds() {
     }
 }
 
-/// The page lists all classes with their properties.
+/// The page of tables lists all classes with their properties.
 #[test]
 fn the_page_has_every_class() {
-    let page = include_str!("../../../docs/suites.md");
+    let page = include_str!("../../../docs/reference/suites.md");
     for class in &CLASSES {
         let place = class.place.map_or("either", Venue::name);
         let known = if class.known { "yes" } else { "" };

@@ -1,4 +1,5 @@
-//! The results table of `docs/results.md`: the paper's flight in every reading, on both plant models, under both laws.
+//! The results table of `docs/reference/results.md`: the paper's flight in every reading, on both plant models, under
+//! both laws.
 
 use crate::markers;
 use afbc_plant::PlantModel;

@@ -1,4 +1,4 @@
-//! `sitl results`: makes the table of `docs/results.md`.
+//! `sitl results`: makes the table of `docs/reference/results.md`.
 
 use super::json::Json;
 use super::progress::Progress;
