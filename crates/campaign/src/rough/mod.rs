@@ -1,5 +1,5 @@
 //! The suite `rough-estimate` flies with sensor behaviour that the vehicle is not told of, and measures the quality of
-//! its estimate. `docs/suites.md` has the classes of behaviour.
+//! its estimate. `docs/reference/suites.md` has the classes of behaviour.
 //!
 //! A flight depends only on seed, vehicle, class and number. It is the same on every machine, whichever other flights
 //! are drawn.
