@@ -43,9 +43,9 @@ fn compared(name: &str, page: &str) {
         let (page, code) = (cells(page), cells(code));
         page.len() != code.len() || page.iter().zip(&code).any(|(page, code)| !agree(page, code))
     });
-    let page = if name == "field" { "suites" } else { name };
+    let file = if name == "field" { "suites" } else { name };
     let cure =
-        format!("run `cargo run --release -- compare --suite {name} --seeds 1 --write docs/reference/{page}.md`");
+        format!("run `cargo run --release -- compare --suite {name} --seeds 1 --write docs/reference/{file}.md`");
     assert_eq!(differ, None, "{cure}");
     assert_eq!(page.lines().count(), code.lines().count(), "{cure}");
 }
