@@ -281,9 +281,9 @@ impl Comms {
         })
     }
 
-    /// Returns a decoder for one of the vehicle's streams of bytes. Each stream has its own, because a frame continues in
-    /// later bytes of the same stream only. The stream does not count as [wired](Decoder::wired) unless the shell says
-    /// so.
+    /// Returns a decoder for one of the vehicle's streams of bytes. Each stream has its own, because a frame continues
+    /// in later bytes of the same stream only. The stream does not count as [wired](Decoder::wired) unless the shell
+    /// says so.
     pub fn decoder(&self) -> Decoder<Uplink> {
         Decoder::new(self.me)
     }

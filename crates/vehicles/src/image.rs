@@ -46,8 +46,8 @@ impl Vehicle {
             link: _,
         } = configuration;
         json!({
-            "parameters": parameters, "settings": settings, "gains": gains, "curve": curve, "response": response, "imu": imu,
-            "estimation": estimation, "arming": arming, "guidance": guidance,
+            "parameters": parameters, "settings": settings, "gains": gains, "curve": curve, "response": response,
+            "imu": imu, "estimation": estimation, "arming": arming, "guidance": guidance,
         })
     }
 }
