@@ -192,7 +192,8 @@ impl Machine for MatekH743 {
     const USB_STATUS: Option<u64> = Some(0x4008_0014);
 
     /// Revision Y returns wrong data when its AXI RAM handles two reads at once (ES0392: "Reading from AXI SRAM may
-    /// lead to data read corruption"). AXI_TARG7_FN_MOD limits the RAM to one read at a time. The models are of revision V.
+    /// lead to data read corruption"). AXI_TARG7_FN_MOD limits the RAM to one read at a time. The models are of
+    /// revision V.
     const EARLY_REVISION: Option<EarlyRevision> =
         Some(EarlyRevision { name: "STM32H743 revision Y", register: 0x5100_8108, value: 1 });
 
