@@ -7,8 +7,8 @@ use afbc_comms::services::health::sensor;
 use afbc_comms::services::origin::{EarthOrigin, Global};
 use afbc_comms::services::status::{GnssReceiver, SensorBits};
 use afbc_drivers::battery::{BatteryPins, BatteryScale};
-use afbc_drivers::{FixReading, MagneticReading, PressureReading};
-use afbc_estimator::Origin;
+use afbc_drivers::{GnssReading, MagneticReading, PressureReading};
+use afbc_estimator::GeodeticOrigin;
 use afbc_onboard::sensors::{FixFrame, field, height};
 use afbc_types::Stamped;
 use core::cell::RefCell;
@@ -58,7 +58,7 @@ pub fn put_field(reading: &Stamped<MagneticReading>, to_body: &Matrix3<f32>) {
 }
 
 /// Passes on a GNSS fix, or `None` for an epoch without a fix.
-pub fn put_fix(at_us: u64, fix: Option<FixReading>) {
+pub fn put_fix(at_us: u64, fix: Option<GnssReading>) {
     let receiver = fix.map_or(GnssReceiver::NO_FIX, |fix| GnssReceiver {
         kind: GnssReceiver::FIX_3D,
         satellites: fix.satellites,
@@ -69,7 +69,7 @@ pub fn put_fix(at_us: u64, fix: Option<FixReading>) {
     let mut frame = with(|known| known.frame).unwrap_or(FixFrame::NEW);
     let measured = fix.and_then(|fix| Some((fix, frame.measure(&fix)?)));
     let first = measured.filter(|(_, (_, is_first))| *is_first).map(|(fix, _)| fix);
-    let origin = first.and_then(|FixReading { latitude_deg, longitude_deg, altitude_m, .. }| {
+    let origin = first.and_then(|GnssReading { latitude_deg, longitude_deg, altitude_m, .. }| {
         EarthOrigin::new(Global { latitude_deg, longitude_deg, altitude_m })
     });
     let _ = with(|known| {
@@ -86,7 +86,7 @@ pub fn put_fix(at_us: u64, fix: Option<FixReading>) {
 }
 
 /// Returns the origin of the local frame, once a first fix has set it.
-pub(crate) fn frame_origin() -> Option<Origin> {
+pub(crate) fn frame_origin() -> Option<GeodeticOrigin> {
     with(|known| known.frame.origin()).flatten()
 }
 

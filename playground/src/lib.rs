@@ -2,13 +2,13 @@
 //! `sitl fly`, with bit-identical results.
 
 use afbc::Profile;
-use afbc_serve::page::Cockpit;
 use afbc_scenario::{BUILT_IN, Scenario, built_in};
+use afbc_serve::page::Cockpit;
 use afbc_serve::{Server, Then, TimeFlow, TimeRate, fleet};
 use afbc_sim::LogRate;
 use afbc_sim::columns::{ESTIMATE, MOTION};
 use afbc_sim::flight::Sample;
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use serde_json::json;
 use wasm_bindgen::prelude::*;
 
@@ -119,7 +119,7 @@ pub fn fly(scenario: &str, law: &str) -> Result<FlightLog, JsError> {
     scenario.choose(&[law.to_owned()]).map_err(|error| JsError::new(&error.to_string()))?;
     let contender = scenario.contenders.first().ok_or_else(|| JsError::new("nothing flies"))?;
     let every = LogRate::usual(scenario.duration_s).steps(&scenario, contender).map_err(|it| JsError::new(&it))?;
-    let run = Run::fly(&scenario, contender, every).map_err(|error| JsError::new(&format!("{error:?}")))?;
+    let run = FlightResult::fly(&scenario, contender, every).map_err(|error| JsError::new(&format!("{error:?}")))?;
     let rotors = scenario.rotors.len();
     let mut names: Vec<String> = MOTION.iter().map(|(name, _)| (*name).to_owned()).collect();
     names.extend((1..=rotors).map(|rotor| format!("omega{rotor}_rad_s")));

@@ -7,7 +7,7 @@ use crate::scenario::{ScenarioArgument, asked};
 use crate::vehicle::VehicleArgument;
 use crate::work::in_slices;
 use afbc_scenario::Scenario;
-use afbc_sim::flight::{View, World};
+use afbc_sim::flight::{World, WorldView};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
@@ -28,12 +28,12 @@ const SLICE: usize = 20_000;
 #[pyclass(name = "Batch", module = "afbc")]
 pub(crate) struct PyBatch {
     scenario: Scenario,
-    worlds: Vec<(World, View)>,
+    worlds: Vec<(World, WorldView)>,
     dt_s: f64,
 }
 
 impl PyBatch {
-    fn begin(&self, seed: u64) -> PyResult<(World, View)> {
+    fn begin(&self, seed: u64) -> PyResult<(World, WorldView)> {
         start(&Scenario { seed, ..self.scenario.clone() }, self.dt_s)
     }
 
@@ -42,7 +42,7 @@ impl PyBatch {
         &self,
         py: Python<'py>,
         width: usize,
-        row: impl Fn(&(World, View)) -> Vec<f64>,
+        row: impl Fn(&(World, WorldView)) -> Vec<f64>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let numbers: Vec<f64> = self.worlds.iter().flat_map(row).collect();
         PyArray1::from_vec(py, numbers).reshape([self.worlds.len(), width])
@@ -138,7 +138,7 @@ impl PyBatch {
     /// True states in double precision, shape (count, 12).
     #[getter]
     fn true_states<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, STATE, |(_, View { motion, .. })| {
+        self.rows(py, STATE, |(_, WorldView { motion, .. })| {
             let parts = [&motion.position_m, &motion.velocity_m_s, &motion.attitude_rad, &motion.rates_rad_s];
             parts.into_iter().flat_map(|part| part.iter().copied()).collect()
         })
@@ -147,7 +147,7 @@ impl PyBatch {
     /// References, shape (count, 10): position, velocity, acceleration, heading.
     #[getter]
     fn references<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, REFERENCE, |(_, View { reference, .. })| {
+        self.rows(py, REFERENCE, |(_, WorldView { reference, .. })| {
             let parts = [&reference.position_m, &reference.velocity_m_s, &reference.acceleration_m_s2];
             let numbers = parts.into_iter().flat_map(|part| part.iter().copied());
             numbers.chain([reference.yaw_rad]).collect()

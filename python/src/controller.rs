@@ -10,7 +10,8 @@ use afbc_control::{Action, FlightController, Trace, Validated};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::{AnyController, AnyControllerMemory};
 use afbc_types::{
-    Axis, Declaration, Declared, Inputs, PLUS, Parameters, PerAxis, ROTORS_MAX, Rotor, Value, ValueMut, with_rotors,
+    Axis, Declaration, Declared, DeclaredValue, DeclaredValueMut, Inputs, PLUS, Parameters, PerAxis, ROTORS_MAX, Rotor,
+    with_rotors,
 };
 use afbc_vehicles::Vehicle;
 use core::convert::Infallible;
@@ -250,7 +251,7 @@ pub(crate) fn made(
 /// Returns the gains of a contender by name.
 pub(crate) fn gains(contender: &Contender) -> Vec<(String, f64)> {
     let mut gains = Vec::new();
-    let Ok(()) = contender.law.visit(&mut |declaration: &Declaration, value: Value<'_>| {
+    let Ok(()) = contender.law.visit(&mut |declaration: &Declaration, value: DeclaredValue<'_>| {
         gains.extend(value.numbers().map(|number| (full(declaration), number)));
         Ok::<(), Infallible>(())
     });
@@ -268,8 +269,8 @@ fn full(declaration: &Declaration) -> String {
 /// Sets a gain by name.
 fn set(contender: &mut Contender, name: &str, value: f64) -> PyResult<()> {
     let (mut found, mut known) = (false, Vec::new());
-    let Ok(()) = contender.law.visit_mut(&mut |declaration: &Declaration, of: ValueMut<'_>| {
-        if let ValueMut::Single([gain]) = of {
+    let Ok(()) = contender.law.visit_mut(&mut |declaration: &Declaration, of: DeclaredValueMut<'_>| {
+        if let DeclaredValueMut::Single([gain]) = of {
             if full(declaration) == name {
                 *gain = value as f32;
                 found = true;

@@ -11,9 +11,9 @@ use afbc_report::flights;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
 use afbc_sim::LogRate;
-use afbc_sim::flown::Flown;
+use afbc_sim::flown::ScenarioFlight;
 use afbc_sim::metrics::{Metrics, SETTLED_S};
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use numpy::{PyArray1, ToPyArray};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
@@ -27,7 +27,7 @@ pub(crate) struct PyFlight {
     told: Told,
     /// The flight itself, whose log is converted to columns when they are asked for; none if `pickle` restored the
     /// columns.
-    flown: Option<Flown>,
+    flown: Option<ScenarioFlight>,
     columns: PyOnceLock<Py<PyDict>>,
 }
 
@@ -41,8 +41,8 @@ type Told = (String, String, usize, Option<When>, Option<When>, Vec<Figure>);
 type Reduced<'py> = (Bound<'py, PyAny>, (Told, Bound<'py, PyDict>));
 
 impl PyFlight {
-    fn of(flown: Flown) -> Self {
-        let Flown { scenario, run } = &flown;
+    fn of(flown: ScenarioFlight) -> Self {
+        let ScenarioFlight { scenario, run } = &flown;
         let lost = run.lost.map(|lost| (lost.time_s, lost.reason.to_owned()));
         let tripped = run.tripped.map(|tripped| (tripped.time_s, tripped.reason.to_owned()));
         let figures = named(&run.metrics).into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
@@ -191,8 +191,9 @@ fn chosen(controllers: Option<&Given<'_, Vec<String>>>) -> PyResult<Option<Vec<S
 }
 
 /// Flies one flight, unless the work is interrupted.
-fn flown(scenario: &Scenario, contender: &Contender, log_every: u64, watch: &Watch) -> Result<Run, String> {
-    let run = Run::fly_unless(scenario, contender, log_every, || watch.is_over()).map_err(|error| error.to_string())?;
+fn flown(scenario: &Scenario, contender: &Contender, log_every: u64, watch: &Watch) -> Result<FlightResult, String> {
+    let run = FlightResult::fly_unless(scenario, contender, log_every, || watch.is_over())
+        .map_err(|error| error.to_string())?;
     if watch.is_over() {
         return Err("interrupted".into());
     }
@@ -230,7 +231,7 @@ pub(crate) fn fly<'py>(
     let flights = watched(py, argument::threads(threads.as_ref())?, progress.as_ref(), |watch| {
         let fly = |contender| {
             let run = flown(&scenario, contender, rate.steps(&scenario, contender)?, watch)?;
-            Ok::<_, String>(Flown { scenario: scenario.clone(), run })
+            Ok::<_, String>(ScenarioFlight { scenario: scenario.clone(), run })
         };
         scenario.contenders.par_iter().map(fly).collect::<Result<Vec<_>, _>>()
     })?;
@@ -246,7 +247,7 @@ struct Outcome<'a> {
     scenario: &'a str,
     contender: &'a str,
     seed: u64,
-    run: Run,
+    run: FlightResult,
 }
 
 /// A planned flight of a comparison: scenario, contender and seed.

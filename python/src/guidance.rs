@@ -7,7 +7,9 @@ use crate::motion::{PySetpoint, vector};
 use crate::plant::{StateArgument, step_s};
 use crate::vehicle::{VehicleArgument, flown};
 use afbc_flight_core::{Mode, Ticketed};
-use afbc_guidance::{FailedSensors, FlightMode, Guidance, GuidanceInputs, Guided, Lift, Order, Orders, Sticks};
+use afbc_guidance::{
+    AvailableThrust, FailedSensors, FlightMode, Guidance, GuidanceInputs, GuidanceOutputs, Order, Orders, Sticks,
+};
 use afbc_types::Stamped;
 use pyo3::prelude::*;
 
@@ -33,10 +35,10 @@ const FLYING: [(&str, Mode); 4] = [
 pub(crate) struct PyGuidance {
     guidance: Guidance,
     orders: Orders,
-    lift: Lift,
+    lift: AvailableThrust,
     dt_s: f64,
     now_us: u64,
-    guided: Option<Guided>,
+    guided: Option<GuidanceOutputs>,
 }
 
 impl PyGuidance {
@@ -58,7 +60,7 @@ impl PyGuidance {
         let dt_s = step_s(&dt_s)?;
         let vehicle = flown(vehicle.as_ref())?;
         let mass_kg = vehicle.parameters.mass_kg;
-        let lift = Lift {
+        let lift = AvailableThrust {
             most_m_s2: (vehicle.rotors.len() as f64 * vehicle.force_max_n / mass_kg) as f32,
             gravity_m_s2: vehicle.parameters.gravity_m_s2 as f32,
             given_m_s2: None,
@@ -159,7 +161,10 @@ impl PyGuidance {
             rested,
             battery: None,
             sensors: FailedSensors::default(),
-            lift: Lift { given_m_s2: thrust_m_s2.map(|thrust_m_s2| thrust_m_s2 as f32), ..self.lift },
+            available_thrust: AvailableThrust {
+                given_m_s2: thrust_m_s2.map(|thrust_m_s2| thrust_m_s2 as f32),
+                ..self.lift
+            },
         };
         let guided = self.guidance.tick(&inputs, &self.orders);
         self.orders.given.pop_front();

@@ -5,7 +5,7 @@ use crate::error::error;
 use crate::plant::{PyPlant, step_s};
 use crate::scenario::{ScenarioArgument, asked};
 use crate::vehicle::VehicleArgument;
-use afbc_plant::Instruments;
+use afbc_plant::SimulatedInstruments;
 use afbc_plant::instruments::ImuReading;
 use nalgebra::Vector3;
 use numpy::{PyArray1, ToPyArray};
@@ -16,7 +16,7 @@ use pyo3::types::{PyDict, PyList};
 /// receiver, barometer and magnetometer, as far as it has them. They can measure any plant.
 #[pyclass(name = "Instruments", module = "afbc")]
 pub(crate) struct PyInstruments {
-    instruments: Instruments,
+    instruments: SimulatedInstruments,
 }
 
 fn three<'py>(py: Python<'py>, vector: &Vector3<f64>) -> Bound<'py, PyArray1<f64>> {

@@ -8,7 +8,7 @@ use crate::vehicle::VehicleArgument;
 use afbc_control::Settings;
 use afbc_plant::{Motion, Truth};
 use afbc_scenario::Scenario;
-use afbc_sim::flight::{View, World};
+use afbc_sim::flight::{World, WorldView};
 use afbc_types::{ROTORS_MAX, RotorSpeeds};
 use nalgebra::SVector;
 use numpy::{PyArray1, ToPyArray};
@@ -20,7 +20,7 @@ use pyo3::prelude::*;
 pub(crate) struct PyPlant {
     scenario: Scenario,
     world: World,
-    view: View,
+    view: WorldView,
     dt_s: f64,
 }
 
@@ -35,7 +35,7 @@ pub(crate) fn step_s(dt_s: &Given<'_, f64>) -> PyResult<f64> {
 }
 
 /// Returns the world of `scenario` and its first observation.
-pub(crate) fn start(scenario: &Scenario, dt_s: f64) -> PyResult<(World, View)> {
+pub(crate) fn start(scenario: &Scenario, dt_s: f64) -> PyResult<(World, WorldView)> {
     let mut world = World::new(scenario, dt_s).map_err(error)?;
     let view = world.look();
     Ok((world, view))

@@ -12,7 +12,7 @@ use afbc_scenario::Scenario;
 use afbc_scenario::case::Case;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::paper::scenario;
-use afbc_sim::flight::{LawOnly, Pilot, World, fly};
+use afbc_sim::flight::{FlightSoftware, LawOnly, World, fly};
 use afbc_types::{Parameters, RotorSpeeds, Setpoint, State};
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};

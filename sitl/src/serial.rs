@@ -1,7 +1,7 @@
 //! Board connected to a serial port.
 
 use afbc_hil::{Autopilot, Error, Station};
-use afbc_mavlink::Command;
+use afbc_mavlink::VehicleCommand;
 use serialport::SerialPort;
 use std::io;
 use std::thread;
@@ -77,7 +77,7 @@ impl Drop for Serial {
     fn drop(&mut self) {
         let mut station = Station::new();
         // Kill, since a vehicle refuses to disarm in the air.
-        (0..FAREWELLS).for_each(|_| station.command(Command::Kill));
+        (0..FAREWELLS).for_each(|_| station.command(VehicleCommand::Kill));
         // A failure can no longer be reported. A vehicle without states descends by itself.
         let _ = self.port.write_all(&station.take());
         let _ = self.port.flush();

@@ -2,7 +2,7 @@
 //! numbers below 1.2e-38 are subnormal, and many processors take a hundred times as long to compute with them.
 
 use afbc::integral::IntegralBackstepping;
-use afbc::monitor::Bounds;
+use afbc::monitor::MonitorBounds;
 use afbc::{Adaptive, Backstepping, Controller, Guarded, Profile};
 use afbc_control::{FlightController, Settings, Trace, Validated};
 use afbc_laws::{Dfbc, Geometric, Indi, L1, Pid, dfbc, geometric, indi, l1, pid};
@@ -162,11 +162,11 @@ fn integral_backstepping() {
 fn monitor() {
     let (vehicle, gains, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.gains(), Profile::Flight.settings());
     let guarded = |bounds| Guarded::new(vehicle, settings, gains, bounds).unwrap();
-    let bounds = Bounds::new(&gains, &vehicle, &settings);
+    let bounds = MonitorBounds::new(&gains, &vehicle, &settings);
     leaves_nothing_subnormal("under its monitor", &guarded(bounds));
-    let hasty = Bounds { error: PerAxis { z: 0.01, ..bounds.error }, ..bounds };
+    let hasty = MonitorBounds { error: PerAxis { z: 0.01, ..bounds.error }, ..bounds };
     leaves_nothing_subnormal("under a hasty monitor", &guarded(hasty));
-    let lax = Bounds { error: PerAxis::from_fn(|_| 1e9), ..bounds };
+    let lax = MonitorBounds { error: PerAxis::from_fn(|_| 1e9), ..bounds };
     leaves_nothing_subnormal("under a lax monitor", &guarded(lax));
 }
 

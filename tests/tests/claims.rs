@@ -9,13 +9,16 @@ use afbc_scenario::contender::ControllerKind;
 use afbc_scenario::paper::scenario;
 use afbc_scenario::trajectory::Trajectory;
 use afbc_sim::flight::Sample;
-use afbc_sim::flown::Flown;
+use afbc_sim::flown::ScenarioFlight;
 use afbc_sim::metrics::{self, Metrics};
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use nalgebra::{Vector3, Vector4};
 
-fn fly_both(scenario: &Scenario) -> Vec<Flown> {
-    let fly = |contender| Flown { scenario: scenario.clone(), run: Run::fly(scenario, contender, 10).unwrap() };
+fn fly_both(scenario: &Scenario) -> Vec<ScenarioFlight> {
+    let fly = |contender| ScenarioFlight {
+        scenario: scenario.clone(),
+        run: FlightResult::fly(scenario, contender, 10).unwrap(),
+    };
     scenario.contenders.iter().map(fly).collect()
 }
 
@@ -33,7 +36,7 @@ fn below(a: Vector4<f64>, b: Vector4<f64>) -> bool {
 }
 
 /// Returns the mean and largest |error| over the last 5 s.
-fn late(run: &Run) -> (Vector4<f64>, Vector4<f64>) {
+fn late(run: &FlightResult) -> (Vector4<f64>, Vector4<f64>) {
     let late = run.log.iter().filter(|sample| sample.time_s >= 55.0);
     let errors: Vec<_> = late.map(|sample| metrics::tracking_error(sample).abs()).collect();
     let largest = errors.iter().fold(Vector4::zeros(), |largest: Vector4<f64>, error| largest.sup(error));
@@ -44,7 +47,7 @@ fn late(run: &Run) -> (Vector4<f64>, Vector4<f64>) {
 #[test]
 fn the_flights_bear_the_claims_out() {
     for scenario in readings() {
-        let [afbc, baseline] = <[Flown; 2]>::try_from(fly_both(&scenario)).unwrap().map(|flown| flown.run);
+        let [afbc, baseline] = <[ScenarioFlight; 2]>::try_from(fly_both(&scenario)).unwrap().map(|flown| flown.run);
         let case = scenario.case.unwrap();
         let place = format!("{} {case:?}", scenario.model.name());
         assert_eq!((afbc.lost, baseline.lost), (None, None), "{place}");
@@ -94,13 +97,13 @@ fn the_claims_as_reported_hold() {
 #[test]
 fn a_claim_falls_with_its_figures() {
     let honest = fly_both(&scenario(PlantModel::Simplified, Case::DEFAULT).unwrap());
-    let holds = |change: &dyn Fn(&mut Run, &Run)| {
+    let holds = |change: &dyn Fn(&mut FlightResult, &FlightResult)| {
         let mut flown = honest.clone();
         change(&mut flown[0].run, &honest[1].run);
         claims(&flown).iter().map(|claim| claim.holds).collect::<Vec<_>>()
     };
     // Adds an error along one axis during the last 5 s, as a share of the error that backstepping has there.
-    let left = |run: &mut Run, baseline: &Run, axis: usize, share: f64| {
+    let left = |run: &mut FlightResult, baseline: &FlightResult, axis: usize, share: f64| {
         let late = |sample: &&Sample| sample.time_s >= 55.0;
         let kept: Vec<f64> = baseline.log.iter().filter(late).map(|s| metrics::tracking_error(s)[axis].abs()).collect();
         let error = share * kept.iter().sum::<f64>() / kept.len() as f64;
@@ -118,7 +121,7 @@ fn a_claim_falls_with_its_figures() {
         assert_eq!(holds(&|a, b| left(a, b, axis, VANISHED - 0.01)), [true, true, true]);
         assert_eq!(holds(&|a, b| a.metrics.rmse[axis] = b.metrics.rmse[axis] * 1.01), [true, false, true]);
         assert_eq!(holds(&|a, _| a.metrics.rmse[axis] = f64::NAN), [true, false, true]);
-        let smoother = |a: &mut Run, b: &Run| {
+        let smoother = |a: &mut FlightResult, b: &FlightResult| {
             a.metrics.mean_abs_delta_u[axis] = b.metrics.mean_abs_delta_u[axis] * 0.99;
         };
         assert_eq!(holds(&smoother), [true, true, false]);
@@ -154,7 +157,8 @@ fn backstepping_keeps_an_offset_of_the_gust_over_one_plus_both_gains() {
             Gust { axis: afbc_types::Axis::X, kind: GustKind::Acceleration, size, start_s: 1.0, end_s: f64::INFINITY };
         scenario.environment = Environment::new(scenario.vehicle, vec![], vec![gust]).unwrap();
 
-        let run = Run::fly(&scenario, scenario.contender(ControllerKind::Backstepping).unwrap(), u64::MAX).unwrap();
+        let run =
+            FlightResult::fly(&scenario, scenario.contender(ControllerKind::Backstepping).unwrap(), u64::MAX).unwrap();
         let offset = size / (1.0 + 1.0 * 2.0);
         // The vehicle holds its height, so the thrust is the weight divided by the cosine of the tilt, as (40) assumes,
         // and g tan(theta) is u5. Only rounding remains: that of f32 positions of 1 m (6e-8) times alpha_1 alpha_2. The
@@ -164,7 +168,7 @@ fn backstepping_keeps_an_offset_of_the_gust_over_one_plus_both_gains() {
         assert!(error.y.abs() < 1e-6 && error.w.abs() < 1e-6, "{error}");
 
         // AFBC keeps no error, since adaptation removes it. After 39 s the error is below a twentieth of the offset.
-        let run = Run::fly(&scenario, scenario.contender(ControllerKind::Afbc).unwrap(), u64::MAX).unwrap();
+        let run = FlightResult::fly(&scenario, scenario.contender(ControllerKind::Afbc).unwrap(), u64::MAX).unwrap();
         assert!(run.metrics.final_error.x.abs() < 0.05 * offset.abs(), "{} m of {offset} m", run.metrics.final_error.x);
     }
 }

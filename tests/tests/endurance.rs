@@ -1,14 +1,14 @@
 //! Ten hours of hover with noise: the estimates of the profile `flight` stay bounded; those of the law as printed
 //! drift.
 
-use afbc::{Adaptive, AdaptiveEstimate, Cascade, Controller, Profile};
+use afbc::{Adaptive, AdaptiveEstimate, CascadeMemory, Controller, Profile};
 use afbc_control::{FlightController, Validated};
 use afbc_plant::sensors::Deviations;
 use afbc_plant::{Environment, Motion, Plant, PlantModel, Realism, Rotors, Sensing, StateSensor};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::{Scenario, built_in};
 use afbc_sim::flight::Sample;
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint};
 use nalgebra::Vector3;
 
@@ -18,7 +18,7 @@ const HOUR: u64 = 3_600_000;
 /// A hover at 2 m with a rotor lag of 20 ms, at most 3 N per rotor, and noise of 0.001 on every state.
 struct Hover {
     controller: Controller<Adaptive>,
-    memory: Validated<Cascade<AdaptiveEstimate>>,
+    memory: Validated<CascadeMemory<AdaptiveEstimate>>,
     plant: Plant,
     sensors: StateSensor,
     setpoint: Setpoint,
@@ -107,7 +107,7 @@ fn estimates_of_the_law_as_printed_drift_until_the_vehicle_is_lost() {
 fn the_printed_hover_is_lost_upwards_and_level() {
     let mut scenario = Scenario { duration_s: 300.0, ..built_in("hover").unwrap().read().unwrap() };
     scenario.contenders = ControllerKind::PAPER.map(|kind| Contender::of(kind, Profile::Paper)).to_vec();
-    let fly = |kind| Run::fly(&scenario, scenario.contender(kind).unwrap(), 7).unwrap();
+    let fly = |kind| FlightResult::fly(&scenario, scenario.contender(kind).unwrap(), 7).unwrap();
     let run = fly(ControllerKind::Afbc);
     let (lost, last) = (run.lost.unwrap(), run.log.last().unwrap());
     let reported = format!(

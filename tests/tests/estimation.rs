@@ -2,12 +2,12 @@
 //! `docs/reference/estimation.md` shows the figures; `--nocapture` prints them.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a failed flight must stop the test
 
-use afbc_plant::instruments::{Failure, InstrumentFault};
+use afbc_plant::instruments::{FailureKind, InstrumentFault};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::trajectory::Trajectory;
 use afbc_scenario::{Outage, Scenario, built_in};
-use afbc_sim::flight::{Estimated, Sample, World, fly};
-use afbc_sim::metrics::{Accumulator, Aid, EstimateMetrics, Metrics, SETTLED_S};
+use afbc_sim::flight::{EstimateErrors, Sample, World, fly};
+use afbc_sim::metrics::{Accumulator, AidSource, EstimateMetrics, Metrics, SETTLED_S};
 use nalgebra::{Vector3, Vector4};
 
 fn scenario(name: &str) -> Scenario {
@@ -93,7 +93,7 @@ fn outdoors() {
 
 /// Returns results of a hover in which the tracker fails for `gap_s`: the largest distance from the reference, and the
 /// largest changes of the inputs per step before the failure and after the tracker's return.
-fn without_tracker(failure: Failure, gap_s: f64, seed: u64) -> (f64, f64, f64) {
+fn without_tracker(failure: FailureKind, gap_s: f64, seed: u64) -> (f64, f64, f64) {
     let mut scenario = scenario("mocap");
     let position_m = Vector3::new(0.0, 0.0, 2.0);
     scenario.trajectory = Trajectory::Hover { position_m, yaw_rad: 0.0 };
@@ -121,7 +121,7 @@ fn without_tracker(failure: Failure, gap_s: f64, seed: u64) -> (f64, f64, f64) {
 
 #[test]
 fn the_tracker_is_gone_in_hover() {
-    let (lost, frozen) = (Failure::TrackerLost, Failure::TrackerFrozen);
+    let (lost, frozen) = (FailureKind::TrackerLost, FailureKind::TrackerFrozen);
     for (failure, gap_s, most_m) in [(lost, 1.0, 0.2), (lost, 3.0, 1.5), (frozen, 3.0, 1.5)] {
         let flights: Vec<_> = (1..=20).map(|seed| without_tracker(failure, gap_s, seed)).collect();
         let far_m = flights.iter().fold(0.0_f64, |far_m, flight| far_m.max(flight.0));
@@ -135,7 +135,7 @@ fn the_tracker_is_gone_in_hover() {
         assert!(far_m <= most_m, "{gap_s} s: {far_m} m");
         // A frozen pose is believed for 0.2 s against the inertial sensor. The vehicle is 0.4 m off by then and flies
         // back faster than after a lost tracker.
-        let most = if matches!(failure, Failure::TrackerFrozen) { 0.35 } else { 1.2 * before };
+        let most = if matches!(failure, FailureKind::TrackerFrozen) { 0.35 } else { 1.2 * before };
         assert!(after <= most, "{gap_s} s: {after} N after {before} N");
     }
 }
@@ -144,11 +144,11 @@ fn the_tracker_is_gone_in_hover() {
 /// gets none.
 #[test]
 fn a_tracker_gone_for_good_is_admitted() {
-    admitted(Failure::TrackerLost);
-    admitted(Failure::TrackerFrozen);
+    admitted(FailureKind::TrackerLost);
+    admitted(FailureKind::TrackerFrozen);
 }
 
-fn admitted(failure: Failure) {
+fn admitted(failure: FailureKind) {
     let mut scenario = scenario("mocap");
     scenario.instrument_faults = vec![InstrumentFault { failure, start_s: 1.0, end_s: f64::INFINITY, rise_s: 0.0 }];
     let mut world = World::new(&scenario, 0.001).unwrap();
@@ -248,7 +248,7 @@ fn shaken_twice_as_much() {
 #[test]
 fn the_same_flight_twice() {
     let estimates = || {
-        let mut all: Vec<Estimated> = Vec::new();
+        let mut all: Vec<EstimateErrors> = Vec::new();
         let scenario = Scenario { duration_s: 2.0, ..scenario("outdoor") };
         flown(&scenario, |sample| all.extend(sample.estimated));
         all
@@ -266,7 +266,7 @@ struct Consistency {
     /// Squared error divided by the variance of attitude, velocity and position, for each coordinate, at these times.
     ratios: [Vector3<f64>; 3],
     /// For each aid: sum of normalised innovations squared, number of scalars, number of rejected measurements.
-    nis: [(f64, u64, u64); Aid::ALL.len()],
+    nis: [(f64, u64, u64); AidSource::ALL.len()],
 }
 
 const FLIGHTS: u64 = 100;
@@ -298,15 +298,17 @@ fn monte_carlo(scenario: &Scenario) -> Consistency {
     for (name, ratio) in ["attitude", "velocity", "position"].iter().zip(&sum.ratios) {
         println!("  {name}: squared error over variance {:.2?}", ratio.as_slice());
     }
-    for (aid, (nis, scalars, rejected)) in Aid::ALL.iter().zip(&sum.nis).filter(|(_, (_, scalars, _))| *scalars > 0) {
+    for (aid, (nis, scalars, rejected)) in
+        AidSource::ALL.iter().zip(&sum.nis).filter(|(_, (_, scalars, _))| *scalars > 0)
+    {
         println!("  {aid:?}: NIS per scalar {:.3} of {scalars}, rejected {rejected}", nis / *scalars as f64);
     }
     sum
 }
 
 impl Consistency {
-    fn nis(&self, aid: Aid) -> f64 {
-        let (sum, scalars, _) = self.nis[Aid::ALL.iter().position(|one| *one == aid).unwrap()];
+    fn nis(&self, aid: AidSource) -> f64 {
+        let (sum, scalars, _) = self.nis[AidSource::ALL.iter().position(|one| *one == aid).unwrap()];
         sum / scalars as f64
     }
 }
@@ -323,7 +325,7 @@ fn consistent_indoors() {
     for (nees, time_s) in found.nees.iter().zip(TIMES_S) {
         assert!(is_consistent(*nees, 9.0), "{nees} at {time_s} s");
     }
-    for aid in [Aid::TrackerPosition, Aid::TrackerAttitude] {
+    for aid in [AidSource::TrackerPosition, AidSource::TrackerAttitude] {
         assert!((0.9..1.05).contains(&found.nis(aid)), "{aid:?}: {}", found.nis(aid));
     }
 }
@@ -346,10 +348,18 @@ fn consistent_outdoors() {
         assert!(found.nees.iter().all(|nees| (6.0..most).contains(nees)), "{name}: {:?}", found.nees);
         assert!(found.ratios.iter().all(|ratio| ratio.max() <= 1.3), "{name}: {:?}", found.ratios);
         // 95 % bounds for 21 000 scalars.
-        assert!((0.981..1.019).contains(&found.nis(Aid::GnssPosition)), "{name}: {}", found.nis(Aid::GnssPosition));
-        assert!((0.9..1.019).contains(&found.nis(Aid::GnssVelocity)), "{name}: {}", found.nis(Aid::GnssVelocity));
-        assert!((0.98..height).contains(&found.nis(Aid::Height)), "{name}: {}", found.nis(Aid::Height));
-        assert!((0.7..1.019).contains(&found.nis(Aid::Heading)), "{name}: {}", found.nis(Aid::Heading));
+        assert!(
+            (0.981..1.019).contains(&found.nis(AidSource::GnssPosition)),
+            "{name}: {}",
+            found.nis(AidSource::GnssPosition)
+        );
+        assert!(
+            (0.9..1.019).contains(&found.nis(AidSource::GnssVelocity)),
+            "{name}: {}",
+            found.nis(AidSource::GnssVelocity)
+        );
+        assert!((0.98..height).contains(&found.nis(AidSource::Height)), "{name}: {}", found.nis(AidSource::Height));
+        assert!((0.7..1.019).contains(&found.nis(AidSource::Heading)), "{name}: {}", found.nis(AidSource::Heading));
     }
 }
 

@@ -5,7 +5,7 @@
 use afbc::Profile;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::{Scenario, built_in};
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use afbc_vehicles::{BUILT_IN, Vehicle};
 use std::thread;
 
@@ -30,7 +30,7 @@ impl Bounds {
 
 /// Flies the scenario and returns one line about what went wrong, if anything did.
 fn fault(scenario: &Scenario, contender: &Contender) -> Option<String> {
-    let run = Run::fly(scenario, contender, u64::MAX).unwrap();
+    let run = FlightResult::fly(scenario, contender, u64::MAX).unwrap();
     let (rms_m, end_m) = (run.metrics.rmse.xyz().norm(), run.metrics.final_error.xyz().norm());
     let calm = scenario.realism.wind == Default::default() && scenario.name != "lissajous";
     let bounds = Bounds::of(contender.kind());

@@ -3,7 +3,7 @@
 
 use afbc_flight_core::{EndReason, Mode};
 use afbc_hil::{Host, Station};
-use afbc_mavlink::Command;
+use afbc_mavlink::VehicleCommand;
 use afbc_plant::{Contact, Environment, Motion, Plant, PlantModel, Realism};
 use afbc_types::{Parameters, State};
 use nalgebra::Vector3;
@@ -70,7 +70,7 @@ fn fly(height_m: f64, speed_m_s: f64, frozen: Frozen) -> Seen {
         station.lead(setpoint);
         if now_ms == ARM_MS {
             station.follow();
-            station.command(Command::Arm);
+            station.command(VehicleCommand::Arm);
         }
         let tick = host.next_tick(&station.take());
         station.hear(&tick.bytes);

@@ -2,10 +2,10 @@
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a failed flight must stop the test
 
 use afbc::adaptive::{self};
-use afbc::fuzzy::{Basis, Membership};
-use afbc::law::Context;
-use afbc::law::Tracking;
-use afbc::{Adaptive, AdaptiveEstimate, Backstepping, Cascade, Controller, Law, Profile, Settings};
+use afbc::fuzzy::{FuzzyBasis, Membership};
+use afbc::law::StepContext;
+use afbc::law::SubsystemTracking;
+use afbc::{Adaptive, AdaptiveEstimate, Backstepping, CascadeMemory, Controller, Profile, Settings, SubsystemLaw};
 use afbc_control::{Errors, FlightController, Validated};
 use afbc_plant::{Environment, Motion, Plant, PlantModel};
 use afbc_scenario::Scenario;
@@ -13,7 +13,7 @@ use afbc_scenario::case::{Case, Reading};
 use afbc_scenario::contender::{self, Contender, ControllerKind};
 use afbc_scenario::paper::scenario;
 use afbc_sim::flight::{FlightEnd, LawOnly, Sample, World, lockstep};
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
 use core::ops::ControlFlow;
 use nalgebra::Vector3;
@@ -32,13 +32,19 @@ fn paper(case: Case) -> Scenario {
 #[derive(Clone, Copy)]
 struct Rateless<L>(L);
 
-impl<L: Law> Law for Rateless<L> {
+impl<L: SubsystemLaw> SubsystemLaw for Rateless<L> {
     type Estimate = L::Estimate;
 
-    fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut L::Estimate) -> (f32, Errors) {
+    fn input(
+        &self,
+        axis: Axis,
+        tracking: &SubsystemTracking,
+        context: &StepContext,
+        estimate: &mut L::Estimate,
+    ) -> (f32, Errors) {
         match axis {
             Axis::Roll | Axis::Pitch => {
-                let standing = Tracking { x1d_dot: 0.0, x1d_ddot: 0.0, ..*tracking };
+                let standing = SubsystemTracking { x1d_dot: 0.0, x1d_ddot: 0.0, ..*tracking };
                 self.0.input(axis, &standing, context, estimate)
             }
             _ => self.0.input(axis, tracking, context, estimate),
@@ -51,7 +57,7 @@ impl<L: Law> Law for Rateless<L> {
 }
 
 /// Flies the scenario. Returns true if the vehicle stayed upright, and within 1 m after 5 s.
-fn flies<L: Law>(scenario: &Scenario, settings: Settings, law: L) -> bool {
+fn flies<L: SubsystemLaw>(scenario: &Scenario, settings: Settings, law: L) -> bool {
     let controller = Controller::new(scenario.vehicle.to_f32(), settings, law).unwrap();
     let mut world = World::new(scenario, f64::from(settings.common.dt_s)).unwrap();
     let near = |sample: &Sample| {
@@ -116,7 +122,7 @@ fn printed(membership: Membership, inputs: [f32; 2]) -> [f32; 9] {
 
 #[test]
 fn the_printed_basis_is_0_over_0_from_1_705_rad_s_and_the_implemented_one_is_not() {
-    let basis = Basis::new(ATTITUDE).unwrap();
+    let basis = FuzzyBasis::new(ATTITUDE).unwrap();
     for step in 0..=2000_u16 {
         let rate = f32::from(step) / 200.0; // 0 to 10 rad/s
         let printed = printed(ATTITUDE, [0.0, rate]);
@@ -137,7 +143,7 @@ fn the_printed_basis_is_0_over_0_from_1_705_rad_s_and_the_implemented_one_is_not
 #[test]
 fn the_basis_is_accurate_where_the_printed_one_underflows() {
     // In f64, (18) holds up to 4.125 rad/s. Up to there, it is the oracle for the implemented basis.
-    let basis = Basis::new(ATTITUDE).unwrap();
+    let basis = FuzzyBasis::new(ATTITUDE).unwrap();
     for step in 0..=400_u16 {
         let rate = f32::from(step) / 100.0;
         let gaussian = |x: f64, j: usize| {
@@ -194,7 +200,7 @@ fn chatter_mn(delta: f32, epsilon: f32) -> f64 {
     let law = Adaptive::new(gains).unwrap();
     let vehicle = Parameters::PAPER;
     let controller = Controller::new(vehicle.to_f32(), Profile::Paper.settings(), law).unwrap();
-    let mut memory: Validated<Cascade<AdaptiveEstimate>> = Validated::default();
+    let mut memory: Validated<CascadeMemory<AdaptiveEstimate>> = Validated::default();
     memory.control.estimates.roll.delta = delta;
     // The estimates of z carry the weight.
     memory.control.estimates.z.theta.fill((vehicle.mass_kg * vehicle.gravity_m_s2) as f32);
@@ -266,18 +272,19 @@ fn in_flight_roll_chatters_once_delta_hat_exceeds_0_030() {
 #[test]
 fn a_hundred_times_the_epsilon_is_as_accurate_without_chatter() {
     for case in [GUSTS, Case::DEFAULT] {
-        let printed = Run::fly(&paper(case), &with_epsilon(0.001), u64::MAX).unwrap();
-        let wide = Run::fly(&paper(case), &with_epsilon(0.1), u64::MAX).unwrap();
+        let printed = FlightResult::fly(&paper(case), &with_epsilon(0.001), u64::MAX).unwrap();
+        let wide = FlightResult::fly(&paper(case), &with_epsilon(0.1), u64::MAX).unwrap();
         assert_eq!((printed.lost, wide.lost), (None, None));
-        let mn = |run: &Run| run.metrics.mean_abs_delta_u * 1000.0;
+        let mn = |run: &FlightResult| run.metrics.mean_abs_delta_u * 1000.0;
         // With the printed epsilon, U1 and U2 chatter by 50 mN or more per step; with the larger one, they do not.
         assert!(mn(&printed).x > 50.0 && mn(&printed).y > 50.0, "{}", mn(&printed));
         assert!(mn(&wide).x < 0.5 && mn(&wide).y < 0.5, "{}", mn(&wide));
         // The accuracy is the same: no error grows by more than a fifth and 5 mm, and all stay below half of
         // backstepping's.
         let baseline =
-            Run::fly(&paper(case), &Contender::of(ControllerKind::Backstepping, Profile::Paper), u64::MAX).unwrap();
-        let errors = |run: &Run| -> [f64; 4] { run.metrics.rmse.into() };
+            FlightResult::fly(&paper(case), &Contender::of(ControllerKind::Backstepping, Profile::Paper), u64::MAX)
+                .unwrap();
+        let errors = |run: &FlightResult| -> [f64; 4] { run.metrics.rmse.into() };
         for ((wide, printed), baseline) in errors(&wide).into_iter().zip(errors(&printed)).zip(errors(&baseline)) {
             assert!(wide <= 1.2 * printed + 0.005, "RMSE {wide}, {printed} as printed");
             assert!(wide <= 0.5 * baseline, "RMSE {wide}, {baseline} under backstepping");
@@ -288,9 +295,9 @@ fn a_hundred_times_the_epsilon_is_as_accurate_without_chatter() {
 // ---------------------------------------------------------------------------------------------------------------------
 // Decision 3: what "1.2 N" and "1.2 N m" mean.
 
-fn both(reading: Reading, model: PlantModel) -> [Run; 2] {
+fn both(reading: Reading, model: PlantModel) -> [FlightResult; 2] {
     let scenario = scenario(model, Case { reading: Some(reading), uncertainty: None }).unwrap();
-    ControllerKind::PAPER.map(|kind| Run::fly(&scenario, scenario.contender(kind).unwrap(), u64::MAX).unwrap())
+    ControllerKind::PAPER.map(|kind| FlightResult::fly(&scenario, scenario.contender(kind).unwrap(), u64::MAX).unwrap())
 }
 
 #[test]

@@ -4,7 +4,7 @@
 use afbc::Profile;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::{Scenario, built_in};
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use afbc_types::{Parameters, Rotor};
 use proptest::prelude::*;
 
@@ -47,7 +47,7 @@ proptest! {
         // Frames without a margin, or whose yaw disturbs roll, are refused by name. This test leaves them out.
         prop_assume!(scenario.check().is_ok());
         for contender in &scenario.contenders {
-            let run = Run::fly(&scenario, contender, u64::MAX).unwrap();
+            let run = FlightResult::fly(&scenario, contender, u64::MAX).unwrap();
             let end_m = run.metrics.final_error.xyz().norm();
             prop_assert!(
                 run.lost.is_none() && run.tripped.is_none() && end_m < END_M,

@@ -4,8 +4,8 @@
 use afbc::adaptive::{Gains, Subsystem};
 use afbc::backstepping::{self, ideal, proportional};
 use afbc::desired::desired_attitude;
-use afbc::fuzzy::{Basis, Membership};
-use afbc::law::Tracking;
+use afbc::fuzzy::{FuzzyBasis, Membership};
+use afbc::law::SubsystemTracking;
 use afbc::model::Dynamics;
 use afbc::{AdaptiveEstimate, Safeguards};
 use afbc_control::mixer::Mixer;
@@ -45,7 +45,7 @@ fn fuzzy_basis_agrees_in_every_row() {
     assert_eq!(table.rows().len(), ROWS);
     for row in table.rows() {
         let [centre, width, first, second] = row.all(["centre", "width", "input1", "input2"]);
-        let basis = Basis::new(Membership { centre: centre as f32, width: width as f32 }).unwrap();
+        let basis = FuzzyBasis::new(Membership { centre: centre as f32, width: width as f32 }).unwrap();
         let w = basis.weights([first as f32, second as f32]);
         let bound = weight_bound(centre, width, [first, second], [U * first.abs(), U * second.abs()]);
         // The order is row-major: the first input is the outermost.
@@ -80,7 +80,8 @@ fn afbc_subsystem_agrees_in_every_row() {
         let x1d_dot_32 = x1d_dot as f32;
         let [x1_32, x2_32] = [x1 as f32, x2 as f32];
         let e1_32 = x1d as f32 - x1_32;
-        let tracking = Tracking { x1: x1_32, x2: x2_32, e1: e1_32, x1d_dot: x1d_dot_32, ..Tracking::default() };
+        let tracking =
+            SubsystemTracking { x1: x1_32, x2: x2_32, e1: e1_32, x1d_dot: x1d_dot_32, ..SubsystemTracking::default() };
         let errors = tracking.errors(gains.backstepping.alpha1);
         let inputs_are_state = row.get("inputs_are_state") == 1.0;
         kinds[usize::from(inputs_are_state)] += 1;
@@ -140,7 +141,7 @@ fn backstepping_agrees_in_every_row() {
     for row in table.rows() {
         let [alpha1, alpha2] = row.all(["alpha1", "alpha2"]);
         let [x1, x2, x1d, x1d_dot, x1d_ddot, f, g] = row.all(["x1", "x2", "x1d", "x1d_dot", "x1d_ddot", "f", "g"]);
-        let tracking = Tracking {
+        let tracking = SubsystemTracking {
             x1: x1 as f32,
             x2: x2 as f32,
             e1: x1d as f32 - x1 as f32,

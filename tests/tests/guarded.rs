@@ -2,7 +2,7 @@
 //! the fallback law.
 #![allow(clippy::unwrap_used, missing_docs)] // a failed flight must stop the test
 
-use afbc::monitor::Bounds;
+use afbc::monitor::MonitorBounds;
 use afbc::{Guarded, Profile, Settings, Trip, guarded};
 use afbc_control::{Action, FlightController, Trace, Validated};
 use afbc_plant::{
@@ -16,13 +16,14 @@ use nalgebra::{Vector2, Vector3, Vector4};
 const STEP_S: f64 = 0.001;
 const SECOND: usize = 1000;
 
-fn guarded(profile: Profile, settings: Settings, bounds: Bounds) -> Guarded {
+fn guarded(profile: Profile, settings: Settings, bounds: MonitorBounds) -> Guarded {
     Guarded::new(Parameters::PAPER.to_f32(), settings, profile.gains(), bounds).unwrap()
 }
 
 /// Returns the profile `flight` under its own bounds, some of them changed.
-fn flight(change: fn(&mut Bounds)) -> Guarded {
-    let mut bounds = Bounds::new(&Profile::Flight.gains(), &Parameters::PAPER.to_f32(), &Profile::Flight.settings());
+fn flight(change: fn(&mut MonitorBounds)) -> Guarded {
+    let mut bounds =
+        MonitorBounds::new(&Profile::Flight.gains(), &Parameters::PAPER.to_f32(), &Profile::Flight.settings());
     change(&mut bounds);
     guarded(Profile::Flight, Profile::Flight.settings(), bounds)
 }
@@ -88,7 +89,7 @@ const NOISE: Deviations = Deviations { position_m: 0.002, velocity_m_s: 0.01, at
 #[test]
 fn the_printed_laws_chatter_is_a_limit_cycle() {
     let paper = paper::scenario(PlantModel::Simplified, Case::DEFAULT).unwrap();
-    let bounds = Bounds::new(&Profile::Paper.gains(), &Parameters::PAPER.to_f32(), &Profile::Paper.settings());
+    let bounds = MonitorBounds::new(&Profile::Paper.gains(), &Parameters::PAPER.to_f32(), &Profile::Paper.settings());
     let fly = |bounds| {
         let mut bench = Bench {
             controller: guarded(Profile::Paper, Profile::Paper.settings(), bounds),
@@ -103,7 +104,7 @@ fn the_printed_laws_chatter_is_a_limit_cycle() {
     };
     let (second, trip) = fly(bounds).unwrap();
     assert!(second >= 30 && matches!(trip, Trip::LimitCycle(_)), "{trip:?} after {second} s");
-    assert_eq!(fly(Bounds { swings_hz: 1e4, ..bounds }), None);
+    assert_eq!(fly(MonitorBounds { swings_hz: 1e4, ..bounds }), None);
 }
 
 /// Noise, wind, turbulence and a series of steps do not trip the monitor of the profile `flight`.
@@ -177,7 +178,7 @@ fn a_flight_goes_on_across_a_trip_and_back() {
 /// The fallback law reaches setpoints for which its speed limits matter, up, down and sideways.
 #[test]
 fn the_fallback_flies_far() {
-    let tripped = |bounds: &mut Bounds| bounds.error = PerAxis { z: 0.0, ..bounds.error };
+    let tripped = |bounds: &mut MonitorBounds| bounds.error = PerAxis { z: 0.0, ..bounds.error };
     let mut bench = Bench::real(flight(tripped), Realism::default(), Deviations::default());
     assert_eq!(bench.fly(SECOND, &above(0.1)), Some(Trip::Error(Axis::Z)));
     for (x, z) in [(0.0, 30.0), (0.0, 2.0), (40.0, 2.0), (0.0, 20.0)] {

@@ -3,14 +3,14 @@
 use afbc::Profile;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::{Scenario, built_in};
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 
 fn hardware() -> Scenario {
     built_in("hardware").unwrap().read().unwrap()
 }
 
-fn fly(kind: ControllerKind, profile: Profile, scenario: &Scenario) -> Run {
-    Run::fly(scenario, &Contender::of(kind, profile), u64::MAX).unwrap()
+fn fly(kind: ControllerKind, profile: Profile, scenario: &Scenario) -> FlightResult {
+    FlightResult::fly(scenario, &Contender::of(kind, profile), u64::MAX).unwrap()
 }
 
 #[test]

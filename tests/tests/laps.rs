@@ -2,11 +2,11 @@
 //! the table of `docs/reference/flight.md`, or writes it with `WRITE=1`.
 
 use afbc::Profile;
-use afbc_plant::{Environment, Motion, ParameterChange, Payload, PlantParameter, RotorFault};
+use afbc_plant::{Environment, Motion, Payload, PlantParameter, PlantParameterChange, RotorFault};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::trajectory::{Sine, Trajectory};
 use afbc_scenario::{Scenario, built_in};
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use core::f64::consts::{SQRT_2, TAU};
 use nalgebra::Vector3;
 use std::{env, fs};
@@ -53,7 +53,7 @@ impl Unlike {
                 drag.area_m2 *= factor;
             }
             Unlike::Thrust(factor) => {
-                let change = ParameterChange { quantity: PlantParameter::ThrustFactor, factor, start_s, end_s };
+                let change = PlantParameterChange { quantity: PlantParameter::ThrustFactor, factor, start_s, end_s };
                 scenario.environment = Environment::new(vehicle, vec![change], Vec::new()).unwrap();
             }
             Unlike::Rotor(efficiency) => {
@@ -88,7 +88,7 @@ fn laps(vehicle: &str, speed_m_s: f64, unlike: Unlike) -> (Scenario, f64) {
 
 /// Returns the root mean square distance from the reference in each lap \[m\].
 fn errors((scenario, period_s): &(Scenario, f64), contender: &Contender) -> [f64; LAPS] {
-    let run = Run::fly(scenario, contender, 1).unwrap();
+    let run = FlightResult::fly(scenario, contender, 1).unwrap();
     assert!(run.lost.is_none() && run.tripped.is_none(), "{:?} {:?}", run.lost, run.tripped);
     core::array::from_fn(|lap| {
         let within = |time_s: f64| (time_s / period_s) as usize == lap;

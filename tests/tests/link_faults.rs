@@ -6,7 +6,7 @@
 
 use afbc_flight_core::{Mode, Refusal, Request};
 use afbc_hil::{Host, Station};
-use afbc_mavlink::Command;
+use afbc_mavlink::VehicleCommand;
 use afbc_plant::{Contact, Environment, Motion, Plant, PlantModel, Realism};
 use afbc_scenario::Scenario;
 use afbc_scenario::paper;
@@ -145,7 +145,7 @@ struct Case {
     flight: Flight,
     faults: &'static [Fault],
     /// Requests after the request to arm.
-    requests: &'static [(i64, Command)],
+    requests: &'static [(i64, VehicleCommand)],
     end_ms: i64,
     then: Then,
 }
@@ -154,14 +154,14 @@ const fn case(name: &'static str, flight: Flight, faults: &'static [Fault], end_
     Case { name, flight, faults, requests: &[], end_ms, then }
 }
 
-const fn asked(requests: &'static [(i64, Command)], case: Case) -> Case {
+const fn asked(requests: &'static [(i64, VehicleCommand)], case: Case) -> Case {
     Case { requests, ..case }
 }
 
-use Command::{Arm, Disarm, Kill};
 use Flight::{Hover, Paper};
 use Of::{Answers, Commands, Downlink, Rotors, Setpoints, States, Uplink};
 use Then::{Flies, GivesUp, Lands, Recovers, Refuses, Resumes, Stays, Stops};
+use VehicleCommand::{Arm, Disarm, Kill};
 use What::{
     Delay, Drop, DropSome, Flip, FlipSome, HoldBack, Jitter, KeepEach, Noise, Replay, Reverse, Truncate, Twice,
 };
@@ -398,7 +398,7 @@ fn fly(case: &Case) -> Seen {
             station.follow();
         }
         if now_ms == 0 {
-            station.command(Command::Arm);
+            station.command(VehicleCommand::Arm);
         }
         case.requests.iter().filter(|(at_ms, _)| *at_ms == now_ms).for_each(|(_, command)| station.command(*command));
 

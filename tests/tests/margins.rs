@@ -9,7 +9,7 @@ use afbc_plant::{Drag, Environment, Turbulence};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::trajectory::{Sine, Trajectory};
 use afbc_scenario::{Scenario, built_in};
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use nalgebra::Vector3;
 
 fn flown(kind: ControllerKind) -> Contender {
@@ -40,7 +40,7 @@ fn turbulent(seed: u64) -> Scenario {
 /// Flies the scenario without a loss or a trip. Returns the RMS distance from the reference \[m\] and the largest mean
 /// change of an input \[N\].
 fn fly(scenario: &Scenario) -> (f64, f64) {
-    let run = Run::fly(scenario, &flown(ControllerKind::Afbc), u64::MAX).unwrap();
+    let run = FlightResult::fly(scenario, &flown(ControllerKind::Afbc), u64::MAX).unwrap();
     assert!(run.lost.is_none() && run.tripped.is_none(), "{:?} {:?}", run.lost, run.tripped);
     (run.metrics.rmse.xyz().norm(), run.metrics.mean_abs_delta_u.max())
 }
@@ -61,7 +61,7 @@ fn wind_is_observed_not_learnt() {
         let mut without = flown(ControllerKind::Afbc);
         without.settings.disturbance.disturbance_rad_s = 0.0;
         let rms_m = |contender: &Contender| {
-            let run = Run::fly(&turbulent(seed), contender, u64::MAX).unwrap();
+            let run = FlightResult::fly(&turbulent(seed), contender, u64::MAX).unwrap();
             assert!(run.lost.is_none() && run.tripped.is_none(), "{:?} {:?}", run.lost, run.tripped);
             run.metrics.rmse.xy().norm()
         };
@@ -100,7 +100,7 @@ fn noisy_rates_cost_less_than_under_pid() {
         let mut scenario = turbulent(seed);
         scenario.sensing.noise.rates_rad_s = 0.05;
         let [afbc, pid] = [ControllerKind::Afbc, ControllerKind::Pid]
-            .map(|kind| afbc_tune::cost(&scenario, &Run::fly(&scenario, &flown(kind), u64::MAX).unwrap()));
+            .map(|kind| afbc_tune::cost(&scenario, &FlightResult::fly(&scenario, &flown(kind), u64::MAX).unwrap()));
         assert!(afbc <= 0.9 * pid, "seed {seed}: {afbc}, PID {pid}");
     }
 }
@@ -112,7 +112,8 @@ fn no_vehicle_is_lifted_by_its_own_limit_cycle() {
     let campaign = afbc_campaign::built_in("robustness").unwrap().read().unwrap();
     for flight in [9540, 8555] {
         let scenario = campaign.flight(flight).unwrap();
-        let run = Run::fly(&scenario, &flown(ControllerKind::Afbc).for_vehicle(&scenario.vehicle), u64::MAX).unwrap();
+        let run = FlightResult::fly(&scenario, &flown(ControllerKind::Afbc).for_vehicle(&scenario.vehicle), u64::MAX)
+            .unwrap();
         let largest_m = run.metrics.max_abs.xyz().norm();
         assert!(run.lost.is_none() && largest_m < 0.05, "flight {flight}: {:?}, {largest_m} m", run.lost);
     }
@@ -128,7 +129,7 @@ fn known_drag_costs_less() {
     let rms_m = |change: fn(&mut KnownDrag)| {
         let mut contender = scenario.contenders[0].clone();
         change(&mut contender.settings.common.drag);
-        let run = Run::fly(scenario, &contender, u64::MAX).unwrap();
+        let run = FlightResult::fly(scenario, &contender, u64::MAX).unwrap();
         assert!(run.lost.is_none() && run.tripped.is_none(), "{:?} {:?}", run.lost, run.tripped);
         run.metrics.rmse.xyz().norm()
     };

@@ -4,7 +4,7 @@ use afbc::Profile;
 use afbc::Trip;
 use afbc_campaign::suite::{SUITES, Suite};
 use afbc_files::read::BuiltIn;
-use afbc_plant::{Drag, Environment, ParameterChange, PlantParameter, Turbulence};
+use afbc_plant::{Drag, Environment, PlantParameter, PlantParameterChange, Turbulence};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::trajectory::Trajectory;
 use afbc_scenario::{Scenario, built_in};
@@ -59,7 +59,8 @@ fn hard_flights_do_not_trip() {
     for (mass, thrust) in [(1.0, 1.0), (0.8, 1.1), (1.3, 0.75), (1.0, 0.6)] {
         for step_m in [[0.0, 0.0, 2.0], [0.0, 0.0, -2.0], [4.0, 0.0, 0.0], [-3.0, 3.0, 0.5]] {
             let mut scenario = Scenario { duration_s: 15.0, ..hardware.clone() };
-            let change = |quantity, factor| ParameterChange { quantity, factor, start_s: 1.0, end_s: f64::INFINITY };
+            let change =
+                |quantity, factor| PlantParameterChange { quantity, factor, start_s: 1.0, end_s: f64::INFINITY };
             let changes = vec![change(PlantParameter::Mass, mass), change(PlantParameter::ThrustFactor, thrust)];
             scenario.environment = Environment::new(*hardware.environment.nominal(), changes, Vec::new()).unwrap();
             scenario.initial.position_m = from_m;

@@ -7,7 +7,7 @@ use afbc_guidance::FlightMode;
 use afbc_hil::{Autopilot, Error, Host, MessagePeriods, Station, firmware, fly};
 use afbc_log::exact::{Frames, Record, ReplayStep, Replayer};
 use afbc_mavlink::{
-    Address, Command, Datum, Decoder, Downlink, FRAME_MAX, Height, ParameterRequest, Sender, Telemetry, Uplink,
+    Address, Datum, Decoder, Downlink, Encoder, FRAME_MAX, Height, ParameterRequest, Telemetry, Uplink, VehicleCommand,
 };
 use afbc_onboard::{Configuration, Readings, Report};
 use afbc_plant::{Motion, Payload, Plant, RotorFault};
@@ -43,7 +43,7 @@ fn setting(name: &str, value: i32) -> ParameterRequest {
 }
 
 /// Sets parameters of a vehicle. Calls `tick` with the frame of each.
-fn set(sender: &mut Sender, parameters: &[(&str, i32)], tick: &mut dyn FnMut(&[u8])) {
+fn set(sender: &mut Encoder, parameters: &[(&str, i32)], tick: &mut dyn FnMut(&[u8])) {
     let mut buffer = [0; FRAME_MAX];
     for (name, value) in parameters {
         tick(sender.send(&Uplink::Parameter(setting(name, *value)), &mut buffer));
@@ -55,7 +55,7 @@ struct Flier {
     world: World,
     speeds: RotorSpeeds<ROTORS_MAX>,
     ms: u64,
-    sender: Sender,
+    sender: Encoder,
     decoder: Decoder<Downlink>,
     report: Option<Report>,
     /// Texts with their times \[ms\].
@@ -87,7 +87,7 @@ impl Flier {
             world: World::released(scenario, 1e-3).unwrap(),
             speeds: RotorSpeeds::default(),
             ms: 0,
-            sender: Sender::new(STATION),
+            sender: Encoder::new(STATION),
             decoder: Decoder::new(STATION),
             report: None,
             texts: Vec::new(),
@@ -145,9 +145,9 @@ impl Flier {
     /// Arms and takes off.
     fn lift_off(&mut self) {
         self.until(READY_MS);
-        self.tick(Some(&Uplink::Command(Command::Arm)));
+        self.tick(Some(&Uplink::Command(VehicleCommand::Arm)));
         self.until(READY_MS + 500);
-        self.tick(Some(&Uplink::Command(Command::TakeOff(Height { metres: 5.0, above: Datum::Here }))));
+        self.tick(Some(&Uplink::Command(VehicleCommand::TakeOff(Height { metres: 5.0, above: Datum::Here }))));
         self.until(ALOFT_MS);
         assert_eq!(self.report.as_ref().unwrap().mode, Mode::Flying, "{:?}", self.texts);
     }
@@ -295,7 +295,7 @@ fn no_drawn_flight_raises_an_alarm() {
             let scenario = Scenario { contenders, ..scenario };
             let vehicle = scenario.vehicle_file.clone().unwrap();
             let mut host = Host::for_vehicle(&vehicle).unwrap();
-            set(&mut Sender::new(STATION), &[listens], &mut |bytes| drop(host.next_tick(bytes)));
+            set(&mut Encoder::new(STATION), &[listens], &mut |bytes| drop(host.next_tick(bytes)));
             let mut heard = Heard { host, decoder: Decoder::new(STATION), texts: Vec::new(), statuses: 0 };
             let end =
                 fly(

@@ -7,7 +7,7 @@ use afbc_scenario::case::{Case, Reading, Sign, Uncertainty};
 use afbc_scenario::contender::ControllerKind;
 use afbc_scenario::paper::scenario;
 use afbc_sim::metrics::Metrics;
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use flight_tests::{Row, golden};
 use std::sync::LazyLock;
 
@@ -56,7 +56,8 @@ static FLOWN: LazyLock<Vec<(Case, ControllerKind, Metrics)>> = LazyLock::new(|| 
                     half.iter()
                         .map(|&(case, kind)| {
                             let scenario = scenario(PlantModel::Simplified, case).unwrap();
-                            let run = Run::fly(&scenario, scenario.contender(kind).unwrap(), u64::MAX).unwrap();
+                            let run =
+                                FlightResult::fly(&scenario, scenario.contender(kind).unwrap(), u64::MAX).unwrap();
                             assert_eq!(run.lost, None, "{} under {}", case.name(), kind.name());
                             (case, kind, run.metrics)
                         })

@@ -6,17 +6,21 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
 use afbc::Profile;
-use afbc::monitor::Bounds;
+use afbc::monitor::MonitorBounds;
 use afbc_files::read::words::{self, number};
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::{Curve, Response};
 use afbc_flight_core::protocol::MotorOutputs;
 use afbc_onboard::parameters::ParameterTable;
 use afbc_onboard::{Configuration, EscSettings, Link};
-use afbc_plant::instruments::{Accelerometer, Barometer, Gnss, Gyroscope, Imu, Magnetometer, TrackerModel};
-use afbc_plant::{Battery, Contact, Deviations, Drag, Dropouts, GroundEffect, Rotors, Sensing, Turbulence, Wind};
+use afbc_plant::instruments::{
+    AccelerometerModel, BarometerModel, GnssModel, GyroscopeModel, ImuModel, MagnetometerModel, TrackerModel,
+};
+use afbc_plant::{
+    BatteryModel, Contact, Deviations, Drag, GroundEffect, MeasurementDropouts, Rotors, Sensing, Turbulence, Wind,
+};
 use afbc_scenario::contender::{ControllerKind, Law};
-use afbc_types::{Declaration, Declared, Mounting, OutOfRange, Parameters, Range, SensorCalibration, Value};
+use afbc_types::{Declaration, Declared, DeclaredValue, Mounting, OutOfRange, Parameters, Range, SensorCalibration};
 use core::convert::Infallible;
 use core::fmt::Write;
 use std::collections::{BTreeMap, BTreeSet};
@@ -55,26 +59,26 @@ fn profiles<G: Declared>(title: impl Into<String>, prefix: &'static str, of: imp
 }
 
 /// Returns a parameter's value, element by element, as in a scenario file.
-fn shown(value: &Value<'_>) -> Vec<String> {
+fn shown(value: &DeclaredValue<'_>) -> Vec<String> {
     match value {
-        Value::Single(numbers) => numbers.iter().map(|number| format!("{number:?}")).collect(),
-        Value::Double(numbers) => numbers.iter().map(|number| format!("{number:?}")).collect(),
-        Value::Whole(number) => vec![number.to_string()],
-        Value::Switch(on) => vec![on.to_string()],
-        Value::Choice(index, words) => vec![words[*index].to_owned()],
+        DeclaredValue::Single(numbers) => numbers.iter().map(|number| format!("{number:?}")).collect(),
+        DeclaredValue::Double(numbers) => numbers.iter().map(|number| format!("{number:?}")).collect(),
+        DeclaredValue::Whole(number) => vec![number.to_string()],
+        DeclaredValue::Switch(on) => vec![on.to_string()],
+        DeclaredValue::Choice(index, words) => vec![words[*index].to_owned()],
     }
 }
 
 /// Returns the accepted values, in words.
-fn accepted(range: &Range, value: &Value<'_>) -> String {
+fn accepted(range: &Range, value: &DeclaredValue<'_>) -> String {
     match value {
-        Value::Switch(_) => "true, false".into(),
-        Value::Choice(_, words) => {
+        DeclaredValue::Switch(_) => "true, false".into(),
+        DeclaredValue::Choice(_, words) => {
             let numbered =
                 words.iter().enumerate().map(|(index, word)| format!("{} {word}", index + range.min as usize));
             numbered.collect::<Vec<_>>().join(", ")
         }
-        Value::Whole(_) => format!("{} to {}", range.min, range.max),
+        DeclaredValue::Whole(_) => format!("{} to {}", range.min, range.max),
         _ => format!("{:?} to {:?}", range.min, range.max),
     }
 }
@@ -107,8 +111,8 @@ fn columns<G: Declared, const N: usize>(
 }
 
 /// Returns the monitor's bounds for the paper's vehicle.
-fn bounds(profile: Profile) -> Bounds {
-    Bounds::new(&profile.gains(), &Parameters::PAPER.to_f32(), &profile.settings())
+fn bounds(profile: Profile) -> MonitorBounds {
+    MonitorBounds::new(&profile.gains(), &Parameters::PAPER.to_f32(), &profile.settings())
 }
 
 /// Returns the name of a control law as the beginning of a heading.
@@ -148,19 +152,19 @@ fn groups() -> Vec<Group> {
     groups.extend(ControllerKind::ALL.map(gains));
     groups.extend([
         group("Simulated rotors: `[rotors]`", "ROT_", Rotors::DEFAULT),
-        group("Simulated battery: `[battery]`", "BAT_", Battery::DEFAULT),
+        group("Simulated battery: `[battery]`", "BAT_", BatteryModel::DEFAULT),
         group("Simulated drag: `[drag]`", "DRAG_", Drag::DEFAULT),
         group("Simulated wind: `[wind]`", "WIND_", Wind::DEFAULT),
         group("Simulated turbulence: `[wind.turbulence]`", "TURB_", Turbulence::DEFAULT),
         group("Simulated ground: `[ground]`", "GND_", Contact::DEFAULT),
         group("Simulated ground effect: `[ground]`", "GE_", GroundEffect::DEFAULT),
         group("Simulated sensors: `[sensors]`", "SENS_", Sensing::DEFAULT),
-        group("Simulated dropouts: `[sensors.dropouts]`", "DROP_", Dropouts::DEFAULT),
-        group("Simulated inertial sensor: `[instruments.imu]`", "I_", Imu::DEFAULT),
+        group("Simulated dropouts: `[sensors.dropouts]`", "DROP_", MeasurementDropouts::DEFAULT),
+        group("Simulated inertial sensor: `[instruments.imu]`", "I_", ImuModel::DEFAULT),
         group("Simulated tracker: `[instruments.tracker]`", "TRK_", TrackerModel::DEFAULT),
-        group("Simulated GNSS receiver: `[instruments.gnss]`", "GNSS_", Gnss::DEFAULT),
-        group("Simulated barometer: `[instruments.barometer]`", "BARO_", Barometer::DEFAULT),
-        group("Simulated magnetometer: `[instruments.magnetometer]`", "MAG_", Magnetometer::DEFAULT),
+        group("Simulated GNSS receiver: `[instruments.gnss]`", "GNSS_", GnssModel::DEFAULT),
+        group("Simulated barometer: `[instruments.barometer]`", "BARO_", BarometerModel::DEFAULT),
+        group("Simulated magnetometer: `[instruments.magnetometer]`", "MAG_", MagnetometerModel::DEFAULT),
     ]);
     groups
 }
@@ -212,8 +216,10 @@ fn keys(parameters: impl Declared) -> Vec<(&'static str, [String; 4])> {
             values => (" each", format!("[{}]", values.join(", "))),
         };
         let accepted = match &value {
-            Value::Switch(_) => "`true`, `false`".to_owned(),
-            Value::Choice(_, words) => words.iter().map(|word| format!("`\"{word}\"`")).collect::<Vec<_>>().join(", "),
+            DeclaredValue::Switch(_) => "`true`, `false`".to_owned(),
+            DeclaredValue::Choice(_, words) => {
+                words.iter().map(|word| format!("`\"{word}\"`")).collect::<Vec<_>>().join(", ")
+            }
             _ => format!("{} to {}{each}", number(range.min), number(range.max)),
         };
         // The meaning becomes part of a sentence, unless it begins with a symbol or an abbreviation.
@@ -241,20 +247,20 @@ fn sections() -> BTreeMap<String, Vec<(&'static str, [String; 4])>> {
         ("Settings", keys(settings)),
         ("Limits", keys(settings.limits)),
         ("Rotors", keys(Rotors::DEFAULT)),
-        ("Battery", keys(Battery::DEFAULT)),
+        ("Battery", keys(BatteryModel::DEFAULT)),
         ("Drag", keys(Drag::DEFAULT)),
         ("Wind", keys(Wind::DEFAULT)),
         ("Turbulence", keys(Turbulence::DEFAULT)),
         ("Ground", [keys(Contact::DEFAULT), keys(GroundEffect::DEFAULT)].concat()),
-        ("Sensors", [keys(Sensing::DEFAULT), keys(Deviations::DEFAULT), keys(Dropouts::DEFAULT)].concat()),
-        ("Inertial sensor", keys(Imu::DEFAULT)),
-        ("Gyroscope", keys(Gyroscope::DEFAULT)),
-        ("Accelerometer", keys(Accelerometer::DEFAULT)),
+        ("Sensors", [keys(Sensing::DEFAULT), keys(Deviations::DEFAULT), keys(MeasurementDropouts::DEFAULT)].concat()),
+        ("Inertial sensor", keys(ImuModel::DEFAULT)),
+        ("Gyroscope", keys(GyroscopeModel::DEFAULT)),
+        ("Accelerometer", keys(AccelerometerModel::DEFAULT)),
         ("Tracker", keys(TrackerModel::DEFAULT)),
-        ("Losses and freezes", keys(Dropouts::DEFAULT)),
-        ("GNSS receiver", keys(Gnss::DEFAULT)),
-        ("Barometer", keys(Barometer::DEFAULT)),
-        ("Magnetometer", keys(Magnetometer::DEFAULT)),
+        ("Losses and freezes", keys(MeasurementDropouts::DEFAULT)),
+        ("GNSS receiver", keys(GnssModel::DEFAULT)),
+        ("Barometer", keys(BarometerModel::DEFAULT)),
+        ("Magnetometer", keys(MagnetometerModel::DEFAULT)),
     ];
     let peers = ControllerKind::ALL.into_iter().filter(|kind| !kind.in_cascade());
     let peers = peers.map(|kind| (heading(kind), keys(Law::of(kind, Profile::Paper))));

@@ -3,7 +3,7 @@
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 
 use afbc_hil::{Host, LoopEnd, MessagePeriods, Station, fly};
-use afbc_plant::instruments::{Barometer, Failure, Imu, InstrumentFault, Magnetometer};
+use afbc_plant::instruments::{BarometerModel, FailureKind, ImuModel, InstrumentFault, MagnetometerModel};
 use afbc_scenario::{Scenario, built_in};
 use core::ops::ControlFlow;
 use pil::budget::{ESTIMATING_INSTRUCTIONS_MAX, ESTIMATING_INSTRUCTIONS_MEAN};
@@ -14,18 +14,19 @@ use std::thread;
 /// Returns flights with every inertial sensor indoors, and with every pair of barometer and magnetometer outdoors.
 fn flights() -> Vec<Scenario> {
     let scenario = |name: &str| built_in(name).expect("built in").read().expect("valid");
-    let with = |mut scenario: Scenario, imu: Imu| {
+    let with = |mut scenario: Scenario, imu: ImuModel| {
         // Vibration and mounting belong to the vehicle, not to the sensor.
         let Some(old) = scenario.instruments.imu else { panic!("{} has none", scenario.name) };
-        let mut imu = Imu { mounting: old.mounting, ..imu };
+        let mut imu = ImuModel { mounting: old.mounting, ..imu };
         imu.gyro.vibration_rad_s = old.gyro.vibration_rad_s;
         imu.accel.vibration_m_s2 = old.accel.vibration_m_s2;
         scenario.instruments.imu = Some(imu);
         scenario
     };
-    let parts = [Imu::ICM_42688_P, Imu::BMI270, Imu::MPU_6000];
+    let parts = [ImuModel::ICM_42688_P, ImuModel::BMI270, ImuModel::MPU_6000];
     let indoors = parts.map(|imu| with(scenario("mocap"), imu));
-    let pairs = [(Barometer::DPS310, Magnetometer::IST8310), (Barometer::BMP388, Magnetometer::QMC5883L)];
+    let pairs =
+        [(BarometerModel::DPS310, MagnetometerModel::IST8310), (BarometerModel::BMP388, MagnetometerModel::QMC5883L)];
     let outdoors = pairs.into_iter().zip(parts).map(|((barometer, magnetometer), imu)| {
         let mut outdoors = with(scenario("outdoor"), imu);
         (outdoors.instruments.barometer, outdoors.instruments.magnetometer) = (Some(barometer), Some(magnetometer));
@@ -86,7 +87,7 @@ fn what_is_left_of_the_sensors_is_the_hosts_bit_for_bit() {
     let mut scenario = built_in("mocap").expect("built in").read().expect("valid");
     scenario.duration_s = 9.0;
     let fault = |failure, start_s| InstrumentFault { failure, start_s, end_s: 9.0, rise_s: 0.0 };
-    scenario.instrument_faults = vec![fault(Failure::ImuDead, 3.0), fault(Failure::TrackerLost, 6.0)];
+    scenario.instrument_faults = vec![fault(FailureKind::ImuDead, 3.0), fault(FailureKind::TrackerLost, 6.0)];
     let Some(mut twins) = twins_or_skip() else { return };
     let end = fly(&scenario, &mut Station::new(), &mut twins, MessagePeriods::LOCKSTEP, |_| ControlFlow::Continue(()));
     let lost = end.expect("flown").lost.expect("nobody knows the attitude");

@@ -4,7 +4,7 @@
 use afbc_scenario::contender::ControllerKind;
 use afbc_scenario::{Scenario, built_in, parse};
 use afbc_sim::flight::{Sample, fly};
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 
 fn scenario(name: &str, duration_s: f64) -> Scenario {
     Scenario { duration_s, ..built_in(name).unwrap().read().unwrap() }
@@ -19,7 +19,7 @@ fn samples(scenario: &Scenario, kind: ControllerKind) -> Vec<Sample> {
 #[test]
 fn every_law_flies_the_papers_experiment_on_hardware() {
     let scenario = scenario("hardware", 60.0);
-    let runs: Vec<_> = scenario.contenders.iter().map(|c| Run::fly(&scenario, c, u64::MAX).unwrap()).collect();
+    let runs: Vec<_> = scenario.contenders.iter().map(|c| FlightResult::fly(&scenario, c, u64::MAX).unwrap()).collect();
     assert_eq!(runs.len(), ControllerKind::ALL.len());
     for run in &runs {
         assert_eq!(run.lost, None, "{}", run.contender.name);
@@ -38,7 +38,7 @@ fn no_law_loses_the_vehicle_in_the_storm() {
     for seed in 7..10 {
         let scenario = Scenario { seed, ..scenario("storm", 60.0) };
         for contender in &scenario.contenders {
-            let run = Run::fly(&scenario, contender, u64::MAX).unwrap();
+            let run = FlightResult::fly(&scenario, contender, u64::MAX).unwrap();
             assert_eq!(run.lost, None, "{} with seed {seed}", contender.name);
             assert!(run.metrics.max_abs.xyz().amax() < 0.5, "{}: {}", contender.name, run.metrics.max_abs);
         }
@@ -57,7 +57,7 @@ fn a_monitor_that_trips_saves_the_vehicle() {
     };
     let fly = |monitor| {
         let scenario = Scenario { duration_s: 20.0, ..parse("chatter", &text(monitor), "chatter").unwrap() };
-        Run::fly(&scenario, &scenario.contenders[0], u64::MAX).unwrap()
+        FlightResult::fly(&scenario, &scenario.contenders[0], u64::MAX).unwrap()
     };
     let (alone, watched) = (fly(false), fly(true));
     assert!(alone.tripped.is_none() && watched.tripped.is_some());

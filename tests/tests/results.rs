@@ -3,7 +3,7 @@
 use afbc_campaign::compare;
 use afbc_report::results;
 use afbc_scenario::built_in;
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 
 const PAGE: &str = include_str!("../../docs/results.md");
 const REFERENCE: &str = include_str!("../../docs/reference/results.md");
@@ -39,7 +39,7 @@ fn the_results_page_is_what_the_code_does() {
 fn the_table_on_real_rotors_is_what_flies() {
     let scenario = built_in("hardware").unwrap().read().unwrap();
     let figures = |contender| {
-        let metrics = Run::fly(&scenario, contender, u64::MAX).unwrap().metrics;
+        let metrics = FlightResult::fly(&scenario, contender, u64::MAX).unwrap().metrics;
         let largest = metrics.max_abs.xyz().max();
         let [x, y, z, psi] = metrics.rmse.into();
         [x, y, z, psi, largest]

@@ -7,7 +7,7 @@ use crate::airborne::checker::End;
 use crate::airborne::{Checker, STATION, Session, Tick, on_all_cores};
 use crate::safety_cases::{Case, Do, Start, cases};
 use afbc_guidance::FlightMode;
-use afbc_mavlink::{Command, Datum, Height, Uplink};
+use afbc_mavlink::{Datum, Height, Uplink, VehicleCommand};
 use std::{env, fs};
 
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/reference/safety.md");
@@ -54,7 +54,7 @@ fn fly(case: &Case, seed: u64) -> Outcome {
     }
     if let Start::Air(metres) = case.start {
         let height = Height { metres, above: Datum::Here };
-        session.say(STATION, Uplink::Command(Command::TakeOff(height)));
+        session.say(STATION, Uplink::Command(VehicleCommand::TakeOff(height)));
         let mut run = |session: &mut Session, mode: FlightMode| {
             let end_s = session.time_s() + TAKEN_OFF_S;
             while session.time_s() < end_s && checker.mode() != mode {

@@ -4,8 +4,8 @@
 
 use afbc::Profile;
 use afbc_campaign::suite::SUITES;
-use afbc_plant::instruments::{Failure, InstrumentFault, TrackerModel};
-use afbc_plant::{Environment, ParameterChange, PlantParameter};
+use afbc_plant::instruments::{FailureKind, InstrumentFault, TrackerModel};
+use afbc_plant::{Environment, PlantParameter, PlantParameterChange};
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_sim::flight::{LOST_DISTANCE_M, fly};
@@ -169,7 +169,7 @@ fn the_model_that_stands_in_for_the_inertial_sensor_need_not_be_right() {
     let base = suite().into_iter().find(|scenario| scenario.name == "imu-dead-indoors").unwrap();
     let changed = |quantity, factor| {
         let mut scenario = Scenario { name: format!("{quantity:?} {factor}"), ..base.clone() };
-        let change = ParameterChange { quantity, factor, start_s: 0.0, end_s: f64::INFINITY };
+        let change = PlantParameterChange { quantity, factor, start_s: 0.0, end_s: f64::INFINITY };
         scenario.environment = Environment::new(scenario.vehicle, vec![change], Vec::new()).unwrap();
         scenario
     };
@@ -179,7 +179,7 @@ fn the_model_that_stands_in_for_the_inertial_sensor_need_not_be_right() {
         scenario
     };
     let mut jumped = Scenario { name: "jumped".into(), ..base.clone() };
-    let failure = Failure::TrackerJumped { by_m: Vector3::new(0.5, 0.0, 0.0), yaw_rad: 0.3 };
+    let failure = FailureKind::TrackerJumped { by_m: Vector3::new(0.5, 0.0, 0.0), yaw_rad: 0.3 };
     jumped.instrument_faults.push(InstrumentFault { failure, start_s: 15.0, end_s: jumped.duration_s, rise_s: 0.0 });
     let scenarios = [
         changed(PlantParameter::ThrustFactor, 0.5),

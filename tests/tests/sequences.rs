@@ -7,7 +7,10 @@
 use crate::airborne;
 use afbc_comms::services::modes;
 use afbc_guidance::FlightMode;
-use afbc_mavlink::{Address, Answer, Command, ControlRequest, Datum, Downlink, Height, Mission, Plan, Storage, Uplink};
+use afbc_mavlink::{
+    Address, CommandResult, ControlRequest, Datum, Downlink, Height, MissionMessage, MissionType, Storage, Uplink,
+    VehicleCommand,
+};
 use airborne::checker::{Bounds, End};
 use airborne::session::{global, item};
 use airborne::{COMPANION, Checker, STATION, Session, Tick, on_all_cores, place, velocity};
@@ -51,30 +54,30 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     let station = || prop_oneof![4 => Just(STATION), 1 => Just(COMPANION)];
     let mode = select(FlightMode::ALL.to_vec());
     let command = prop_oneof![
-        6 => Just(Command::Arm),
-        2 => Just(Command::Disarm),
-        5 => (0.5_f32..6.0).prop_map(|metres| Command::TakeOff(Height { metres, above: Datum::Here })),
-        2 => Just(Command::Land),
-        2 => Just(Command::Return),
-        6 => mode.prop_map(|mode| Command::SelectMode(modes::custom(mode))),
-        2 => Just(Command::StartMission(0, None)),
-        1 => (0_u16..4).prop_map(|number| Command::SetCurrent(Some(number), false)),
-        1 => Just(Command::Home(None)),
-        1 => (0.5_f32..5.0).prop_map(Command::Speed),
-        3 => (-30.0_f32..30.0, -30.0_f32..30.0, 1.0_f32..14.0).prop_map(|(x, y, z)| Command::Reposition {
+        6 => Just(VehicleCommand::Arm),
+        2 => Just(VehicleCommand::Disarm),
+        5 => (0.5_f32..6.0).prop_map(|metres| VehicleCommand::TakeOff(Height { metres, above: Datum::Here })),
+        2 => Just(VehicleCommand::Land),
+        2 => Just(VehicleCommand::Return),
+        6 => mode.prop_map(|mode| VehicleCommand::SelectMode(modes::custom(mode))),
+        2 => Just(VehicleCommand::StartMission(0, None)),
+        1 => (0_u16..4).prop_map(|number| VehicleCommand::SetCurrent(Some(number), false)),
+        1 => Just(VehicleCommand::Home(None)),
+        1 => (0.5_f32..5.0).prop_map(VehicleCommand::Speed),
+        3 => (-30.0_f32..30.0, -30.0_f32..30.0, 1.0_f32..14.0).prop_map(|(x, y, z)| VehicleCommand::Reposition {
             place: global(x, y, z),
             yaw_rad: f32::NAN,
             speed_m_s: None,
             changes_mode: true,
         }),
-        1 => Just(Command::CheckArming),
-        1 => Just(Command::Storage(Storage::Save)),
-        1 => Just(Command::Engage),
-        1 => Just(Command::Other(31_999)),
-        1 => Just(Command::Denied(400)),
+        1 => Just(VehicleCommand::CheckArming),
+        1 => Just(VehicleCommand::Storage(Storage::Save)),
+        1 => Just(VehicleCommand::Engage),
+        1 => Just(VehicleCommand::Other(31_999)),
+        1 => Just(VehicleCommand::Denied(400)),
     ];
     // Kill is rare, since it ends a flight.
-    let command = prop_oneof![60 => command, 1 => Just(Command::Kill)];
+    let command = prop_oneof![60 => command, 1 => Just(VehicleCommand::Kill)];
     let target = prop_oneof![
         (-20.0_f32..20.0, -20.0_f32..20.0, 0.5_f32..10.0).prop_map(|(x, y, z)| place(x, y, z)),
         (-5.0_f32..5.0, -5.0_f32..5.0, -1.5_f32..3.0).prop_map(|(x, y, z)| velocity(x, y, z)),
@@ -97,7 +100,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
         1 => (station(), select(vec![0, 0, 2, 3, 7])).prop_map(|(of, one_of)| Step::Breaks(of, one_of)),
         2 => proptest::collection::vec(any::<u8>(), 1..300).prop_map(Step::Noise),
         1 => (station(), control).prop_map(|(from, wish)| Step::Say(from, Uplink::Control(wish))),
-        1 => station().prop_map(|from| Step::Say(from, Uplink::Mission(Mission::Clear(Plan::MISSION)))),
+        1 => station().prop_map(|from| Step::Say(from, Uplink::Mission(MissionMessage::Clear(MissionType::MISSION)))),
         2 => (station(), [-28.0_f32..28.0, -20.0_f32..20.0, 1.5_f32..9.0], any::<bool>())
             .prop_map(|(from, at, lands)| Step::Upload(from, at, lands)),
         4 => line.prop_map(Step::Line),
@@ -112,9 +115,9 @@ fn sequence(number: u64) -> Vec<Step> {
     seed.iter_mut().zip(number.to_le_bytes()).for_each(|(to, from)| *to = from);
     let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::from_seed(RngAlgorithm::ChaCha, &seed));
     let drawn = steps().new_tree(&mut runner).unwrap().current();
-    let take_off = Command::TakeOff(Height { metres: 3.0, above: Datum::Here });
+    let take_off = VehicleCommand::TakeOff(Height { metres: 3.0, above: Datum::Here });
     let say = |command| Step::Say(STATION, Uplink::Command(command));
-    let flies = [say(Command::Arm), Step::Wait(100), say(take_off), Step::Wait(3000)];
+    let flies = [say(VehicleCommand::Arm), Step::Wait(100), say(take_off), Step::Wait(3000)];
     let begin = if number.is_multiple_of(4) { &[][..] } else { &flies[..] };
     begin.iter().cloned().chain(drawn).collect()
 }
@@ -227,12 +230,12 @@ fn the_checker_complains_of_falsified_records() {
     let mut session = Session::new(true, 1);
     let mut ticks = Vec::new();
     session.arm(|tick| ticks.push(tick.clone()));
-    session.say(STATION, Uplink::Command(Command::TakeOff(Height { metres: 2.0, above: Datum::Here })));
+    session.say(STATION, Uplink::Command(VehicleCommand::TakeOff(Height { metres: 2.0, above: Datum::Here })));
     let mut run = |session: &mut Session, milliseconds: u32| {
         ticks.extend((0..milliseconds).map(|_| session.step()));
     };
     run(&mut session, 6000);
-    session.say(STATION, Uplink::Command(Command::Land));
+    session.say(STATION, Uplink::Command(VehicleCommand::Land));
     run(&mut session, 9000);
     let judge = |ticks: &[Tick]| {
         let mut checker = Checker::new(Bounds::DEFAULT, 10.0, true);
@@ -242,7 +245,7 @@ fn the_checker_complains_of_falsified_records() {
     };
     assert_eq!(judge(&ticks), [""; 0]);
     let is_answer = |message: &Downlink, id: u16| match message {
-        Downlink::Answer { command, answer: Answer::Accepted, .. } => *command == id,
+        Downlink::CommandAck { command, answer: CommandResult::Accepted, .. } => *command == id,
         _ => false,
     };
     let is_text = |message: &Downlink, wanted: &str| match message {

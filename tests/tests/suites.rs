@@ -4,12 +4,12 @@ use afbc::Profile;
 use afbc_campaign::compare::{self, standard_and_monitored};
 use afbc_campaign::suite::{SUITES, Suite, SuiteFlight};
 use afbc_files::read::BuiltIn;
-use afbc_plant::{Misreading, PlantParameter};
+use afbc_plant::{PlantParameter, SensorFaultKind};
 use afbc_report::markers;
 use afbc_report::suite::{self, FlownSuite};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_sim::flight::fly;
-use afbc_types::{Axis, Declared, Value};
+use afbc_types::{Axis, Declared, DeclaredValue};
 use core::convert::Infallible;
 use std::collections::BTreeSet;
 
@@ -236,9 +236,9 @@ fn the_faults_are_complete() {
         found.extend(scenario.sensor_faults.iter().map(|fault| {
             let axis = fault.axis.map_or("all", Axis::name);
             match fault.misreading {
-                Misreading::Factor(factor) => format!("{axis} times {factor}"),
-                Misreading::Offset(_) => format!("{axis} off"),
-                Misreading::Frozen => format!("{axis} frozen"),
+                SensorFaultKind::Factor(factor) => format!("{axis} times {factor}"),
+                SensorFaultKind::Offset(_) => format!("{axis} off"),
+                SensorFaultKind::Frozen => format!("{axis} frozen"),
             }
         }));
     }
@@ -261,7 +261,7 @@ fn every_law_may_tilt_as_far() {
     let tilts = |contender: &Contender| {
         let mut tilts = Vec::new();
         let Ok(()) = contender.law.visit(&mut |declaration, value| {
-            if let ("tilt_max_rad", Value::Single([tilt])) = (declaration.range.name, value) {
+            if let ("tilt_max_rad", DeclaredValue::Single([tilt])) = (declaration.range.name, value) {
                 tilts.push(*tilt);
             }
             Ok::<(), Infallible>(())

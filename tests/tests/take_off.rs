@@ -2,7 +2,7 @@
 //! hold and leave the ground.
 
 use afbc::Profile;
-use afbc_plant::Start;
+use afbc_plant::RotorStart;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::trajectory::{Trajectory, Waypoint};
 use afbc_scenario::{Scenario, built_in};
@@ -28,7 +28,7 @@ fn take_off(vehicle: &Vehicle, wind_m_s: [f64; 2], yaw_rad: f64, seed: u64) -> S
     let [x, y] = wind_m_s;
     scenario.realism.wind.steady_m_s = Vector3::new(x, y, 0.0);
     let mut scenario = scenario.on(vehicle, Profile::Flight).unwrap();
-    scenario.realism.rotors.start = Start::Idle;
+    scenario.realism.rotors.start = RotorStart::Idle;
     scenario
 }
 

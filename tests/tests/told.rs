@@ -3,9 +3,9 @@
 
 use afbc::Profile;
 use afbc_plant::InstrumentSuite;
-use afbc_plant::instruments::{Barometer, Imu, Magnetometer, TrackerModel};
+use afbc_plant::instruments::{BarometerModel, ImuModel, MagnetometerModel, TrackerModel};
 use afbc_scenario::contender::{Contender, ControllerKind};
-use afbc_scenario::{Scenario, Told, parse};
+use afbc_scenario::{AssumedInstruments, Scenario, parse};
 use afbc_sim::flight::fly;
 
 const INSTRUMENTS: &str = "[instruments]\ntracker = \"mocap-100\"\nbarometer = \"dps310\"\nmagnetometer = \"ist8310\"\n\
@@ -60,16 +60,16 @@ fn what_is_told_is_read_key_by_key() {
     let scenario = scenario(&format!("{INSTRUMENTS}{told}"));
     let there = scenario.instruments;
     let wanted = InstrumentSuite {
-        imu: Some(Imu::BMI270),
+        imu: Some(ImuModel::BMI270),
         tracker: Some(TrackerModel { rate_hz: 50.0, ..TrackerModel::MOCAP_100 }),
-        magnetometer: Some(Magnetometer { hard_iron_ut: 10.0, ..Magnetometer::IST8310 }),
+        magnetometer: Some(MagnetometerModel { hard_iron_ut: 10.0, ..MagnetometerModel::IST8310 }),
         ..there
     };
-    assert_eq!((scenario.told.clone(), scenario.told()), (Told::Suite(Box::new(wanted)), wanted));
-    assert_eq!(there.barometer, Some(Barometer::DPS310));
+    assert_eq!((scenario.told.clone(), scenario.told()), (AssumedInstruments::Suite(Box::new(wanted)), wanted));
+    assert_eq!(there.barometer, Some(BarometerModel::DPS310));
     // The told values stay when the instruments change. Nothing is told about an instrument that is gone.
     let mut drawn = scenario.clone();
-    drawn.instruments = InstrumentSuite { imu: Some(Imu::MPU_6000), tracker: None, ..there };
+    drawn.instruments = InstrumentSuite { imu: Some(ImuModel::MPU_6000), tracker: None, ..there };
     assert_eq!(drawn.told(), InstrumentSuite { tracker: None, ..wanted });
 }
 
@@ -88,7 +88,7 @@ fn a_vehicles_file_says_what_it_knows() {
     let bare = on(file.text, &plain);
     assert_eq!(bare.told(), plain.instruments);
     let named = on(&part, &plain);
-    assert_eq!(named.told(), InstrumentSuite { imu: Some(Imu::MPU_6000), ..plain.instruments });
+    assert_eq!(named.told(), InstrumentSuite { imu: Some(ImuModel::MPU_6000), ..plain.instruments });
     assert_eq!(named.instruments, plain.instruments);
     assert_ne!(settings(&named), settings(&bare));
     let stated = settings(&on(&set, &plain));
@@ -96,5 +96,5 @@ fn a_vehicles_file_says_what_it_knows() {
     (wanted.gate_sigmas, wanted.gyro_noise_rad_s_rthz) = (4.0, 0.01);
     assert_eq!(stated, wanted);
     let told = scenario(&format!("{INSTRUMENTS}[told]\nimu = \"bmi270\"\n"));
-    assert_eq!(on(&part, &told).told().imu, Some(Imu::BMI270));
+    assert_eq!(on(&part, &told).told().imu, Some(ImuModel::BMI270));
 }

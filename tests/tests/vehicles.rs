@@ -115,7 +115,8 @@ fn a_perfect_hover_does_not_trip() {
         let settings = Profile::Flight.settings().with_rotor_force_max_n(mass_kg * 6.0);
         let gains = Profile::Flight.gains_for(&vehicle, afbc::LAG_S);
         let guarded =
-            Guarded::new(vehicle, settings, gains, afbc::monitor::Bounds::new(&gains, &vehicle, &settings)).unwrap();
+            Guarded::new(vehicle, settings, gains, afbc::monitor::MonitorBounds::new(&gains, &vehicle, &settings))
+                .unwrap();
         let mut memory = afbc_control::Validated::default();
         for _ in 0..5_000 {
             let command =

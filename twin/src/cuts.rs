@@ -8,7 +8,7 @@ use crate::machine::{Machine, quiet_usb};
 use crate::random::Random;
 use crate::trouble::Patient;
 use crate::wire::Wire;
-use afbc_mavlink::{Address, Decoder, Downlink, FRAME_MAX, ParameterName, ParameterRequest, Sender, Uplink};
+use afbc_mavlink::{Address, Decoder, Downlink, FRAME_MAX, ParameterName, ParameterRequest, Encoder, Uplink};
 use rigless::emulator::{AccessKind, Driver, Host, Settled, Start, Stop, run};
 use rigless::image::Image;
 use rigless::machine::matekh743::MatekH743;
@@ -275,7 +275,7 @@ fn padded(name: &str) -> ParameterName {
 }
 
 fn say(wire: &Wire, messages: &[Uplink]) {
-    let mut sender = Sender::new(STATION);
+    let mut sender = Encoder::new(STATION);
     for message in messages {
         wire.send(sender.send(message, &mut [0; FRAME_MAX]));
     }

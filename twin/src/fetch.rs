@@ -2,7 +2,7 @@
 //! logs.
 
 use crate::check::check;
-use afbc_mavlink::{Decoder, LogEntry, LogMessage, LogRequest, Question, Uplink};
+use afbc_mavlink::{Decoder, LogEntry, LogMessage, LogRequest, ServiceRequest, Uplink};
 use std::error::Error;
 
 /// Time after the flight until the log has ended, and between two attempts of a request [ms].
@@ -138,7 +138,7 @@ impl Fetch {
             }
             Step::Done => return None,
         };
-        Some(Uplink::Question(Question::Log(request)))
+        Some(Uplink::ServiceRequest(ServiceRequest::Log(request)))
     }
 
     /// Compares the list and the downloads with the logs on the card.

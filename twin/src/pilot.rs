@@ -8,7 +8,7 @@ use crate::world::Transducers;
 use afbc_flight_core::motor::{THROTTLE_MAX, THROTTLE_MIN};
 use afbc_ground::{Client, Patience};
 use afbc_mavlink::telemetry::EscStatus;
-use afbc_mavlink::{Command, Datum, Decoder, Downlink, Height, Mission, Plan, Telemetry, Uplink};
+use afbc_mavlink::{VehicleCommand, Datum, Decoder, Downlink, Height, MissionMessage, MissionType, Telemetry, Uplink};
 use afbc_onboard::Readings;
 use afbc_plant::Motion;
 use afbc_scenario::Scenario;
@@ -312,7 +312,7 @@ impl Pilot {
         self.client.hear(&bytes, |_, message| match message {
             Downlink::Heartbeat { armed: is_armed, .. } => *armed = *is_armed,
             Downlink::Telemetry(Telemetry::EscStatus(status)) => *escs = Some((now_ms, *status)),
-            Downlink::Mission { message: Mission::Reached(number), .. } => {
+            Downlink::Mission { message: MissionMessage::Reached(number), .. } => {
                 tour.iter_mut().for_each(|tour| tour.reach(*number, now_ms, position_m));
             }
             Downlink::Health(health) => {
@@ -363,9 +363,9 @@ impl Pilot {
                 let is_ready = self.tour.as_ref().is_none_or(Tour::is_aboard);
                 if second && self.now_ms > 3000 {
                     if is_ready {
-                        self.client.say(Uplink::Command(Command::Arm));
+                        self.client.say(Uplink::Command(VehicleCommand::Arm));
                     } else {
-                        self.client.upload([(Plan::MISSION, Tour::items())], Patience::ONCE);
+                        self.client.upload([(MissionType::MISSION, Tour::items())], Patience::ONCE);
                     }
                     self.send();
                 }
@@ -377,7 +377,7 @@ impl Pilot {
                 }
                 if passed_ms % 2000 == 500 && z - self.start_m[2] < 0.5 {
                     let height = Height { metres: HEIGHT_M, above: Datum::Here };
-                    self.say(&Uplink::Command(Command::TakeOff(height)));
+                    self.say(&Uplink::Command(VehicleCommand::TakeOff(height)));
                 }
                 (z - self.start_m[2] > 0.6 * f64::from(HEIGHT_M)).then_some(Phase::Hovers)
             }
@@ -390,13 +390,13 @@ impl Pilot {
             }
             Phase::Tours => {
                 if passed_ms % 2000 == 0 && z < 0.5 && self.tour.as_ref().is_some_and(|tour| !tour.has_begun()) {
-                    self.say(&Uplink::Command(Command::StartMission(0, None)));
+                    self.say(&Uplink::Command(VehicleCommand::StartMission(0, None)));
                 }
                 (!self.armed).then_some(after)
             }
             Phase::Lands => {
                 if passed_ms % 2000 == 0 && self.armed {
-                    self.say(&Uplink::Command(Command::Land));
+                    self.say(&Uplink::Command(VehicleCommand::Land));
                 }
                 (!self.armed).then_some(after)
             }

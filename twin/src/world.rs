@@ -1,6 +1,6 @@
 //! Converts the readings of the plant's instruments into signals of the board's transducers.
 
-use afbc_estimator::{Measurement, Origin};
+use afbc_estimator::{Measurement, GeodeticOrigin};
 use afbc_onboard::Readings;
 use nalgebra::Vector3;
 use rigless::chip::nmea::Position;
@@ -34,7 +34,7 @@ pub struct Transducers {
 impl Transducers {
     pub fn new() -> Self {
         let [latitude, longitude, altitude] = PLACE;
-        let origin = Origin::new(latitude, longitude, altitude).expect("a place");
+        let origin = GeodeticOrigin::new(latitude, longitude, altitude).expect("a place");
         let step = origin.local(latitude + 1e-3, longitude + 1e-3, altitude) * 1e-4;
         let scale = [step.x.into(), (-step.y).into()];
         Transducers { signals: at_the_place(), scale, fix_m: [0.0; 3], height_m: 0.0 }

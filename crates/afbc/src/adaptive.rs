@@ -1,8 +1,8 @@
 //! Adaptive fuzzy backstepping of one subsystem: the law (20)-(22) and its adaptation (32)-(34).
 
 use crate::backstepping::{self, proportional};
-use crate::fuzzy::{Basis, Firing, Membership};
-use crate::law::{Context, Law, Tracking};
+use crate::fuzzy::{FiringStrengths, FuzzyBasis, Membership};
+use crate::law::{StepContext, SubsystemLaw, SubsystemTracking};
 use crate::model::ModelConstants;
 use crate::safeguards::Safeguards;
 use afbc_control::{Errors, math};
@@ -94,9 +94,9 @@ pub struct AdaptiveEstimate {
 }
 
 /// Derivatives of an [`AdaptiveEstimate`]. The derivative of Theta_hat, gamma e_2 w(x), is stored in factors
-/// ([`Firing`]).
+/// ([`FiringStrengths`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rate {
+pub struct AdaptationRate {
     first: Vector3<f32>,
     second: Vector3<f32>,
     /// gamma e_2 divided by the sum of the firing strengths.
@@ -105,7 +105,7 @@ pub struct Rate {
     leakage: f32,
 }
 
-impl Rate {
+impl AdaptationRate {
     /// Returns (34): gamma e_2 w(x).
     pub fn theta(&self) -> Matrix3<f32> {
         self.first * self.second.transpose() * self.theta
@@ -143,7 +143,7 @@ fn spread(input: f32, weights: &Matrix3<f32>, norm_max: f32) -> AdaptiveEstimate
 
 /// Advances the estimate by one explicit Euler step, with projection onto its bounds.
 #[inline]
-fn advance(estimate: &mut AdaptiveEstimate, rate: &Rate, safeguards: &Safeguards, dt_s: f32) {
+fn advance(estimate: &mut AdaptiveEstimate, rate: &AdaptationRate, safeguards: &Safeguards, dt_s: f32) {
     let Safeguards { theta_max, delta_max, .. } = *safeguards;
     // If the leakage is faster than the step, the estimate becomes zero and does not change sign.
     let keep = math::max(1.0 - rate.leakage * dt_s, 0.0);
@@ -156,7 +156,7 @@ fn advance(estimate: &mut AdaptiveEstimate, rate: &Rate, safeguards: &Safeguards
 
 /// The three terms of (20).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Terms {
+pub struct ControlTerms {
     /// u_a (22)
     pub fuzzy: f32,
     /// u_r (32)
@@ -165,7 +165,7 @@ pub struct Terms {
     pub proportional: f32,
 }
 
-impl Terms {
+impl ControlTerms {
     /// Returns u (20).
     #[inline]
     pub fn sum(&self) -> f32 {
@@ -177,7 +177,7 @@ impl Terms {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Subsystem {
     gains: Gains,
-    basis: Basis,
+    basis: FuzzyBasis,
     inverse_epsilon: f32,
 }
 
@@ -188,7 +188,7 @@ impl Subsystem {
     /// Returns the first gain that is out of range.
     pub fn new(gains: Gains) -> Result<Self, OutOfRange> {
         gains.validate()?;
-        Ok(Subsystem { gains, basis: Basis::new(gains.membership)?, inverse_epsilon: 1.0 / gains.epsilon })
+        Ok(Subsystem { gains, basis: FuzzyBasis::new(gains.membership)?, inverse_epsilon: 1.0 / gains.epsilon })
     }
 
     /// Returns the terms of (20) and the derivatives of the estimate by (33), (34) with the [`Safeguards`], both from
@@ -200,18 +200,18 @@ impl Subsystem {
         inputs: [f32; 2],
         estimate: &AdaptiveEstimate,
         unallocated: f32,
-    ) -> (Terms, Rate) {
+    ) -> (ControlTerms, AdaptationRate) {
         let Gains { gamma, eta, safeguards, .. } = &self.gains;
         let e2 = errors.e2;
-        let Firing { first, second, share } = self.basis.fire(inputs);
+        let FiringStrengths { first, second, share } = self.basis.fire(inputs);
         let s = math::tanh(e2 * self.inverse_epsilon);
-        let terms = Terms {
+        let terms = ControlTerms {
             fuzzy: first.dot(&(estimate.theta * second)) * share,
             robust: estimate.delta * s,
             proportional: proportional(self.gains.backstepping.alpha2, errors),
         };
         let (error, leakage) = (safeguards.adaptation_error(e2, unallocated), safeguards.leakage(e2));
-        (terms, Rate { first, second, theta: gamma * error * share, delta: eta * error * s, leakage })
+        (terms, AdaptationRate { first, second, theta: gamma * error * share, delta: eta * error * s, leakage })
     }
 
     /// Returns u, and advances the estimate if the context allows it.
@@ -222,7 +222,7 @@ impl Subsystem {
         errors: &Errors,
         [x1, x2]: [f32; 2],
         unallocated: f32,
-        context: &Context,
+        context: &StepContext,
         estimate: &mut AdaptiveEstimate,
     ) -> f32 {
         let (terms, rate) = self.law(errors, [x1, x2], estimate, unallocated);
@@ -291,7 +291,7 @@ impl Adaptive {
     }
 }
 
-impl Law for Adaptive {
+impl SubsystemLaw for Adaptive {
     /// The gyroscopic effect of the rotors is learnt like any other unknown.
     const USES_ROTOR_RESIDUAL: bool = false;
 
@@ -303,8 +303,8 @@ impl Law for Adaptive {
     fn input(
         &self,
         axis: Axis,
-        tracking: &Tracking,
-        context: &Context,
+        tracking: &SubsystemTracking,
+        context: &StepContext,
         estimate: &mut AdaptiveEstimate,
     ) -> (f32, Errors) {
         let subsystem = &self.subsystems[axis];
@@ -351,7 +351,7 @@ mod tests {
     /// fits, and never larger than the smallest estimate with that input.
     #[test]
     fn an_input_is_spread_as_evenly_as_fits() {
-        let basis = Basis::new(Membership { centre: 3.0, width: 1.2 }).unwrap();
+        let basis = FuzzyBasis::new(Membership { centre: 3.0, width: 1.2 }).unwrap();
         for inputs in [[0.0, 0.0], [0.4, -0.9], [2.0, 1.0], [-1.5, 4.0], [-6.0, 0.1]] {
             let weights = basis.weights(inputs);
             let least_norm = |input: f32| input.abs() / weights.norm();

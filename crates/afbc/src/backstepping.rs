@@ -1,6 +1,6 @@
 //! Backstepping of one second-order subsystem (7), and the classical controller that is the paper's baseline.
 
-use crate::law::{Context, Law, Tracking};
+use crate::law::{StepContext, SubsystemLaw, SubsystemTracking};
 use crate::model::{Dynamics, ModelConstants};
 use afbc_control::Errors;
 use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, parameters};
@@ -21,10 +21,10 @@ fn compensated(acceleration: f32, e2: f32, dynamics: &Dynamics) -> f32 {
     (acceleration - f - drift) / g
 }
 
-/// Returns [`ideal`]. At the speed limit, where [`Tracking::errors`] uses the approach speed for e_2, c e_1 + alpha_1
-/// de_1/dt becomes alpha_1 e_2.
+/// Returns [`ideal`]. At the speed limit, where [`SubsystemTracking::errors`] uses the approach speed for e_2, c e_1 +
+/// alpha_1 de_1/dt becomes alpha_1 e_2.
 #[inline]
-pub(crate) fn known(gains: &Gains, tracking: &Tracking, errors: &Errors, dynamics: &Dynamics) -> f32 {
+pub(crate) fn known(gains: &Gains, tracking: &SubsystemTracking, errors: &Errors, dynamics: &Dynamics) -> f32 {
     if tracking.approach_1_s.is_some() {
         compensated(gains.alpha1 * errors.e2 + tracking.x1d_ddot, errors.e2, dynamics)
     } else {
@@ -40,7 +40,7 @@ pub fn proportional(alpha2: f32, errors: &Errors) -> f32 {
 
 /// Returns u*_eq + alpha_2 e_2, and the errors.
 #[inline]
-pub(crate) fn classical(gains: &Gains, tracking: &Tracking, dynamics: &Dynamics) -> (f32, Errors) {
+pub(crate) fn classical(gains: &Gains, tracking: &SubsystemTracking, dynamics: &Dynamics) -> (f32, Errors) {
     let errors = tracking.errors(gains.alpha1);
     (known(gains, tracking, &errors, dynamics) + proportional(gains.alpha2, &errors), errors)
 }
@@ -93,12 +93,12 @@ impl Backstepping {
     }
 }
 
-impl Law for Backstepping {
+impl SubsystemLaw for Backstepping {
     /// Empty, because a fixed law has no memory.
     type Estimate = ();
 
     #[inline]
-    fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, (): &mut ()) -> (f32, Errors) {
+    fn input(&self, axis: Axis, tracking: &SubsystemTracking, context: &StepContext, (): &mut ()) -> (f32, Errors) {
         classical(&self.gains[axis], tracking, &context.dynamics(&self.model, axis))
     }
 

@@ -1,23 +1,25 @@
 //! Cascade of six subsystems: position gives thrust and desired attitude, attitude gives U1..U3, and the mixer turns
 //! these into rotor speeds. Section III-D, Fig. 2.
 
-use crate::ahead::Ahead;
+use crate::delay_compensation::DelayCompensation;
 use crate::desired::{DesiredAttitude, DesiredMemory, DesiredRollPitch};
-use crate::disturbance::{ForceObserver, ForceObserverMemory, MomentObserver, Turning};
+use crate::disturbance::{
+    ForceObserver, ForceObserverMemory, MomentObserver, MomentObserverMemory, ObserverConditions,
+};
 use crate::effort::Effort;
-use crate::law::{Context, Law, Tracking};
-use crate::limits::Approach;
+use crate::law::{StepContext, SubsystemLaw, SubsystemTracking};
+use crate::limits::ApproachLimit;
 use crate::model::{Attitude, ModelConstants, RollPitch, euler_rates};
-use crate::reference::{Detours, ReferenceFilter};
-use crate::rotation::Turn;
+use crate::reference::{ReferenceFilter, ReferenceMemory};
+use crate::rotation::AttitudeTracking;
 pub use crate::settings::Settings;
-use crate::standstill::Standstill;
+use crate::standstill::StandstillDetector;
 use afbc_control::mixer::Mixer;
 use afbc_control::{Action, Errors, FlightController, Smoothed, Smoother, Trace, math};
 use afbc_types::{Airframe, Axis, Declared, Inputs, OutOfRange, PerAxis, Setpoint, State};
 use nalgebra::{Vector2, Vector3};
 
-/// Controller with its constants. Everything that changes in flight is in [`Cascade`].
+/// Controller with its constants. Everything that changes in flight is in [`CascadeMemory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Controller<L, const N: usize = 4> {
     law: L,
@@ -27,10 +29,10 @@ pub struct Controller<L, const N: usize = 4> {
     forces: Option<ForceObserver>,
     moments: Option<MomentObserver>,
     /// Speed limits of x, y and z.
-    approach: [Approach; 3],
+    approach: [ApproachLimit; 3],
     desired: DesiredAttitude,
     smoother: Smoother,
-    ahead: Ahead,
+    ahead: DelayCompensation,
     effort: Effort,
     mixer: Mixer<N>,
     settings: Settings,
@@ -42,12 +44,12 @@ pub struct Controller<L, const N: usize = 4> {
 
 /// Memory of the cascade.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Cascade<E> {
+pub struct CascadeMemory<E> {
     /// Estimates of each subsystem.
     pub estimates: PerAxis<E>,
     /// Results of the last step.
     pub last: LastStep,
-    pub(crate) filters: Filters,
+    pub(crate) filters: FilterMemories,
     rotor_residual_rad_s: f32,
 }
 
@@ -61,40 +63,42 @@ pub struct LastStep {
     /// Inputs of each subsystem: U1..U4 \[N\], u5, u6 \[m/s2\].
     pub inputs: PerAxis<f32>,
     /// U1..U4 after the filters, as given to the mixer.
-    pub asked: Inputs,
-    /// Part of each input that was not allocated, see [`Context::unallocated`].
+    pub commanded: Inputs,
+    /// Part of each input that was not allocated, see [`StepContext::unallocated`].
     unallocated: PerAxis<f32>,
-    /// eta and d eta/dt. As in (6), d eta/dt is the body rates; with feed-forward it follows from them.
-    pub(crate) turning: [Vector3<f32>; 2],
+    /// eta: roll, pitch and yaw \[rad\].
+    pub(crate) eta: Vector3<f32>,
+    /// d eta/dt \[rad/s\]. As in (6), d eta/dt is the body rates; with feed-forward it follows from them.
+    pub(crate) eta_dot: Vector3<f32>,
 }
 
 /// Memories of the filters and observers around the law.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Filters {
+pub(crate) struct FilterMemories {
     /// Reference filter, `None` before the first step.
-    detours: Option<Detours>,
+    reference: Option<ReferenceMemory>,
     pub(crate) forces: Option<ForceObserverMemory>,
-    moments: Option<Turning>,
+    moments: Option<MomentObserverMemory>,
     desired: DesiredMemory,
     smoothed: Option<Smoothed>,
-    /// Low-pass of [`Ahead`].
-    late: Option<Vector2<f32>>,
+    /// Low-pass of [`DelayCompensation`].
+    delay_low_pass: Option<Vector2<f32>>,
     /// Memory of [`Effort`].
-    more_effort: f32,
-    standstill: Standstill,
+    effort_excess: f32,
+    standstill: StandstillDetector,
 }
 
-impl<E> Cascade<E> {
+impl<E> CascadeMemory<E> {
     /// Returns the memory with the estimates of another law, which starts with this rotor residual.
-    pub(crate) fn handed_over<F>(&self, estimates: PerAxis<F>, rotor_residual_rad_s: f32) -> Cascade<F> {
+    pub(crate) fn handed_over<F>(&self, estimates: PerAxis<F>, rotor_residual_rad_s: f32) -> CascadeMemory<F> {
         // Filters and observers keep their memory, so no input jumps and observed disturbances stay compensated.
-        let Cascade { last, filters, .. } = *self;
-        Cascade { estimates, last, filters, rotor_residual_rad_s }
+        let CascadeMemory { last, filters, .. } = *self;
+        CascadeMemory { estimates, last, filters, rotor_residual_rad_s }
     }
 
     /// Returns the trace of the last step.
     pub(crate) fn trace(&self) -> Trace {
-        let LastStep { errors, inputs: PerAxis { x, y, .. }, asked, .. } = self.last;
+        let LastStep { errors, inputs: PerAxis { x, y, .. }, commanded: asked, .. } = self.last;
         let mut trace = Trace::default();
         trace.inputs = asked;
         trace.virtual_m_s2 = [x, y];
@@ -104,7 +108,7 @@ impl<E> Cascade<E> {
     }
 }
 
-impl<L: Law, const N: usize> Controller<L, N> {
+impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
     /// Creates a controller for a vehicle with these nominal parameters.
     ///
     /// # Errors
@@ -118,7 +122,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         let dt_s = common.dt_s;
         let model = ModelConstants::new(&vehicle.parameters);
         let known = settings.feed_forward.then_some(&model);
-        let approach = |axis, speed_max_m_s| Approach::new(speed_max_m_s, law.approach(axis, known));
+        let approach = |axis, speed_max_m_s| ApproachLimit::new(speed_max_m_s, law.approach(axis, known));
         // Without feed-forward, or for a law that does not use them, the observers would have no effect.
         let observes = settings.feed_forward && L::OBSERVES;
         Ok(Controller {
@@ -139,7 +143,12 @@ impl<L: Law, const N: usize> Controller<L, N> {
             reference: ReferenceFilter::new(&settings.reference, limits, dt_s),
             desired: DesiredAttitude::new(&settings, vehicle.parameters.gravity_m_s2, thrust_max_n)?,
             smoother: Smoother::new(&settings.smoothing, dt_s)?,
-            ahead: Ahead::new(disturbance.disturbance_lag_s, &settings.smoothing, settings.command_filter_rad_s, dt_s),
+            ahead: DelayCompensation::new(
+                disturbance.disturbance_lag_s,
+                &settings.smoothing,
+                settings.command_filter_rad_s,
+                dt_s,
+            ),
             effort: Effort::new(vehicle.parameters.weight_n(), dt_s),
             settings,
             weight_n: vehicle.parameters.weight_n(),
@@ -160,7 +169,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
     }
 
     /// Returns the estimated hover thrust U4 \[N\], limited to what the rotors can give.
-    pub(crate) fn hover_thrust_n(&self, memory: &Cascade<L::Estimate>) -> f32 {
+    pub(crate) fn hover_thrust_n(&self, memory: &CascadeMemory<L::Estimate>) -> f32 {
         let hover_n = self.law.hover_thrust_n(&memory.estimates.z, self.weight_n, self.known_weight_n());
         // (40) divides the commanded thrust by the hover thrust, so both need the same limit.
         math::min(hover_n, self.thrust_max_n)
@@ -173,15 +182,15 @@ impl<L: Law, const N: usize> Controller<L, N> {
 
     /// Returns true if the vehicle stands on the ground and `freeze_on_ground` is set.
     #[inline]
-    pub(crate) fn stands(&self, memory: &Cascade<L::Estimate>) -> bool {
-        self.settings.freeze_on_ground && memory.filters.standstill.stands()
+    pub(crate) fn is_standing(&self, memory: &CascadeMemory<L::Estimate>) -> bool {
+        self.settings.freeze_on_ground && memory.filters.standstill.is_standing()
     }
 
     /// Computes (7)-(40) in their order; `fresh` as in [`FlightController::decide`].
     #[inline(never)]
     pub(crate) fn cascade(
         &self,
-        memory: &mut Cascade<L::Estimate>,
+        memory: &mut CascadeMemory<L::Estimate>,
         state: &State,
         setpoint: &Setpoint,
         fresh: bool,
@@ -190,31 +199,31 @@ impl<L: Law, const N: usize> Controller<L, N> {
             // The law must not learn the weight that feed-forward already knows, or it would be carried twice.
             self.law.start(&mut memory.estimates, self.weight_n - self.known_weight_n());
         }
-        let (hover_n, stands) = (self.hover_thrust_n(memory), self.stands(memory));
-        let touches = self.settings.freeze_on_ground && memory.filters.standstill.touches();
+        let (hover_n, stands) = (self.hover_thrust_n(memory), self.is_standing(memory));
+        let touches_ground = self.settings.freeze_on_ground && memory.filters.standstill.is_touching_ground();
         let low_tan =
             if self.settings.freeze_on_ground { memory.filters.standstill.tilt_max_tan() } else { f32::INFINITY };
-        let Cascade { estimates, last, filters, rotor_residual_rad_s } = memory;
-        let reference = self.reference(&mut filters.detours, state, setpoint);
+        let CascadeMemory { estimates, last, filters, rotor_residual_rad_s } = memory;
+        let reference = self.reference(&mut filters.reference, state, setpoint);
         let attitude = Attitude::of(state);
         // Drag is computed before the thrust, so it uses the last step's. A law may ask for negative thrust; `hover_n`
         // is positive.
-        let share = math::max(last.asked.thrust_n, 0.0) / hover_n;
-        let observed_m_s2 = self.observe_forces(&mut filters.forces, state, &attitude, hover_n, [fresh, touches]);
+        let share = math::max(last.commanded.thrust_n, 0.0) / hover_n;
+        let conditions = ObserverConditions { fresh, touches_ground };
+        let observed_m_s2 = self.observe_forces(&mut filters.forces, state, &attitude, hover_n, conditions);
         let gyroscopic_rad_s2 = self.model.gyroscopic(&state.rates_rad_s, *rotor_residual_rad_s);
         let velocity_body_m_s = attitude.in_body(&state.velocity_m_s);
         // Given to the moment observer, which would otherwise compensate the known moments a second time.
-        let known_rad_s2 = gyroscopic_rad_s2 + self.drag_turns(&velocity_body_m_s, share);
-        let observed_rad_s2 =
-            self.observe_moments(&mut filters.moments, &state.rates_rad_s, &known_rad_s2, [fresh, touches]);
-        let context = Context {
+        let known_rad_s2 = gyroscopic_rad_s2 + self.drag_acceleration_rad_s2(&velocity_body_m_s, share);
+        let observed_rad_s2 = self.observe_moments(&mut filters.moments, &state.rates_rad_s, &known_rad_s2, conditions);
+        let context = StepContext {
             state,
             roll_pitch: attitude.roll_pitch,
             rotor_residual_rad_s: *rotor_residual_rad_s,
             dt_s: self.settings.common.dt_s,
             // On the ground the feet hold the vehicle against everything but the thrust, so only the thrust is learnt
             // (`lift`).
-            adapt: fresh && !touches,
+            adapt: fresh && !touches_ground,
             unallocated: &last.unallocated,
             observed_m_s2,
             known: self.settings.feed_forward.then_some(&self.model),
@@ -222,27 +231,29 @@ impl<L: Law, const N: usize> Controller<L, N> {
         let eta_dot = self.eta_dot(state, &attitude);
 
         // Position: subsystems 4, 5, 6.
-        let lift = Context { adapt: fresh && !stands, ..context };
+        let lift = StepContext { adapt: fresh && !stands, ..context };
         let [u4, u5, u6] = self.position(&reference, [&lift, &context], estimates, &mut last.errors);
         // Desired roll and pitch (40), with the derivatives for (12) and (16).
         let followed = [&reference, setpoint];
         let desired = self.desired.advance(&mut filters.desired, [u5, u6, u4], [hover_n, low_tan], &attitude, followed);
         // Attitude: subsystems 1, 2, 3.
-        let mut turn = self.turn(&desired, &reference, &attitude, state);
+        let mut tracking = self.attitude_tracking(&desired, &reference, &attitude, state);
         if self.settings.feed_forward {
             // Without the measured body rates, whose noise the lead would amplify.
-            let more = self.ahead.advance(&mut filters.late, &turn.desired_accelerations.xy());
-            turn.accelerations += Vector3::new(more.x, more.y, 0.0);
+            let more = self.ahead.advance(&mut filters.delay_low_pass, &tracking.desired_accelerations.xy());
+            tracking.accelerations += Vector3::new(more.x, more.y, 0.0);
         }
-        let [u1, u2, u3] = self.attitude(&turn, [&state.attitude_rad, &eta_dot], &context, estimates, &mut last.errors);
+        let [u1, u2, u3] =
+            self.attitude(&tracking, [&state.attitude_rad, &eta_dot], &context, estimates, &mut last.errors);
 
         // Rotors. Moments are compensated at their predicted value after the rotor lag. In rotating axes (R' v)' = R'
         // dv/dt - Omega x R' v, because the drag's moment turns with the body.
         let change = attitude.in_body(&reference.acceleration_m_s2) - state.rates_rad_s.cross(&velocity_body_m_s);
         let ahead_m_s = velocity_body_m_s + change * self.settings.disturbance.disturbance_lag_s;
-        let against = self.make_up(&observed_rad_s2, &ahead_m_s, share, touches);
+        let compensation_n = self.moment_compensation_n(&observed_rad_s2, &ahead_m_s, share, touches_ground);
         let ahead_n = self.mass_kg * self.ahead.thrust_s * desired.thrust_m_s3;
-        let (asked, effort) = self.asked(filters, [u1, u2, u3, u4 + ahead_n], against, hover_n, stands);
+        let (asked, effort) =
+            self.commanded_inputs(filters, [u1, u2, u3, u4 + ahead_n], compensation_n, hover_n, stands);
         let allocation = self.mixer.allocate(&asked);
         let action = self.mixer.carry_out(&allocation);
 
@@ -250,16 +261,16 @@ impl<L: Law, const N: usize> Controller<L, N> {
         if let Some(forces) = &self.forces {
             // The thrust as given, not as asked: otherwise the part beyond the rotors' limits would be observed as a
             // disturbance.
-            forces.give(&mut filters.forces, action.given.thrust_n);
+            forces.record_thrust(&mut filters.forces, action.given.thrust_n);
         }
         if let Some(moments) = &self.moments {
-            moments.give(&mut filters.moments, &action.given, effort);
+            moments.record_inputs(&mut filters.moments, &action.given, effort);
         }
         filters.standstill.advance(u4, self.weight_n, state, self.settings.common.dt_s);
-        let leaves = touches && !filters.standstill.touches();
+        let leaves_ground = touches_ground && !filters.standstill.is_touching_ground();
         // The way back after sliding on the ground must not be learnt as a disturbance.
-        if let (true, Some(reference), Some(detours)) = (leaves, &self.reference, &mut filters.detours) {
-            reference.restart_level(detours, state, setpoint);
+        if let (true, Some(reference), Some(memory)) = (leaves_ground, &self.reference, &mut filters.reference) {
+            reference.restart_horizontal(memory, state, setpoint);
         }
         if L::USES_ROTOR_RESIDUAL {
             *rotor_residual_rad_s = self.mixer.residual_rad_s(&action.speeds);
@@ -274,24 +285,24 @@ impl<L: Law, const N: usize> Controller<L, N> {
         let [x, y, z] = (reference.position_m - state.position_m).into();
         last.distances = PerAxis { roll: roll.e1, pitch: pitch.e1, yaw: yaw.e1, z, x, y };
         last.inputs = PerAxis { roll: u1, pitch: u2, yaw: u3, z: u4, x: u5, y: u6 };
-        last.turning = [state.attitude_rad, eta_dot];
-        last.asked = asked;
+        (last.eta, last.eta_dot) = (state.attitude_rad, eta_dot);
+        last.commanded = asked;
         action
     }
 
     /// Returns the setpoint, or the output of the reference model for it.
     #[inline(always)]
-    fn reference(&self, detours: &mut Option<Detours>, state: &State, setpoint: &Setpoint) -> Setpoint {
+    fn reference(&self, memory: &mut Option<ReferenceMemory>, state: &State, setpoint: &Setpoint) -> Setpoint {
         match &self.reference {
             Some(reference) => {
-                let detours = detours.get_or_insert_with(|| reference.start(state, setpoint));
-                reference.advance(detours, state, setpoint)
+                let memory = memory.get_or_insert_with(|| reference.start(state, setpoint));
+                reference.advance(memory, state, setpoint)
             }
             None => *setpoint,
         }
     }
 
-    /// Returns the observed f of x, y and z \[m/s2\]; `fresh` and `touches` as in [`ForceObserver::advance`].
+    /// Returns the observed f of x, y and z \[m/s2\].
     #[inline(always)]
     fn observe_forces(
         &self,
@@ -299,10 +310,10 @@ impl<L: Law, const N: usize> Controller<L, N> {
         state: &State,
         attitude: &Attitude,
         hover_n: f32,
-        fresh_touches: [bool; 2],
+        conditions: ObserverConditions,
     ) -> Vector3<f32> {
         match &self.forces {
-            Some(forces) => forces.advance(observed, state, &attitude.up(), hover_n, fresh_touches),
+            Some(forces) => forces.advance(observed, state, &attitude.up(), hover_n, conditions),
             None => {
                 *observed = None;
                 Vector3::zeros()
@@ -313,25 +324,26 @@ impl<L: Law, const N: usize> Controller<L, N> {
     /// Returns the angular acceleration by the rotors' drag \[rad/s2\], for this velocity in body axes and `share` of
     /// the hover thrust. Zero without a moment observer.
     #[inline(always)]
-    fn drag_turns(&self, velocity_body_m_s: &Vector3<f32>, share: f32) -> Vector3<f32> {
+    fn drag_acceleration_rad_s2(&self, velocity_body_m_s: &Vector3<f32>, share: f32) -> Vector3<f32> {
         match &self.moments {
-            Some(moments) => moments.turns(&self.settings.common.drag.moment(velocity_body_m_s, share)),
+            Some(moments) => {
+                moments.angular_acceleration_rad_s2(&self.settings.common.drag.moment(velocity_body_m_s, share))
+            }
             None => Vector3::zeros(),
         }
     }
 
-    /// Returns the observed f of roll, pitch and yaw \[rad/s2\] in addition to `known_rad_s2`; `fresh` and `touches` as
-    /// in [`MomentObserver::advance`].
+    /// Returns the observed f of roll, pitch and yaw \[rad/s2\] in addition to `known_rad_s2`.
     #[inline(always)]
     fn observe_moments(
         &self,
-        observed: &mut Option<Turning>,
+        observed: &mut Option<MomentObserverMemory>,
         rates_rad_s: &Vector3<f32>,
         known_rad_s2: &Vector3<f32>,
-        fresh_touches: [bool; 2],
+        conditions: ObserverConditions,
     ) -> Vector3<f32> {
         match &self.moments {
-            Some(moments) => moments.advance(observed, rates_rad_s, known_rad_s2, fresh_touches),
+            Some(moments) => moments.advance(observed, rates_rad_s, known_rad_s2, conditions),
             None => {
                 *observed = None;
                 Vector3::zeros()
@@ -355,8 +367,8 @@ impl<L: Law, const N: usize> Controller<L, N> {
     fn input(
         &self,
         axis: Axis,
-        tracking: Tracking,
-        context: &Context,
+        tracking: SubsystemTracking,
+        context: &StepContext,
         estimate: &mut L::Estimate,
         errors: &mut Errors,
     ) -> f32 {
@@ -370,7 +382,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
     fn position(
         &self,
         reference: &Setpoint,
-        [lift, context]: [&Context; 2],
+        [lift, context]: [&StepContext; 2],
         estimates: &mut PerAxis<L::Estimate>,
         errors: &mut PerAxis<Errors>,
     ) -> [f32; 3] {
@@ -390,7 +402,13 @@ impl<L: Law, const N: usize> Controller<L, N> {
 
     /// Returns errors and reference derivatives for roll, pitch and yaw.
     #[inline(always)]
-    fn turn(&self, desired: &DesiredRollPitch, reference: &Setpoint, attitude: &Attitude, state: &State) -> Turn {
+    fn attitude_tracking(
+        &self,
+        desired: &DesiredRollPitch,
+        reference: &Setpoint,
+        attitude: &Attitude,
+        state: &State,
+    ) -> AttitudeTracking {
         let [roll, pitch] = &desired.filtered;
         let [roll_ddot, pitch_ddot] = desired.accelerations_rad_s2;
         let rates = Vector3::new(roll.rate, pitch.rate, reference.yaw_rate_rad_s);
@@ -398,10 +416,10 @@ impl<L: Law, const N: usize> Controller<L, N> {
         if self.settings.by_rotation {
             let roll_pitch = RollPitch::of(roll.angle, pitch.angle);
             let (r, omega) = (&attitude.r_earth_body, &state.rates_rad_s);
-            Turn::new(r, &roll_pitch, desired.heading, omega, [&rates, &accelerations])
+            AttitudeTracking::new(r, &roll_pitch, desired.heading, omega, [&rates, &accelerations])
         } else {
             let eta_d = Vector3::new(roll.angle, pitch.angle, reference.yaw_rad);
-            Turn::of_angles(&eta_d, &state.attitude_rad, rates, accelerations)
+            AttitudeTracking::of_angles(&eta_d, &state.attitude_rad, rates, accelerations)
         }
     }
 
@@ -409,14 +427,15 @@ impl<L: Law, const N: usize> Controller<L, N> {
     #[inline(always)]
     fn attitude(
         &self,
-        turn: &Turn,
+        tracking: &AttitudeTracking,
         [eta, eta_dot]: [&Vector3<f32>; 2],
-        context: &Context,
+        context: &StepContext,
         estimates: &mut PerAxis<L::Estimate>,
         errors: &mut PerAxis<Errors>,
     ) -> [f32; 3] {
-        let Turn { error, rates, accelerations, .. } = turn;
-        let track = |x1, x2, e1, x1d_dot, x1d_ddot| Tracking { x1, x2, e1, x1d_dot, x1d_ddot, approach_1_s: None };
+        let AttitudeTracking { error, rates, accelerations, .. } = tracking;
+        let track =
+            |x1, x2, e1, x1d_dot, x1d_ddot| SubsystemTracking { x1, x2, e1, x1d_dot, x1d_ddot, approach_1_s: None };
         let roll = track(eta.x, eta_dot.x, error.x, rates.x, accelerations.x);
         let pitch = track(eta.y, eta_dot.y, error.y, rates.y, accelerations.y);
         let yaw = track(eta.z, eta_dot.z, error.z, rates.z, accelerations.z);
@@ -429,25 +448,26 @@ impl<L: Law, const N: usize> Controller<L, N> {
 
     /// Returns U1..U3 \[N\] that compensate the observed moments and the drag's moment at this velocity in body axes.
     #[inline(always)]
-    fn make_up(
+    fn moment_compensation_n(
         &self,
         observed_rad_s2: &Vector3<f32>,
         velocity_body_m_s: &Vector3<f32>,
         share: f32,
-        touches: bool,
+        touches_ground: bool,
     ) -> [f32; 3] {
         let Some(moments) = &self.moments else { return [0.0; 3] };
         // On the ground, the feet also hold the vehicle against the drag.
-        let known = if touches { Vector3::zeros() } else { self.drag_turns(velocity_body_m_s, share) };
-        moments.against(&(observed_rad_s2 + known))
+        let known =
+            if touches_ground { Vector3::zeros() } else { self.drag_acceleration_rad_s2(velocity_body_m_s, share) };
+        moments.compensating_inputs_n(&(observed_rad_s2 + known))
     }
 
     /// Returns U1..U4 \[N\] for the mixer, and the effort factor. The inputs are filtered, the moment compensation is
     /// added, and U1..U3 are multiplied by the effort factor.
     #[inline(always)]
-    fn asked(
+    fn commanded_inputs(
         &self,
-        filters: &mut Filters,
+        filters: &mut FilterMemories,
         [u1, u2, u3, u4]: [f32; 4],
         [roll_n, pitch_n, yaw_n]: [f32; 3],
         hover_n: f32,
@@ -458,7 +478,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         let mut inputs = self.smoother.advance(&mut filters.smoothed, &inputs);
         let mut effort = 1.0;
         if self.moments.is_some() {
-            effort = self.effort.advance(&mut filters.more_effort, hover_n);
+            effort = self.effort.advance(&mut filters.effort_excess, hover_n);
             // The compensation of roll and pitch is added after the filters: it is smooth already, and the observer
             // would feed back the filters' lead.
             inputs.roll_n = (inputs.roll_n + roll_n) * effort;
@@ -471,8 +491,8 @@ impl<L: Law, const N: usize> Controller<L, N> {
     }
 }
 
-impl<L: Law, const N: usize> FlightController<N> for Controller<L, N> {
-    type Memory = Cascade<L::Estimate>;
+impl<L: SubsystemLaw, const N: usize> FlightController<N> for Controller<L, N> {
+    type Memory = CascadeMemory<L::Estimate>;
 
     fn dt_s(&self) -> f32 {
         self.settings.common.dt_s

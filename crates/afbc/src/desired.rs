@@ -4,7 +4,7 @@
 //! The paper takes the derivatives from the filter. With feed-forward they come from the reference, and the filter's
 //! input leads by the filter's lag, so that its output is the intended angle.
 
-use crate::forward::{Followed, Forward};
+use crate::jump_filter::{JumpFilter, JumpMemory};
 use crate::model::Attitude;
 use crate::settings::Settings;
 use crate::tilt::Tilt;
@@ -25,7 +25,7 @@ pub struct DesiredAttitude {
     /// Lag 1/w of the command filter \[s\], and delay of its command, which is held for a step.
     lag_s: f32,
     half_step_s: f32,
-    forward: Forward,
+    jump_filter: JumpFilter,
     drag: KnownDrag,
     gravity_m_s2: f32,
     inverse_gravity: f32,
@@ -46,7 +46,7 @@ pub struct DesiredMemory {
     /// Angles of the last step, `None` before the first one.
     last: Option<LastAngles>,
     /// Jerk filter, `None` before the first step.
-    followed: Option<Followed>,
+    jump_memory: Option<JumpMemory>,
 }
 
 /// Angles of the last step.
@@ -112,7 +112,7 @@ impl DesiredAttitude {
             *settings;
         let dt_s = settings.common.dt_s;
         Ok(DesiredAttitude {
-            forward: Forward::new(settings.forward_rad_s, dt_s)?,
+            jump_filter: JumpFilter::new(settings.forward_rad_s, dt_s)?,
             filter: CommandFilter::new(command_filter_rad_s, dt_s)?.limited(limits.tilt_rate_max_rad_s)?,
             lag_s: 1.0 / command_filter_rad_s,
             half_step_s: 0.5 * dt_s,
@@ -156,7 +156,7 @@ impl DesiredAttitude {
         let tilt = Tilt::new(a5, a6, heading, inverse_vertical);
         let (share, up) = (thrust_n / hover_n, attitude.up());
         let forward = if self.feed_forward {
-            Some(self.derivatives(&mut memory.followed, &tilt, share, &up, [reference, setpoint]))
+            Some(self.derivatives(&mut memory.jump_memory, &tilt, share, &up, [reference, setpoint]))
         } else {
             None
         };
@@ -208,7 +208,7 @@ impl DesiredAttitude {
     #[inline(always)]
     fn derivatives(
         &self,
-        followed: &mut Option<Followed>,
+        followed: &mut Option<JumpMemory>,
         tilt: &Tilt,
         share: f32,
         up: &Vector3<f32>,
@@ -217,16 +217,16 @@ impl DesiredAttitude {
         let Setpoint { velocity_m_s: v, acceleration_m_s2: a, jerk_m_s3: jerk, .. } = reference;
         let turn = [reference.yaw_rate_rad_s, reference.yaw_acceleration_rad_s2];
         // Jumps of the setpoint's jerk are smoothed; the reference model has none.
-        let [followed, snap] = self.forward.advance(followed, setpoint);
-        let detour = jerk - setpoint.jerk_m_s3;
-        let gradual = followed + detour;
+        let [followed, snap] = self.jump_filter.advance(followed, setpoint);
+        let offset = jerk - setpoint.jerk_m_s3;
+        let gradual = followed + offset;
         // Drag depends on the velocity, so it turns the thrust as the velocity changes.
         let thrust = [share, share * self.gravity_m_s2];
         let [turning, snap] = self.drag.followed(v, up, thrust, [a, jerk, &snap]);
-        // The detour after a step or a jump starts at once and is not known ahead. Its vertical part is left out of the
+        // The offset after a step or a jump starts at once and is not known ahead. Its vertical part is left out of the
         // turn: a_z may fall to little, and its snap is unknown.
-        let thrust_m_s3 = up.dot(&(turning - detour));
-        let turning = turning - Vector3::z() * detour.z;
+        let thrust_m_s3 = up.dot(&(turning - offset));
+        let turning = turning - Vector3::z() * offset.z;
         let [rates, _] = tilt.turned(&turning, &snap, turn);
         let [_, accelerations] = tilt.turned(&(turning + (gradual - jerk)), &snap, turn);
         ([rates, accelerations], thrust_m_s3)

@@ -16,7 +16,7 @@
 //! 2009, with both poles at the same place as in Gao, *Scaling and bandwidth-parameterization based controller tuning*,
 //! ACC 2003, in exact discrete form.
 
-use crate::memory::{Memory, Remembered};
+use crate::force_map::{ForceMap, ForceMapWeights};
 use afbc_control::Settings;
 use afbc_control::drag::KnownDrag;
 use afbc_control::math::{self, max};
@@ -84,9 +84,18 @@ pub struct ForceObserver {
     lag: f32,
     dt_s: f32,
     drag: KnownDrag,
-    memory: Option<Memory>,
+    memory: Option<ForceMap>,
     gravity_m_s2: f32,
     weight_n: f32,
+}
+
+/// Conditions of a tick that decide whether an observer advances.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ObserverConditions {
+    /// True if the state has been measured since the last tick.
+    pub fresh: bool,
+    /// True if the vehicle touches the ground, whose forces are no disturbance.
+    pub touches_ground: bool,
 }
 
 /// Memory of the force observer: v_hat, f_hat along x and y, and T.
@@ -96,7 +105,7 @@ pub struct ForceObserverMemory {
     acceleration_m_s2: [f32; 2],
     thrust_n: f32,
     /// Learnt relation between velocity and force.
-    pub remembered: Remembered,
+    pub remembered: ForceMapWeights,
     /// True if the next velocity is not measured.
     held: bool,
 }
@@ -122,7 +131,7 @@ impl ForceObserver {
         let Settings { dt_s, drag, .. } = *common;
         // Two poles at exp(-w dt).
         let rest = 1.0 - math::exp(-bandwidth * dt_s);
-        let memory = Memory::new(settings.memory_1_s, settings.memory_speed_m_s, dt_s)?;
+        let memory = ForceMap::new(settings.memory_1_s, settings.memory_speed_m_s, dt_s)?;
         Ok((bandwidth > 0.0).then(|| ForceObserver {
             velocity: 2.0 * rest,
             acceleration: rest * rest / dt_s,
@@ -136,7 +145,7 @@ impl ForceObserver {
     }
 
     /// Returns f \[m/s2\] for this state with the thrust along `up`: known drag plus, along x and y, the remembered
-    /// force and f_hat. Advances f_hat by one step if the state is `fresh`. Returns zero while the vehicle `touches`
+    /// force and f_hat. Advances f_hat by one step if the state is `fresh`. Returns zero while the vehicle touches
     /// the ground.
     #[inline]
     pub fn advance(
@@ -145,7 +154,7 @@ impl ForceObserver {
         state: &State,
         up: &Vector3<f32>,
         hover_n: f32,
-        [fresh, touches]: [bool; 2],
+        ObserverConditions { fresh, touches_ground }: ObserverConditions,
     ) -> Vector3<f32> {
         let measured = [state.velocity_m_s.x, state.velocity_m_s.y];
         let start = |thrust_n, remembered| ForceObserverMemory {
@@ -156,8 +165,8 @@ impl ForceObserver {
             held: false,
         };
         // A flight that begins in the air is assumed to hover, with a thrust equal to the weight.
-        let observed = observed.get_or_insert_with(|| start(self.weight_n, Remembered::default()));
-        if touches {
+        let observed = observed.get_or_insert_with(|| start(self.weight_n, ForceMapWeights::default()));
+        if touches_ground {
             // The thrust and the learnt force survive a touch of the ground.
             *observed = start(observed.thrust_n, observed.remembered);
             return Vector3::zeros();
@@ -199,7 +208,7 @@ impl ForceObserver {
 
     /// Stores the total thrust commanded in this step \[N\].
     #[inline]
-    pub fn give(&self, observed: &mut Option<ForceObserverMemory>, thrust_n: f32) {
+    pub fn record_thrust(&self, observed: &mut Option<ForceObserverMemory>, thrust_n: f32) {
         if let Some(observed) = observed {
             observed.thrust_n = math::settled(observed.thrust_n + (thrust_n - observed.thrust_n) * self.lag);
         }
@@ -237,7 +246,7 @@ pub struct MomentObserver {
 
 /// Memory of the moment observer.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Turning {
+pub struct MomentObserverMemory {
     rates_rad_s: Vector3<f32>,
     acceleration_rad_s2: Vector3<f32>,
     /// Angular acceleration g U by the inputs \[rad/s2\].
@@ -274,27 +283,36 @@ impl MomentObserver {
     }
 
     /// Returns f_hat of roll, pitch and yaw \[rad/s2\] for these rates, in addition to `known` \[rad/s2\]. Advances
-    /// f_hat by one step if the rates are `fresh`. Returns zero while the vehicle `touches` the ground.
+    /// f_hat by one step if the rates are `fresh`. Returns zero while the vehicle touches the ground.
     #[inline]
     pub fn advance(
         &self,
-        turning: &mut Option<Turning>,
+        memory: &mut Option<MomentObserverMemory>,
         rates_rad_s: &Vector3<f32>,
         known: &Vector3<f32>,
-        [fresh, touches]: [bool; 2],
+        ObserverConditions { fresh, touches_ground }: ObserverConditions,
     ) -> Vector3<f32> {
         let zero = Vector3::zeros();
-        let start =
-            Turning { rates_rad_s: *rates_rad_s, acceleration_rad_s2: zero, given_rad_s2: zero, known_rad_s2: *known };
-        let turning = turning.get_or_insert(start);
-        if touches {
-            *turning = start;
+        let start = MomentObserverMemory {
+            rates_rad_s: *rates_rad_s,
+            acceleration_rad_s2: zero,
+            given_rad_s2: zero,
+            known_rad_s2: *known,
+        };
+        let memory = memory.get_or_insert(start);
+        if touches_ground {
+            *memory = start;
             return zero;
         }
         if !fresh {
-            return turning.acceleration_rad_s2;
+            return memory.acceleration_rad_s2;
         }
-        let Turning { rates_rad_s: omega_hat, acceleration_rad_s2: f_hat, given_rad_s2: given, known_rad_s2 } = turning;
+        let MomentObserverMemory {
+            rates_rad_s: omega_hat,
+            acceleration_rad_s2: f_hat,
+            given_rad_s2: given,
+            known_rad_s2,
+        } = memory;
         // Delayed to the assumed age of the rates; otherwise every change of the known moments would be observed as a
         // disturbance.
         *known_rad_s2 = (*known_rad_s2 + (known - *known_rad_s2) * self.age).map(math::settled);
@@ -313,25 +331,24 @@ impl MomentObserver {
 
     /// Returns the angular acceleration \[rad/s2\] by a moment per mass \[m2/s2\].
     #[inline]
-    pub fn turns(&self, moment_m2_s2: &Vector3<f32>) -> Vector3<f32> {
+    pub fn angular_acceleration_rad_s2(&self, moment_m2_s2: &Vector3<f32>) -> Vector3<f32> {
         moment_m2_s2.component_mul(&self.per_moment)
     }
 
     /// Returns U1..U3 \[N\] that compensate an angular acceleration.
     #[inline]
-    pub fn against(&self, acceleration_rad_s2: &Vector3<f32>) -> [f32; 3] {
+    pub fn compensating_inputs_n(&self, acceleration_rad_s2: &Vector3<f32>) -> [f32; 3] {
         acceleration_rad_s2.component_mul(&self.ineffectiveness).into()
     }
 
     /// Stores U1..U3 commanded in this step \[N\], which are `effort` times as large as for the model's rotors.
     #[inline]
-    pub fn give(&self, turning: &mut Option<Turning>, given: &Inputs, effort: f32) {
-        if let Some(turning) = turning {
+    pub fn record_inputs(&self, memory: &mut Option<MomentObserverMemory>, given: &Inputs, effort: f32) {
+        if let Some(memory) = memory {
             let given = Vector3::new(given.roll_n, given.pitch_n, given.yaw_n);
             // Known weakness of the rotors is no moment. `effort` is bounded away from zero.
             let given = given.component_mul(&self.effectiveness) * (1.0 / effort);
-            turning.given_rad_s2 =
-                (turning.given_rad_s2 + (given - turning.given_rad_s2) * self.lag).map(math::settled);
+            memory.given_rad_s2 = (memory.given_rad_s2 + (given - memory.given_rad_s2) * self.lag).map(math::settled);
         }
     }
 }

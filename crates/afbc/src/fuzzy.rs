@@ -12,7 +12,7 @@
 //! Multiplying by t = exp(-k|x|), which cancels in the normalisation, gives \[q t^2, t, q\] for positive x: one
 //! exponential per input, never with a positive exponent, and a sum of at least q. So no finite input overflows,
 //! divides zero by zero or makes all weights vanish; (18) as printed does so above 1.7 rad/s in `f32`. The law does not
-//! normalise the triples but divides once, by the product of both sums ([`Firing`]).
+//! normalise the triples but divides once, by the product of both sums ([`FiringStrengths`]).
 
 use afbc_control::math;
 use afbc_types::{Declared, OutOfRange, Range, parameters};
@@ -41,14 +41,14 @@ parameters! {
 
 /// Fuzzy basis of one subsystem; both inputs use the same [`Membership`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Basis {
+pub struct FuzzyBasis {
     /// k / ln 2, with k = c/s^2.
     k: f32,
     /// q = exp(-c^2 / 2s^2)
     q: f32,
 }
 
-impl Basis {
+impl FuzzyBasis {
     /// Creates the basis of `membership`.
     ///
     /// # Errors
@@ -56,7 +56,10 @@ impl Basis {
     pub fn new(membership: Membership) -> Result<Self, OutOfRange> {
         membership.validate()?;
         let spread = membership.centre / membership.width;
-        Ok(Basis { k: spread / membership.width * core::f32::consts::LOG2_E, q: math::exp(-0.5 * spread * spread) })
+        Ok(FuzzyBasis {
+            k: spread / membership.width * core::f32::consts::LOG2_E,
+            q: math::exp(-0.5 * spread * spread),
+        })
     }
 
     /// Returns w(x) of (18), one weight per rule. The row is the first input's Gaussian and the column the second's,
@@ -72,10 +75,10 @@ impl Basis {
 
     /// Returns the firing strengths w(x) of the rules, in factors.
     #[inline]
-    pub fn fire(&self, [x1, x2]: [f32; 2]) -> Firing {
+    pub fn fire(&self, [x1, x2]: [f32; 2]) -> FiringStrengths {
         let ((first, first_sum), (second, second_sum)) = (self.memberships(x1), self.memberships(x2));
         // Each sum is at least q, and q is at least exp(-18) by SPREAD, so the product is never zero.
-        Firing { first, second, share: 1.0 / (first_sum * second_sum) }
+        FiringStrengths { first, second, share: 1.0 / (first_sum * second_sum) }
     }
 
     /// Returns the memberships of one input, scaled by t divided by the middle one, and their sum.
@@ -90,7 +93,7 @@ impl Basis {
 
 /// Firing strengths of the nine rules: w(x) = `first` `second`^T `share`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Firing {
+pub struct FiringStrengths {
     /// Memberships of the first input, up to a common factor.
     pub first: Vector3<f32>,
     /// Memberships of the second input, up to a common factor.

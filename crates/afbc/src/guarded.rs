@@ -2,10 +2,10 @@
 //! with the last inputs. Only a command engages AFBC again.
 
 use crate::adaptive::{self, Adaptive, AdaptiveEstimate};
-use crate::cascade::{Cascade, Controller, LastStep, Settings};
-use crate::integral::{Integral, IntegralBackstepping};
+use crate::cascade::{CascadeMemory, Controller, LastStep, Settings};
+use crate::integral::{IntegralBackstepping, IntegralMemory};
 use crate::model::ModelConstants;
-use crate::monitor::{Bounds, Monitor, MonitorFigures};
+use crate::monitor::{Monitor, MonitorBounds, MonitorFigures};
 use crate::safeguards::Safeguards;
 use crate::trip::Trip;
 use afbc_control::{Action, Errors, FlightController, Mixer, Trace};
@@ -32,8 +32,8 @@ pub struct Guarded<const N: usize = 4> {
 
 /// Memory of the fallback law.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct StandIn<const N: usize> {
-    cascade: Cascade<Integral>,
+struct FallbackMemory<const N: usize> {
+    cascade: CascadeMemory<IntegralMemory>,
     /// Last action. Stored here, because returning it would make the compiler build an action in memory on AFBC's path
     /// too.
     action: Action<N>,
@@ -41,7 +41,7 @@ struct StandIn<const N: usize> {
 
 /// Reason and state of a trip.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Tripped {
+struct TripState {
     trip: Trip,
     /// omega of (6) after AFBC's last step \[rad/s\].
     rotor_residual_rad_s: f32,
@@ -50,11 +50,11 @@ struct Tripped {
 /// Memory of a flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Memory<const N: usize = 4> {
-    afbc: Cascade<AdaptiveEstimate>,
+    afbc: CascadeMemory<AdaptiveEstimate>,
     figures: MonitorFigures,
-    tripped: Option<Tripped>,
+    trip: Option<TripState>,
     /// Memory of the fallback law, `None` before its first step.
-    stand_in: Option<StandIn<N>>,
+    fallback: Option<FallbackMemory<N>>,
 }
 
 impl<const N: usize> Memory<N> {
@@ -65,12 +65,12 @@ impl<const N: usize> Memory<N> {
 
     /// Returns AFBC's estimates, zero while the fallback law flies.
     pub fn estimates(&self) -> PerAxis<AdaptiveEstimate> {
-        if self.tripped.is_some() { PerAxis::default() } else { self.afbc.estimates }
+        if self.trip.is_some() { PerAxis::default() } else { self.afbc.estimates }
     }
 
     /// Returns the reason of the trip while the fallback law flies.
     pub fn trip(&self) -> Option<Trip> {
-        self.tripped.map(|tripped| tripped.trip)
+        self.trip.map(|state| state.trip)
     }
 }
 
@@ -87,7 +87,7 @@ impl<const N: usize> Guarded<N> {
         vehicle: impl Into<Airframe<N>>,
         settings: Settings,
         gains: PerAxis<adaptive::Gains>,
-        bounds: Bounds,
+        bounds: MonitorBounds,
     ) -> Result<Self, OutOfRange> {
         let vehicle = vehicle.into();
         let Airframe { parameters, .. } = vehicle;
@@ -115,21 +115,23 @@ impl<const N: usize> Guarded<N> {
     /// that.
     #[cold]
     #[inline(never)]
-    fn stand_in<'a>(
+    fn fallback_step<'a>(
         &self,
-        memory: &'a mut Option<StandIn<N>>,
-        (afbc, tripped): (&Cascade<AdaptiveEstimate>, &Tripped),
-        (state, setpoint): (&State, &Setpoint),
+        memory: &'a mut Option<FallbackMemory<N>>,
+        afbc: &CascadeMemory<AdaptiveEstimate>,
+        trip: &TripState,
+        state: &State,
+        setpoint: &Setpoint,
         fresh: bool,
     ) -> &'a Action<N> {
-        let StandIn { cascade, action } = memory.get_or_insert_with(|| {
+        let FallbackMemory { cascade, action } = memory.get_or_insert_with(|| {
             let hover_thrust_n = Some(self.adaptive.hover_thrust_n(afbc));
-            let resume = |axis| Integral { value: 0.0, resume: Some(afbc.last.inputs[axis]), hover_thrust_n };
-            let cascade = afbc.handed_over(PerAxis::from_fn(resume), tripped.rotor_residual_rad_s);
-            StandIn { cascade, action: Action::default() }
+            let resume = |axis| IntegralMemory { value: 0.0, resume: Some(afbc.last.inputs[axis]), hover_thrust_n };
+            let cascade = afbc.handed_over(PerAxis::from_fn(resume), trip.rotor_residual_rad_s);
+            FallbackMemory { cascade, action: Action::default() }
         });
         *action = self.fallback.cascade(cascade, state, setpoint, fresh);
-        action.health.fallback = Some(tripped.trip.reason());
+        action.health.fallback = Some(trip.trip.reason());
         action
     }
 
@@ -137,10 +139,10 @@ impl<const N: usize> Guarded<N> {
     /// the learnt part of either law, since both have the same known part.
     fn resumed<E>(
         &self,
-        cascade: &Cascade<E>,
+        cascade: &CascadeMemory<E>,
         learnt: impl Fn(Axis, [f32; 2], &Errors, &E) -> f32,
-    ) -> Cascade<AdaptiveEstimate> {
-        let LastStep { inputs, errors, turning: [eta, eta_dot], .. } = &cascade.last;
+    ) -> CascadeMemory<AdaptiveEstimate> {
+        let LastStep { inputs, errors, eta, eta_dot, .. } = &cascade.last;
         let law = self.adaptive.law();
         let estimates = PerAxis::from_fn(|axis| {
             let x = match axis {
@@ -175,48 +177,48 @@ impl<const N: usize> FlightController<N> for Guarded<N> {
 
     #[inline(always)]
     fn decide(&self, memory: &mut Memory<N>, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
-        let Memory { afbc, figures, tripped, stand_in } = memory;
-        if let Some(tripped) = tripped {
-            return *self.stand_in(stand_in, (afbc, tripped), (state, setpoint), fresh);
+        let Memory { afbc, figures, trip, fallback } = memory;
+        if let Some(trip) = trip {
+            return *self.fallback_step(fallback, afbc, trip, state, setpoint, fresh);
         }
         let action = self.adaptive.cascade(afbc, state, setpoint, fresh);
         // On the ground a law may demand negative thrust forever, so the monitor is off.
-        if !self.adaptive.stands(afbc)
-            && let Some(trip) = self.monitor.watch(figures, afbc, action.health.saturated)
+        if !self.adaptive.is_standing(afbc)
+            && let Some(reason) = self.monitor.watch(figures, afbc, action.health.saturated)
         {
             let rotor_residual_rad_s = self.adaptive.mixer().residual_rad_s(&action.speeds);
             // AFBC's action is used once more: a tick has no time for a step of both laws.
-            *tripped = Some(Tripped { trip, rotor_residual_rad_s });
+            *trip = Some(TripState { trip: reason, rotor_residual_rad_s });
         }
         action
     }
 
     // Until the fallback law's first step, AFBC's memory takes these notices and hands them over.
     fn on_ground(&self, memory: &mut Memory<N>) {
-        match &mut memory.stand_in {
-            Some(stand_in) => self.fallback.on_ground(&mut stand_in.cascade),
+        match &mut memory.fallback {
+            Some(fallback) => self.fallback.on_ground(&mut fallback.cascade),
             None => self.adaptive.on_ground(&mut memory.afbc),
         }
     }
 
     fn position_lost(&self, memory: &mut Memory<N>) {
-        match &mut memory.stand_in {
-            Some(stand_in) => self.fallback.position_lost(&mut stand_in.cascade),
+        match &mut memory.fallback {
+            Some(fallback) => self.fallback.position_lost(&mut fallback.cascade),
             None => self.adaptive.position_lost(&mut memory.afbc),
         }
     }
 
     fn trace(memory: &Memory<N>) -> Trace {
-        match &memory.stand_in {
-            Some(stand_in) => stand_in.cascade.trace(),
+        match &memory.fallback {
+            Some(fallback) => fallback.cascade.trace(),
             None => memory.afbc.trace(),
         }
     }
 
     fn engage(&self, memory: &mut Memory<N>) -> bool {
-        let Memory { afbc, tripped: Some(_), stand_in, .. } = memory else { return false };
-        let afbc = match stand_in {
-            Some(StandIn { cascade, .. }) => self.resumed(cascade, |_, _, _, integral| integral.value),
+        let Memory { afbc, trip: Some(_), fallback, .. } = memory else { return false };
+        let afbc = match fallback {
+            Some(FallbackMemory { cascade, .. }) => self.resumed(cascade, |_, _, _, integral| integral.value),
             None => self.resumed(afbc, |axis, x, errors, own| self.adaptive.law().fuzzy(axis, x, errors, own)),
         };
         // With new figures, because a mean that has tripped is still beyond its bound.

@@ -11,7 +11,7 @@
 
 use crate::adaptive;
 use crate::backstepping::{self, classical};
-use crate::law::{Context, Law, Tracking};
+use crate::law::{StepContext, SubsystemLaw, SubsystemTracking};
 use crate::model::ModelConstants;
 use crate::safeguards::Safeguards;
 use afbc_control::{Errors, math};
@@ -37,7 +37,7 @@ impl From<&adaptive::Gains> for Gains {
 
 /// Memory of one subsystem.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Integral {
+pub struct IntegralMemory {
     /// The integral i.
     pub value: f32,
     /// Input to continue with; the next step chooses i accordingly.
@@ -70,13 +70,19 @@ impl IntegralBackstepping {
     }
 }
 
-impl Law for IntegralBackstepping {
+impl SubsystemLaw for IntegralBackstepping {
     const OBSERVES: bool = true;
 
-    type Estimate = Integral;
+    type Estimate = IntegralMemory;
 
     #[inline]
-    fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, integral: &mut Integral) -> (f32, Errors) {
+    fn input(
+        &self,
+        axis: Axis,
+        tracking: &SubsystemTracking,
+        context: &StepContext,
+        integral: &mut IntegralMemory,
+    ) -> (f32, Errors) {
         let Gains { backstepping, integral: kappa, integral_max } = &self.gains[axis];
         let (fixed, errors) = classical(backstepping, tracking, &context.observed(&self.model, axis));
         if let Some(input) = integral.resume.take() {
@@ -93,7 +99,7 @@ impl Law for IntegralBackstepping {
         self.gains[axis].backstepping.approach(self.model.hover_gain(axis))
     }
 
-    fn hover_thrust_n(&self, z: &Integral, weight_n: f32, _: f32) -> f32 {
+    fn hover_thrust_n(&self, z: &IntegralMemory, weight_n: f32, _: f32) -> f32 {
         // Not weight plus integral, which would include the thrust of manoeuvres.
         z.hover_thrust_n.unwrap_or(weight_n)
     }

@@ -6,11 +6,11 @@ use afbc_types::{Axis, PerAxis, State};
 use nalgebra::Vector3;
 
 /// Computes a subsystem's input from its errors. AFBC, its fallback and the baseline differ only in this trait.
-pub trait Law {
-    /// True if the law uses [`Context::rotor_residual_rad_s`].
+pub trait SubsystemLaw {
+    /// True if the law uses [`StepContext::rotor_residual_rad_s`].
     const USES_ROTOR_RESIDUAL: bool = true;
 
-    /// True if the law uses [`Context::observed_m_s2`].
+    /// True if the law uses [`StepContext::observed_m_s2`].
     const OBSERVES: bool = false;
 
     /// Memory of the law for one subsystem.
@@ -18,8 +18,13 @@ pub trait Law {
 
     /// Returns u_i in the subsystem's unit (N for roll, pitch, yaw and z; m/s2 for x and y), and the errors. Updates
     /// the estimate if the context allows it.
-    fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut Self::Estimate)
-    -> (f32, Errors);
+    fn input(
+        &self,
+        axis: Axis,
+        tracking: &SubsystemTracking,
+        context: &StepContext,
+        estimate: &mut Self::Estimate,
+    ) -> (f32, Errors);
 
     /// Returns the approach speed per error e_1 \[1/s\] at which the law keeps that speed for a constant error.
     fn approach(&self, axis: Axis, known: Option<&ModelConstants>) -> f32;
@@ -35,7 +40,7 @@ pub trait Law {
 
 /// Data shared by all six subsystems in one step.
 #[derive(Clone, Copy, Debug)]
-pub struct Context<'a> {
+pub struct StepContext<'a> {
     /// State used in the step.
     pub state: &'a State,
     /// Sines and cosines of roll and pitch in `state`.
@@ -55,7 +60,7 @@ pub struct Context<'a> {
     pub known: Option<&'a ModelConstants>,
 }
 
-impl Context<'_> {
+impl StepContext<'_> {
     /// Returns f, g and dg/dt of a subsystem from `model` in this step.
     #[inline]
     pub(crate) fn dynamics(&self, model: &ModelConstants, axis: Axis) -> Dynamics {
@@ -80,7 +85,7 @@ impl Context<'_> {
 
 /// State and reference of a subsystem: x_1, x_2 and the reference with two derivatives, in m or rad, and seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tracking {
+pub struct SubsystemTracking {
     /// x_1
     pub x1: f32,
     /// x_2 = d x_1/dt
@@ -95,12 +100,12 @@ pub struct Tracking {
     pub approach_1_s: Option<f32>,
 }
 
-impl Tracking {
+impl SubsystemTracking {
     /// Returns (9) and (12): e_2 = d x_1d/dt + alpha_1 e_1 - x_2. At the speed limit, the approach speed per error
     /// replaces alpha_1, so that e_2 and the adaptation are zero at that speed.
     #[inline]
     pub fn errors(&self, alpha1: f32) -> Errors {
-        let Tracking { e1, x1d_dot, x2, approach_1_s, .. } = *self;
+        let SubsystemTracking { e1, x1d_dot, x2, approach_1_s, .. } = *self;
         let e1_dot = x1d_dot - x2;
         Errors { e1, e1_dot, e2: e1_dot + approach_1_s.unwrap_or(alpha1) * e1 }
     }

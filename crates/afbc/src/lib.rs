@@ -37,19 +37,19 @@
 #![no_std]
 
 pub mod adaptive;
-pub mod ahead;
 pub mod backstepping;
 pub mod cascade;
+pub mod delay_compensation;
 pub mod desired;
 pub mod disturbance;
 pub mod effort;
-pub mod forward;
+pub mod force_map;
 pub mod fuzzy;
 pub mod guarded;
 pub mod integral;
+pub mod jump_filter;
 pub mod law;
 pub mod limits;
-pub mod memory;
 pub mod model;
 pub mod monitor;
 mod profile;
@@ -63,10 +63,10 @@ mod trip;
 
 pub use adaptive::{Adaptive, AdaptiveEstimate};
 pub use backstepping::Backstepping;
-pub use cascade::{Cascade, Controller, Settings};
+pub use cascade::{CascadeMemory, Controller, Settings};
 pub use guarded::Guarded;
-pub use law::Law;
-pub use limits::Limits;
+pub use law::SubsystemLaw;
+pub use limits::PositionControlLimits;
 pub use profile::{LAG_S, Profile, by_rule, slowness};
 pub use safeguards::Safeguards;
 pub use trip::Trip;

@@ -1,6 +1,6 @@
 //! Limits on the demands of position control. Not in the paper.
 
-use crate::law::Tracking;
+use crate::law::SubsystemTracking;
 use afbc_control::command_filter::RATE_MAX;
 use afbc_types::parameters;
 
@@ -9,7 +9,7 @@ parameters! {
     /// degrees.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-    pub struct Limits {
+    pub struct PositionControlLimits {
         /// Largest angle between thrust and vertical.
         #[parameter(TILT, "rad", 0.05..=1.57)]
         pub tilt_max_rad: f32 = 1.57,
@@ -28,36 +28,36 @@ parameters! {
     }
 }
 
-impl Limits {
+impl PositionControlLimits {
     /// No limits.
     pub const NONE: Self = Self::DEFAULT;
 }
 
 /// Speed limit of x, y or z: cuts the position error to the one that demands the largest speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Approach {
+pub struct ApproachLimit {
     /// Largest e_1 \[m\].
     e1_max_m: f32,
     /// Approach speed per e_1 \[1/s\].
     approach_1_s: f32,
 }
 
-impl Approach {
+impl ApproachLimit {
     /// Creates the speed limit for a law with an approach speed of `approach_1_s` times the error.
     pub fn new(speed_max_m_s: f32, approach_1_s: f32) -> Self {
         // A law that does not approach has no limit: the quotient is infinite.
-        Approach { e1_max_m: speed_max_m_s / approach_1_s, approach_1_s }
+        ApproachLimit { e1_max_m: speed_max_m_s / approach_1_s, approach_1_s }
     }
 
     /// Returns state, reference and error (9) for the law, with the error cut at the limit.
     #[inline(always)]
-    pub fn tracking(&self, [x1, x2]: [f32; 2], [x1d, x1d_dot, x1d_ddot]: [f32; 3]) -> Tracking {
+    pub fn tracking(&self, [x1, x2]: [f32; 2], [x1d, x1d_dot, x1d_ddot]: [f32; 3]) -> SubsystemTracking {
         let distance = x1d - x1;
         let (e1, approach_1_s) = if distance.abs() > self.e1_max_m {
             (self.e1_max_m.copysign(distance), Some(self.approach_1_s))
         } else {
             (distance, None)
         };
-        Tracking { x1, x2, e1, x1d_dot, x1d_ddot, approach_1_s }
+        SubsystemTracking { x1, x2, e1, x1d_dot, x1d_ddot, approach_1_s }
     }
 }

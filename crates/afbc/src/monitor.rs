@@ -2,10 +2,10 @@
 //!
 //! | figure | of | trips beyond |
 //! |---|---|---|
-//! | \|Theta_hat\|, delta_hat | each subsystem | [`Bounds::theta`], [`Bounds::delta`] |
-//! | \|e_1\| from the reference, mean over 1 s | each subsystem | [`Bounds::error`] |
-//! | share of steps with a saturated rotor, over 1 s | all | [`Bounds::saturation_share`] |
-//! | reversals of U1..U4 by more than [`Bounds::swing_n`], per second | each input | [`Bounds::swings_hz`] |
+//! | \|Theta_hat\|, delta_hat | each subsystem | [`MonitorBounds::theta`], [`MonitorBounds::delta`] |
+//! | \|e_1\| from the reference, mean over 1 s | each subsystem | [`MonitorBounds::error`] |
+//! | share of steps with a saturated rotor, over 1 s | all | [`MonitorBounds::saturation_share`] |
+//! | reversals of U1..U4 beyond [`MonitorBounds::swing_n`], per second | each input | [`MonitorBounds::swings_hz`] |
 //!
 //! The last row detects limit cycles: it counts turning points of an input that are further apart than a threshold. It
 //! finds chatter between steps and slow oscillations, but ignores manoeuvres and smaller noise. Of U3 it counts only
@@ -16,7 +16,7 @@
 //! Norms, errors, U3 and rates are updated for one subsystem per step, so each is at most six steps old.
 
 use crate::adaptive::{self, AdaptiveEstimate};
-use crate::cascade::{Cascade, Settings};
+use crate::cascade::{CascadeMemory, Settings};
 use crate::trip::Trip;
 use afbc_control::math;
 use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, parameters};
@@ -37,10 +37,10 @@ pub const TRIM_SHARE: PerAxis<f32> = PerAxis { roll: 0.75, pitch: 0.75, yaw: 2.2
 const THETA_SHARE: f32 = 0.95;
 
 parameters! {
-    /// Bounds of the monitor. The defaults are those that do not depend on gains and vehicle; [`Bounds::new`] computes
-    /// the others.
+    /// Bounds of the monitor. The defaults are those that do not depend on gains and vehicle; [`MonitorBounds::new`]
+    /// computes the others.
     #[derive(Clone, Copy, Debug, PartialEq)]
-    pub struct Bounds {
+    pub struct MonitorBounds {
         /// Bound on |Theta_hat|, in the subsystem's input.
         #[parameter(THETA, "input", 0.0..=1e9)]
         pub theta: PerAxis<f32> = PerAxis { roll: 1e9, pitch: 1e9, yaw: 1e9, z: 1e9, x: 1e9, y: 1e9 },
@@ -62,7 +62,7 @@ parameters! {
     }
 }
 
-impl Bounds {
+impl MonitorBounds {
     /// Computes bounds for a law with these gains and settings on this vehicle, whose parameters must be valid. They
     /// trip when an estimate is about to reach its projection, and at a limit cycle of half the weight. (With a fifth
     /// of the weight, noise of 20 mrad/s alone would cause too many reversals of U3.) With feed-forward the estimates
@@ -74,7 +74,7 @@ impl Bounds {
             let carries = if matches!(axis, Axis::X | Axis::Y) { vehicle.gravity_m_s2 } else { weight_n };
             if settings.feed_forward { math::min(TRIM_SHARE[axis] * carries, projection) } else { projection }
         };
-        Bounds {
+        MonitorBounds {
             theta: PerAxis::from_fn(theta),
             // Projection normally keeps delta_hat within its bound, so a larger value means that projection has failed.
             delta: PerAxis::from_fn(|axis| 1.001 * gains[axis].safeguards.delta_max),
@@ -86,7 +86,7 @@ impl Bounds {
 
 /// Norms of the estimates of one subsystem.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Norm {
+pub struct EstimateNorms {
     /// |Theta_hat|^2
     pub theta_squared: f32,
     /// delta_hat
@@ -95,7 +95,7 @@ pub struct Norm {
 
 /// Detector of turning points of one input.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Swing {
+pub struct OscillationDetector {
     /// Extreme value since the last turning point \[N\].
     extreme: f32,
     /// Present direction: 1 or -1.
@@ -104,13 +104,13 @@ pub struct Swing {
     pub rate_hz: f32,
 }
 
-impl Default for Swing {
+impl Default for OscillationDetector {
     fn default() -> Self {
-        Swing { extreme: 0.0, direction: 1.0, rate_hz: 0.0 }
+        OscillationDetector { extreme: 0.0, direction: 1.0, rate_hz: 0.0 }
     }
 }
 
-impl Swing {
+impl OscillationDetector {
     /// Counts a reversal by more than `least` if this input is one.
     #[inline]
     fn advance(&mut self, input: f32, least: f32) {
@@ -135,14 +135,14 @@ impl Swing {
 
 /// Part of an input that the vehicle can follow: the mean over a round after two low-passes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Followed {
+struct FollowableInput {
     /// Sum of the inputs since the last round \[N\].
     sum_n: f32,
     /// Input after one low-pass and after both \[N\].
     passed_n: [f32; 2],
 }
 
-impl Followed {
+impl FollowableInput {
     /// Ends a round; its mean enters the low-passes with this share. Returns the output \[N\].
     #[inline]
     fn end_round(&mut self, share: f32) -> f32 {
@@ -159,15 +159,15 @@ impl Followed {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MonitorFigures {
     /// Norms of the estimates.
-    pub norms: PerAxis<Norm>,
+    pub norms: PerAxis<EstimateNorms>,
     /// Mean of |e_1| \[m or rad\].
     pub error: PerAxis<f32>,
     /// Share of steps with a saturated rotor.
     pub saturation_share: f32,
     /// Detectors of U1, U2, U3, U4.
-    pub swings: [Swing; 4],
+    pub swings: [OscillationDetector; 4],
     /// Part of U3 that the vehicle can follow.
-    yaw: Followed,
+    yaw: FollowableInput,
     /// Subsystem updated last.
     axis: Axis,
 }
@@ -178,8 +178,8 @@ impl Default for MonitorFigures {
             norms: PerAxis::default(),
             error: PerAxis::default(),
             saturation_share: 0.0,
-            swings: [Swing::default(); 4],
-            yaw: Followed::default(),
+            swings: [OscillationDetector::default(); 4],
+            yaw: FollowableInput::default(),
             // The last subsystem of a round, so that the first step updates roll.
             axis: Axis::Y,
         }
@@ -189,7 +189,7 @@ impl Default for MonitorFigures {
 impl MonitorFigures {
     /// Returns the subsystem updated last, and its norms.
     #[inline]
-    pub fn latest(&self) -> (Axis, Norm) {
+    pub fn latest(&self) -> (Axis, EstimateNorms) {
         (self.axis, self.norms[self.axis])
     }
 }
@@ -197,7 +197,7 @@ impl MonitorFigures {
 /// Monitor with its constants. Everything that changes in flight is in [`MonitorFigures`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Monitor {
-    bounds: Bounds,
+    bounds: MonitorBounds,
     theta_squared: PerAxis<f32>,
     /// Share of a mean that is replaced per step.
     forget: f32,
@@ -210,7 +210,7 @@ impl Monitor {
     ///
     /// # Errors
     /// Returns the first bound that is out of range.
-    pub fn new(bounds: Bounds, dt_s: f32) -> Result<Self, OutOfRange> {
+    pub fn new(bounds: MonitorBounds, dt_s: f32) -> Result<Self, OutOfRange> {
         bounds.validate()?;
         Ok(Monitor {
             bounds,
@@ -230,14 +230,14 @@ impl Monitor {
     pub fn watch(
         &self,
         figures: &mut MonitorFigures,
-        cascade: &Cascade<AdaptiveEstimate>,
+        cascade: &CascadeMemory<AdaptiveEstimate>,
         saturated: bool,
     ) -> Option<Trip> {
         let axis = figures.axis.next();
         figures.axis = axis;
 
         let estimate = &cascade.estimates[axis];
-        let norm = Norm { theta_squared: estimate.theta.norm_squared(), delta: estimate.delta };
+        let norm = EstimateNorms { theta_squared: estimate.theta.norm_squared(), delta: estimate.delta };
         figures.norms[axis] = norm;
 
         let error = &mut figures.error[axis];
@@ -248,8 +248,8 @@ impl Monitor {
         figures.saturation_share = math::settled(share + self.forget * (saturated - share));
 
         let [roll, pitch, yaw, thrust] = &mut figures.swings;
-        let Bounds { swing_n, swings_hz, .. } = self.bounds;
-        let asked = &cascade.last.asked;
+        let MonitorBounds { swing_n, swings_hz, .. } = self.bounds;
+        let asked = &cascade.last.commanded;
         roll.advance(asked.roll_n, swing_n);
         pitch.advance(asked.pitch_n, swing_n);
         thrust.advance(asked.thrust_n, swing_n);

@@ -4,7 +4,7 @@ use crate::disturbance::DisturbanceObserver;
 use crate::fuzzy::Membership;
 use crate::model::ModelConstants;
 use crate::reference::ReferenceModel;
-use crate::{Limits, Safeguards, Settings, adaptive, backstepping};
+use crate::{PositionControlLimits, Safeguards, Settings, adaptive, backstepping};
 use afbc_control::drag::KnownDrag;
 use afbc_control::{Smoothing, math};
 use afbc_types::{Axis, Parameters, PerAxis};
@@ -96,7 +96,7 @@ impl Profile {
                     raised_thrust_max: 0.8,
                     drag: KnownDrag::NONE,
                 },
-                limits: Limits {
+                limits: PositionControlLimits {
                     // At 0.7 rad and 9 m/s2, gusts of the campaign `robustness` push harder than the vehicle may lean.
                     tilt_max_rad: 1.0,
                     tilt_rate_max_rad_s: 6.0,

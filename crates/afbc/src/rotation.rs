@@ -23,7 +23,7 @@ const HALF_MIN: f32 = 0.04;
 
 /// Attitude errors and reference derivatives for roll, pitch and yaw, about the body axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Turn {
+pub struct AttitudeTracking {
     /// e_1 \[rad\].
     pub error: Vector3<f32>,
     /// d x_1d/dt \[rad/s\].
@@ -34,7 +34,7 @@ pub struct Turn {
     pub desired_accelerations: Vector3<f32>,
 }
 
-impl Turn {
+impl AttitudeTracking {
     /// Returns the errors of a body at R with rates Omega from the desired attitude. `heading` is the sine and cosine
     /// of the desired yaw; the desired angles change by `eta_dot` \[rad/s\] and `eta_ddot` \[rad/s2\].
     #[inline(always)]
@@ -51,7 +51,7 @@ impl Turn {
         let rates = to_body * omega_d;
         let desired_accelerations = to_body * omega_d_dot;
         let accelerations = desired_accelerations - omega.cross(&rates);
-        Turn { error: error(&to_body), rates, accelerations, desired_accelerations }
+        AttitudeTracking { error: error(&to_body), rates, accelerations, desired_accelerations }
     }
 
     /// Returns the errors as differences of Euler angles (9), as in the paper, with yaw the shorter way round.
@@ -63,7 +63,7 @@ impl Turn {
         eta_d_ddot: Vector3<f32>,
     ) -> Self {
         let error = Vector3::new(eta_d.x - eta.x, eta_d.y - eta.y, math::wrap_angle(eta_d.z - eta.z));
-        Turn { error, rates: eta_d_dot, accelerations: eta_d_ddot, desired_accelerations: eta_d_ddot }
+        AttitudeTracking { error, rates: eta_d_dot, accelerations: eta_d_ddot, desired_accelerations: eta_d_ddot }
     }
 }
 

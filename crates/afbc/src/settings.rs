@@ -1,7 +1,7 @@
 //! Settings of the cascade around the law.
 
 use crate::disturbance::DisturbanceObserver;
-use crate::limits::Limits;
+use crate::limits::PositionControlLimits;
 use crate::reference::ReferenceModel;
 use afbc_control::Smoothing;
 use afbc_control::command_filter::BANDWIDTH;
@@ -24,7 +24,7 @@ parameters! {
         pub forward_rad_s: f32 = 40.0,
         /// Limits on the demands of position control.
         #[group("limits")]
-        pub limits: Limits = Limits::NONE,
+        pub limits: PositionControlLimits = PositionControlLimits::NONE,
         /// Whether the desired attitude is computed with the commanded thrust, instead of the hover thrust (39).
         #[switch(TILT_THRUST)]
         pub tilt_by_thrust: bool = false,
@@ -76,7 +76,7 @@ impl Settings {
         Settings {
             command_filter_rad_s: command_filter_rad_s / slowness,
             forward_rad_s: forward_rad_s / slowness,
-            limits: Limits { tilt_rate_max_rad_s: limits.tilt_rate_max_rad_s / slowness, ..limits },
+            limits: PositionControlLimits { tilt_rate_max_rad_s: limits.tilt_rate_max_rad_s / slowness, ..limits },
             disturbance: disturbance.slowed(slowness, lag_s),
             reference: reference.slowed(slowness),
             smoothing: smoothing.slowed(slowness),

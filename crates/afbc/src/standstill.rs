@@ -37,15 +37,15 @@ pub const IN_AIR_S: f32 = 3.0;
 
 /// Detector of a vehicle that stands on the ground or touches it. It starts in the air.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Standstill {
+pub struct StandstillDetector {
     still_s: f32,
     /// Take-off in progress, `None` in the air.
-    low: Option<Low>,
+    ground_contact: Option<GroundContact>,
 }
 
 /// A vehicle that touches the ground or has just left it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Low {
+struct GroundContact {
     /// Height at which the vehicle last stood \[m\], `None` before the first step.
     height_m: Option<f32>,
     /// Time since the vehicle last stood \[s\].
@@ -54,23 +54,23 @@ struct Low {
     risen_m: f32,
 }
 
-impl Standstill {
+impl StandstillDetector {
     /// Sets the vehicle as standing on the ground, before a take-off.
     pub fn land(&mut self) {
-        self.low = Some(Low { height_m: None, since_s: 0.0, risen_m: -1.0 });
+        self.ground_contact = Some(GroundContact { height_m: None, since_s: 0.0, risen_m: -1.0 });
     }
 
     /// Processes one step with the demanded U4 \[N\].
     #[inline]
     pub fn advance(&mut self, thrust_n: f32, weight_n: f32, state: &State, dt_s: f32) {
         let slower = |speed_max| state.velocity_m_s.iter().all(|v| v.abs() < speed_max);
-        let speed_max = if self.stands() { MOVING_M_S } else { STILL_M_S };
+        let speed_max = if self.is_standing() { MOVING_M_S } else { STILL_M_S };
         self.still_s = if thrust_n < LIFT_SHARE * weight_n && slower(speed_max) { self.still_s + dt_s } else { 0.0 };
         // Repeated in every step, because the height at which the vehicle stood last counts.
-        if self.stands() {
+        if self.is_standing() {
             self.land();
         }
-        if let Some(Low { height_m, since_s, risen_m }) = &mut self.low {
+        if let Some(GroundContact { height_m, since_s, risen_m }) = &mut self.ground_contact {
             let (z_m, climb_m_s) = (state.position_m.z, state.velocity_m_s.z);
             let above_m = (z_m - *height_m.get_or_insert(z_m)).abs();
             *since_s += dt_s;
@@ -79,26 +79,26 @@ impl Standstill {
                 *risen_m = above_m;
             }
             if above_m > FREE_M || *since_s > IN_AIR_S || climb_m_s < -MOVING_M_S {
-                self.low = None;
+                self.ground_contact = None;
             }
         }
     }
 
     /// Returns true if the vehicle stands on the ground.
     #[inline]
-    pub fn stands(&self) -> bool {
+    pub fn is_standing(&self) -> bool {
         self.still_s > STILL_S
     }
 
     /// Returns true if the vehicle may touch the ground: it has not left the place where it stood.
     #[inline]
-    pub fn touches(&self) -> bool {
-        self.low.is_some_and(|low| low.risen_m < 0.0)
+    pub fn is_touching_ground(&self) -> bool {
+        self.ground_contact.is_some_and(|low| low.risen_m < 0.0)
     }
 
     /// Returns the tangent of the largest tilt allowed, infinite in the air.
     #[inline]
     pub fn tilt_max_tan(&self) -> f32 {
-        self.low.map_or(f32::INFINITY, |low| TOUCHING_TAN + TAN_PER_M * math::max(low.risen_m, 0.0))
+        self.ground_contact.map_or(f32::INFINITY, |low| TOUCHING_TAN + TAN_PER_M * math::max(low.risen_m, 0.0))
     }
 }

@@ -1,18 +1,18 @@
 //! All integration tests in one binary: linking each one separately takes longer than running it.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, reason = "a test that cannot go on should say why")]
 
-mod ahead;
 mod cascade;
 mod common;
+mod delay_compensation;
 mod disturbance;
-mod forward;
 mod fuzzy;
 mod guarded;
 mod integral;
+mod jump_filter;
 mod law;
 mod limits;
-mod make_up;
 mod model;
+mod moment_compensation;
 mod moments;
 mod monitor;
 mod profile;

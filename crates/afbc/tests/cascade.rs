@@ -5,9 +5,9 @@
 use crate::common::step;
 use afbc::desired::desired_attitude;
 use afbc::integral::IntegralBackstepping;
-use afbc::law::{Context, Tracking};
+use afbc::law::{StepContext, SubsystemTracking};
 use afbc::model::{ModelConstants, RollPitch};
-use afbc::{Adaptive, Backstepping, Controller, Law, Limits, Profile, Settings};
+use afbc::{Adaptive, Backstepping, Controller, PositionControlLimits, Profile, Settings, SubsystemLaw};
 use afbc_control::command_filter::Filtered;
 use afbc_control::{FlightController, Validated};
 use afbc_types::{Axis, Inputs, Parameters, PerAxis, Setpoint, State};
@@ -52,10 +52,8 @@ fn near() -> impl Strategy<Value = (State, Setpoint)> {
 
 /// Draws the paper's settings with random switches, and limits that may cut the desired attitude.
 fn settings() -> impl Strategy<Value = Settings> {
-    let limits = (0.3_f32..1.5, 1.0_f32..20.0).prop_map(|(tilt_max_rad, acceleration_max_m_s2)| Limits {
-        tilt_max_rad,
-        acceleration_max_m_s2,
-        ..Limits::NONE
+    let limits = (0.3_f32..1.5, 1.0_f32..20.0).prop_map(|(tilt_max_rad, acceleration_max_m_s2)| {
+        PositionControlLimits { tilt_max_rad, acceleration_max_m_s2, ..PositionControlLimits::NONE }
     });
     (limits, any::<[bool; 4]>(), [10.0_f32..100.0, 5.0_f32..50.0], prop_oneof![Just(3.0_f32), Just(1.5)]).prop_map(
         |(limits, switches, [command_filter_rad_s, forward_rad_s], force_n)| {
@@ -108,7 +106,7 @@ struct Carried {
 }
 
 /// Flies `law` in its cascade, and compares each subsystem's errors and input with the law alone.
-fn compose<L: Law + Copy>(
+fn compose<L: SubsystemLaw + Copy>(
     law: L,
     settings: Settings,
     inputs: &[(State, Setpoint)],
@@ -127,7 +125,7 @@ fn compose<L: Law + Copy>(
         let hover_n = law.hover_thrust_n(&estimates.z, WEIGHT_N as f32, known_n);
         let command = step(&controller, &mut memory, state, setpoint);
         let (trace, action) = (&command.trace, &command.action);
-        let context = Context {
+        let context = StepContext {
             state,
             roll_pitch: RollPitch::new(state),
             rotor_residual_rad_s: carried.rotor_residual_rad_s,
@@ -148,7 +146,7 @@ fn compose<L: Law + Copy>(
         let ahead_n = if settings.feed_forward { lag_s * along_thrust * WEIGHT_N / GRAVITY_M_S2 } else { 0.0 };
         let seen = command.per_axis();
         let seen = PerAxis { z: (f64::from(seen.z) - ahead_n) as f32, ..seen };
-        let mut check = |axis: Axis, tracking: Tracking, [error_slack, input_slack]: [f64; 2]| {
+        let mut check = |axis: Axis, tracking: SubsystemTracking, [error_slack, input_slack]: [f64; 2]| {
             let (u, errors) = law.input(axis, &tracking, &context, &mut estimates[axis]);
             let got = trace.errors[axis];
             for (got, wanted) in [(got.e1, errors.e1), (got.e1_dot, errors.e1_dot), (got.e2, errors.e2)] {
@@ -166,7 +164,7 @@ fn compose<L: Law + Copy>(
 
         // Position: directly from state and setpoint.
         for (index, axis) in [(2, Axis::Z), (0, Axis::X), (1, Axis::Y)] {
-            let tracking = Tracking {
+            let tracking = SubsystemTracking {
                 x1: state.position_m[index],
                 x2: state.velocity_m_s[index],
                 e1: setpoint.position_m[index] - state.position_m[index],
@@ -267,7 +265,7 @@ fn compose<L: Law + Copy>(
         for (i, axis) in [Axis::Roll, Axis::Pitch].into_iter().enumerate() {
             let Filtered { angle, rate } = trace.filtered[i];
             let filter = w * w * (commanded[i] - f64::from(angle)) - 2.0 * w * f64::from(rate);
-            let tracking = Tracking {
+            let tracking = SubsystemTracking {
                 x1: state.attitude_rad[i],
                 x2: turning[i] as f32,
                 e1: angle - state.attitude_rad[i],
@@ -278,7 +276,7 @@ fn compose<L: Law + Copy>(
             check(axis, tracking, slack)?;
         }
         let turn = f64::from(setpoint.yaw_rad) - eta.z;
-        let tracking = Tracking {
+        let tracking = SubsystemTracking {
             x1: state.attitude_rad.z,
             x2: turning.z as f32,
             e1: (turn - core::f64::consts::TAU * (turn / core::f64::consts::TAU).round()) as f32,
@@ -370,7 +368,7 @@ proptest! {
 #[test]
 fn a_controller_reports_what_others_need() {
     let (vehicle, settings) = (Parameters::PAPER.to_f32(), Profile::Paper.settings().with_dt_s(0.004));
-    let limits = Limits { speed_max_m_s: 1.0, climb_max_m_s: 1.0, ..Limits::NONE };
+    let limits = PositionControlLimits { speed_max_m_s: 1.0, climb_max_m_s: 1.0, ..PositionControlLimits::NONE };
     let law = Adaptive::new(Profile::Paper.gains()).unwrap();
     let controller: Controller<Adaptive> = Controller::new(vehicle, Settings { limits, ..settings }, law).unwrap();
     assert_eq!(controller.dt_s(), 0.004);

@@ -2,7 +2,9 @@
 //! disturbance.
 
 use afbc::Settings;
-use afbc::disturbance::{ACCELERATION_MAX_M_S2, DisturbanceObserver, ForceObserver, ForceObserverMemory, JUMP_M_S};
+use afbc::disturbance::{
+    ACCELERATION_MAX_M_S2, DisturbanceObserver, ForceObserver, ForceObserverMemory, JUMP_M_S, ObserverConditions,
+};
 use afbc_control::Settings as Common;
 use afbc_control::drag::KnownDrag;
 use afbc_types::{Parameters, State};
@@ -14,6 +16,10 @@ const DT_S: f32 = 0.001;
 fn observer(disturbance_rad_s: f32) -> ForceObserver {
     let settings = DisturbanceObserver { disturbance_rad_s, ..DisturbanceObserver::DEFAULT };
     ForceObserver::new(&settings, &Common::DEFAULT, &Parameters::PAPER.to_f32()).unwrap().unwrap()
+}
+
+fn conditions(fresh: bool, touches_ground: bool) -> ObserverConditions {
+    ObserverConditions { fresh, touches_ground }
 }
 
 fn weight_n() -> f32 {
@@ -45,8 +51,8 @@ impl Body {
     /// Flies one step with the hover thrust and this disturbance, and returns the observer's output.
     fn step(&mut self, observer: &ForceObserver, f_m_s2: [f32; 2]) -> Vector3<f32> {
         let up = self.up();
-        let seen = observer.advance(&mut self.memory, &self.state, &up, self.hover_n, [true, false]);
-        observer.give(&mut self.memory, self.hover_n);
+        let seen = observer.advance(&mut self.memory, &self.state, &up, self.hover_n, conditions(true, false));
+        observer.record_thrust(&mut self.memory, self.hover_n);
         let up = up * 9.81;
         self.state.velocity_m_s += Vector3::new(up.x + f_m_s2[0], up.y + f_m_s2[1], 0.0) * DT_S;
         seen
@@ -117,7 +123,8 @@ fn it_waits_for_states_and_forgets_on_the_ground() {
         body.step(&observer, [1.0, 0.0]);
     }
     let up = body.up();
-    let mut look = |fresh, stands| observer.advance(&mut body.memory, &body.state, &up, weight_n(), [fresh, stands]);
+    let mut look =
+        |fresh, stands| observer.advance(&mut body.memory, &body.state, &up, weight_n(), conditions(fresh, stands));
     let held = look(false, false);
     assert!(held.x > 0.9);
     assert_eq!(look(false, false), held);
@@ -179,9 +186,9 @@ fn a_slower_observer_is_the_same_on_a_slower_clock() {
         let (mut memory, state, up) = (None, State::default(), Vector3::new(0.05_f32.sin(), 0.0, 0.05_f32.cos()));
         (0..100_u16)
             .map(|_| {
-                let seen = observer.advance(&mut memory, &state, &up, weight_n(), [true, false]);
+                let seen = observer.advance(&mut memory, &state, &up, weight_n(), conditions(true, false));
                 // Half of the thrust and no motion, so that the rotor lag matters.
-                observer.give(&mut memory, 0.5 * weight_n());
+                observer.record_thrust(&mut memory, 0.5 * weight_n());
                 seen.x
             })
             .collect::<Vec<_>>()
@@ -208,9 +215,9 @@ proptest! {
                 ..State::default()
             };
             let up = Body { state, memory: None, hover_n: hover }.up();
-            let seen = observer.advance(&mut memory, &state, &up, hover, [true, false]);
+            let seen = observer.advance(&mut memory, &state, &up, hover, conditions(true, false));
             prop_assert!(seen.iter().all(|f| f.abs() <= ACCELERATION_MAX_M_S2), "{seen:?}");
-            observer.give(&mut memory, thrust_n);
+            observer.record_thrust(&mut memory, thrust_n);
         }
     }
 }
@@ -255,8 +262,8 @@ fn what_was_learnt_at_a_velocity_is_remembered() {
                 let a = Vector3::new(4.0 * cos, -3.0 * sin, 0.0) * (core::f32::consts::TAU / 6.0) - f;
                 let up = Vector3::new(a.x / 9.81, a.y / 9.81, 1.0);
                 let state = State { velocity_m_s: v, ..State::default() };
-                let seen = observer.advance(&mut memory, &state, &up, weight_n(), [true, false]);
-                observer.give(&mut memory, weight_n());
+                let seen = observer.advance(&mut memory, &state, &up, weight_n(), conditions(true, false));
+                observer.record_thrust(&mut memory, weight_n());
                 worst.max((seen - f).xy().norm())
             })
         })

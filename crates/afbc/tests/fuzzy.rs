@@ -1,6 +1,6 @@
 //! Properties of the fuzzy basis (17)-(19), for every accepted membership and every finite input.
 
-use afbc::fuzzy::{Basis, Membership, SPREAD};
+use afbc::fuzzy::{FuzzyBasis, Membership, SPREAD};
 use afbc_types::{Declared, Range};
 use nalgebra::Matrix3;
 use proptest::prelude::*;
@@ -63,7 +63,7 @@ proptest! {
 
     #[test]
     fn weights_are_finite_within_0_and_1_and_sum_to_1(membership in membership(), a in finite(), b in finite()) {
-        let w = Basis::new(membership).unwrap().weights([a, b]);
+        let w = FuzzyBasis::new(membership).unwrap().weights([a, b]);
         prop_assert!(w.iter().all(|w| w.is_finite() && (0.0..=1.0).contains(w)), "{w:?}");
         // Two sums of three, a product, a division and a product before the sum of nine: 16 roundings.
         let sum: f64 = w.iter().copied().map(f64::from).sum();
@@ -74,7 +74,7 @@ proptest! {
     #[test]
     fn weights_agree_with_18_in_f64(membership in membership(), widths in prop::array::uniform2(-60.0_f32..60.0)) {
         let inputs = widths.map(|x| x * membership.width);
-        let (w, exact) = (Basis::new(membership).unwrap().weights(inputs), exact(membership, inputs));
+        let (w, exact) = (FuzzyBasis::new(membership).unwrap().weights(inputs), exact(membership, inputs));
         let bound = relative_bound(membership, inputs);
         for (w, exact) in w.iter().zip(exact.iter()) {
             // An exponential below the normal numbers of f32 is 0: 2^-126 divided by a sum of at least q = 1.5e-8.
@@ -85,7 +85,7 @@ proptest! {
 
     #[test]
     fn mirroring_an_input_mirrors_the_weights(membership in membership(), a in finite(), b in finite()) {
-        let basis = Basis::new(membership).unwrap();
+        let basis = FuzzyBasis::new(membership).unwrap();
         let (w, first, second) = (basis.weights([a, b]), basis.weights([-a, b]), basis.weights([a, -b]));
         // The triples are the same numbers in reverse order; their sums may round differently, by 2 roundings each.
         let near = |x: f32, y: f32| (f64::from(x) - f64::from(y)).abs() <= 8.0 * U * f64::from(x) + 1e-44;
@@ -99,7 +99,7 @@ proptest! {
     fn far_out_the_outer_rule_takes_all(membership in membership(), far in 200.0_f32..1e30) {
         // Beyond 200 widths the next Gaussian is exp(-k x + c^2 / 2s^2) < exp(-200 * 0.1 + 18) of the outer one for the
         // widest spread, the worst case: less than 0.14. It decreases with x.
-        let basis = Basis::new(membership).unwrap();
+        let basis = FuzzyBasis::new(membership).unwrap();
         let x = far * membership.width;
         let w = basis.weights([x, -x]);
         let (row, column) = (2, 0);
@@ -111,7 +111,7 @@ proptest! {
 fn each_rule_has_its_place() {
     // The first input is the outer index: rule 3 i + j + 1 is row i, column j, from -c to c.
     let membership = Membership { centre: 10.0, width: 2.0 };
-    let basis = Basis::new(membership).unwrap();
+    let basis = FuzzyBasis::new(membership).unwrap();
     for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
         let w = basis.weights([10.0 * (i as f32 - 1.0), 10.0 * (j as f32 - 1.0)]);
         assert!(w[(i, j)] > 0.999_98, "rule {}: {w}", 3 * i + j + 1);
@@ -120,7 +120,7 @@ fn each_rule_has_its_place() {
 
 #[test]
 fn a_bad_membership_is_refused_by_name() {
-    let refused = |centre, width| Basis::new(Membership { centre, width }).unwrap_err().range.name;
+    let refused = |centre, width| FuzzyBasis::new(Membership { centre, width }).unwrap_err().range.name;
     assert_eq!(refused(f32::NAN, 1.0), "centre");
     assert_eq!(refused(0.0, 1.0), "centre");
     assert_eq!(refused(-1.0, 1.0), "centre");

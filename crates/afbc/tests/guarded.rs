@@ -5,7 +5,7 @@
 use crate::common::{Stepped, U, check_step, gains, plausible, setpoint, settings, state, step, value};
 use afbc::adaptive::Gains;
 use afbc::disturbance::DisturbanceObserver;
-use afbc::monitor::Bounds;
+use afbc::monitor::MonitorBounds;
 use afbc::reference::ReferenceModel;
 use afbc::standstill::LIFT_SHARE;
 use afbc::{Adaptive, AdaptiveEstimate, Controller, Guarded, Profile, Settings, Trip, guarded};
@@ -36,23 +36,23 @@ fn direct() -> Settings {
     }
 }
 
-fn guarded(bounds: Bounds) -> Guarded {
+fn guarded(bounds: MonitorBounds) -> Guarded {
     Guarded::new(Parameters::PAPER.to_f32(), direct(), Profile::Flight.gains(), bounds).unwrap()
 }
 
-fn bounds() -> Bounds {
-    Bounds::new(&Profile::Flight.gains(), &Parameters::PAPER.to_f32(), &direct())
+fn bounds() -> MonitorBounds {
+    MonitorBounds::new(&Profile::Flight.gains(), &Parameters::PAPER.to_f32(), &direct())
 }
 
 /// Returns bounds that trip in the first step with an error of roll: any estimate above zero trips.
-fn hair_trigger() -> Bounds {
-    Bounds { theta: PerAxis { roll: 0.0, ..bounds().theta }, ..bounds() }
+fn hair_trigger() -> MonitorBounds {
+    MonitorBounds { theta: PerAxis { roll: 0.0, ..bounds().theta }, ..bounds() }
 }
 
 /// Returns bounds that never trip.
-fn lax() -> Bounds {
+fn lax() -> MonitorBounds {
     let most = PerAxis::from_fn(|_| 1e9);
-    Bounds { theta: most, delta: most, error: most, saturation_share: 1.0, swing_n: 1e4, swings_hz: 1e4 }
+    MonitorBounds { theta: most, delta: most, error: most, saturation_share: 1.0, swing_n: 1e4, swings_hz: 1e4 }
 }
 
 /// Draws a state with errors that keep the fallback law within its integral's bounds.
@@ -97,9 +97,9 @@ proptest! {
         gains.z.safeguards.theta_max = gains.z.safeguards.theta_max.max(5.01 * WEIGHT_N);
         settings.common.rotor_force_max_n = settings.common.rotor_force_max_n.max(2.0);
         let bounds = if trips {
-            Bounds { error: PerAxis::from_fn(|_| 1.0), ..lax() }
+            MonitorBounds { error: PerAxis::from_fn(|_| 1.0), ..lax() }
         } else {
-            Bounds::new(&gains, &Parameters::PAPER.to_f32(), &settings)
+            MonitorBounds::new(&gains, &Parameters::PAPER.to_f32(), &settings)
         };
         let controller = Guarded::new(Parameters::PAPER.to_f32(), settings, gains, bounds).unwrap();
         let mut memory = Flight::default();
@@ -194,8 +194,8 @@ proptest! {
         };
         let (settings, mut gains) = (Settings { feed_forward, ..direct() }, Profile::Flight.gains());
         gains.z.safeguards.theta_max = 8.0 * WEIGHT_N;
-        let bounds = Bounds::new(&gains, &Parameters::PAPER.to_f32(), &settings);
-        let hasty = Bounds { error: PerAxis { z: 0.0, ..bounds.error }, ..bounds };
+        let bounds = MonitorBounds::new(&gains, &Parameters::PAPER.to_f32(), &settings);
+        let hasty = MonitorBounds { error: PerAxis { z: 0.0, ..bounds.error }, ..bounds };
         let controller = Guarded::new(Parameters::PAPER.to_f32(), settings, gains, hasty).unwrap();
         let mut memory = Flight::default();
         let mut commands = Vec::new();
@@ -291,7 +291,7 @@ fn a_tripped_controller_learns_nothing_and_says_why() {
 fn bounds_and_gains_out_of_range_are_refused_by_name() {
     let (vehicle, settings, gains) = (Parameters::PAPER.to_f32(), Profile::Flight.settings(), Profile::Flight.gains());
     let name = |settings, gains, bounds| Guarded::new(vehicle, settings, gains, bounds).unwrap_err().range.name;
-    assert_eq!(name(settings, gains, Bounds { swing_n: 0.0, ..bounds() }), "swing_n");
+    assert_eq!(name(settings, gains, MonitorBounds { swing_n: 0.0, ..bounds() }), "swing_n");
     let mut bad = gains;
     bad.z.gamma = f32::NAN;
     assert_eq!(name(settings, bad, bounds()), "gamma");
@@ -304,7 +304,7 @@ fn a_vehicle_that_cannot_hover_is_refused_by_name() {
     let settings = Profile::Flight.settings();
     let of_mass = |mass_kg: f32| Parameters { mass_kg, ..Parameters::PAPER.to_f32() };
     let refusal = |vehicle: Parameters, gains: PerAxis<Gains>| {
-        let guarded = Guarded::new(vehicle, settings, gains, Bounds::new(&gains, &vehicle, &settings));
+        let guarded = Guarded::new(vehicle, settings, gains, MonitorBounds::new(&gains, &vehicle, &settings));
         guarded.err().map(|error| (error.range.name, error.range.min as f32))
     };
     for mass_kg in [0.3, 0.486, 0.61, 0.8, 0.94, 0.95, 0.97, 1.22, 2.0, 50.0] {
@@ -325,7 +325,7 @@ fn a_vehicle_that_cannot_hover_is_refused_by_name() {
     let strong = |mass_kg: f32| {
         let gains = Profile::Flight.gains();
         let settings = settings.with_rotor_force_max_n(100.0);
-        Guarded::new(of_mass(mass_kg), settings, gains, Bounds::new(&gains, &of_mass(mass_kg), &settings))
+        Guarded::new(of_mass(mass_kg), settings, gains, MonitorBounds::new(&gains, &of_mass(mass_kg), &settings))
     };
     assert!(strong(0.55).is_ok());
     let error = strong(0.97).unwrap_err();
@@ -507,7 +507,7 @@ fn tripped(steps: usize, aside_m: f32) -> (Stepped, Flight) {
     for _ in 0..steps {
         step(&controller, &mut memory, &State::default(), &sinks);
     }
-    let touchy = guarded(Bounds { error: PerAxis { z: 0.0, ..bounds().error }, ..bounds() });
+    let touchy = guarded(MonitorBounds { error: PerAxis { z: 0.0, ..bounds().error }, ..bounds() });
     let aside = Setpoint { position_m: Vector3::new(aside_m, 0.0, 1e-4), ..sinks };
     let mut last = Stepped::default();
     while memory.control.trip().is_none() {
@@ -524,7 +524,7 @@ fn what_turns_the_vehicle_is_handed_over() {
         Settings { reference: ReferenceModel::DEFAULT, smoothing: Smoothing::DEFAULT, ..Profile::Flight.settings() };
     let trips_after = |bounds| Guarded::new(paper, settings, Profile::Flight.gains(), bounds).unwrap();
     let moment = Vector3::new(3.0, -2.0, 0.5);
-    let (calm, hasty) = (trips_after(lax()), trips_after(Bounds { theta: PerAxis::from_fn(|_| 0.0), ..lax() }));
+    let (calm, hasty) = (trips_after(lax()), trips_after(MonitorBounds { theta: PerAxis::from_fn(|_| 0.0), ..lax() }));
     let (mut memory, mut rates) = (Flight::default(), Vector3::zeros());
     // The vehicle turns by its rotors and the moment, but stays in place.
     let mut fly = |controller: &Guarded, engage: bool| {

@@ -1,10 +1,10 @@
 //! Compares the fallback law with its equations in `f64`, and checks its stability proof.
 #![allow(clippy::unwrap_used, missing_docs)] // a law that cannot be built must stop the test
 
-use afbc::integral::{Gains, Integral, IntegralBackstepping};
-use afbc::law::{Context, Tracking};
+use afbc::integral::{Gains, IntegralBackstepping, IntegralMemory};
+use afbc::law::{StepContext, SubsystemTracking};
 use afbc::model::RollPitch;
-use afbc::{Backstepping, Law, Profile, adaptive, backstepping};
+use afbc::{Backstepping, Profile, SubsystemLaw, adaptive, backstepping};
 use afbc_types::{Axis, Parameters, PerAxis, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -13,13 +13,13 @@ use proptest::prelude::*;
 const U: f64 = 1.0 / (1 << 24) as f64;
 const DT_S: f32 = 0.001;
 
-fn tracking() -> impl Strategy<Value = Tracking> {
-    prop::array::uniform4(-3.0_f32..3.0).prop_map(|[x2, e1, x1d_dot, x1d_ddot]| Tracking {
+fn tracking() -> impl Strategy<Value = SubsystemTracking> {
+    prop::array::uniform4(-3.0_f32..3.0).prop_map(|[x2, e1, x1d_dot, x1d_ddot]| SubsystemTracking {
         x2,
         e1,
         x1d_dot,
         x1d_ddot,
-        ..Tracking::default()
+        ..SubsystemTracking::default()
     })
 }
 
@@ -35,11 +35,17 @@ fn gains() -> impl Strategy<Value = Gains> {
 
 /// Runs one step of the subsystem x, with f = 0 and g = 1. Returns u of this law, u of the baseline for the same errors
 /// (to which the integral is added), and e_2.
-fn step(gains: Gains, tracking: &Tracking, unallocated: f32, adapt: bool, integral: &mut Integral) -> [f32; 3] {
+fn step(
+    gains: Gains,
+    tracking: &SubsystemTracking,
+    unallocated: f32,
+    adapt: bool,
+    integral: &mut IntegralMemory,
+) -> [f32; 3] {
     let vehicle = Parameters::PAPER.to_f32();
     let law = IntegralBackstepping::new(&vehicle, PerAxis::from_fn(|_| gains)).unwrap();
     let fixed = Backstepping::new(&vehicle, PerAxis::from_fn(|_| gains.backstepping)).unwrap();
-    let context = Context {
+    let context = StepContext {
         state: &State::default(),
         roll_pitch: RollPitch::new(&State::default()),
         rotor_residual_rad_s: 0.0,
@@ -65,7 +71,7 @@ proptest! {
         gains in gains(), tracking in tracking(), value in -12.0_f32..12.0, adapt: bool,
         unallocated in prop_oneof![Just(0.0_f32), -1.0_f32..1.0],
     ) {
-        let mut integral = Integral { value, ..Integral::default() };
+        let mut integral = IntegralMemory { value, ..IntegralMemory::default() };
         let [u, alone, e2] = step(gains, &tracking, unallocated, adapt, &mut integral);
         let i = value.clamp(-gains.integral_max, gains.integral_max);
         prop_assert_eq!(u, alone + i);
@@ -79,7 +85,7 @@ proptest! {
     /// The law continues with the input to resume, once and as far as its bound allows.
     #[test]
     fn it_takes_over_with_the_last_input(gains in gains(), tracking in tracking(), last in -20.0_f32..20.0) {
-        let mut integral = Integral { value: 3.0, resume: Some(last), hover_thrust_n: None };
+        let mut integral = IntegralMemory { value: 3.0, resume: Some(last), hover_thrust_n: None };
         let [u, alone, _] = step(gains, &tracking, 0.0, false, &mut integral);
         let most = gains.integral_max;
         let wanted = last.clamp(alone - most, alone + most);
@@ -94,7 +100,7 @@ proptest! {
     #[test]
     fn lyapunov(gains in gains(), tracking in tracking(), value in -5.0_f32..5.0, d in -5.0_f64..5.0) {
         let gains = Gains { integral_max: 10.0, ..gains };
-        let mut integral = Integral { value, ..Integral::default() };
+        let mut integral = IntegralMemory { value, ..IntegralMemory::default() };
         let [u, _, e2] = step(gains, &tracking, 0.0, true, &mut integral);
         let backstepping::Gains { alpha1, alpha2, stiffness } = gains.backstepping;
         let [a1, a2, c, kappa, e1, e2] =
@@ -122,7 +128,8 @@ fn it_stands_in_for_afbc() {
         assert_eq!((own.integral, own.integral_max), (of.gamma, of.safeguards.theta_max));
     }
     let law = IntegralBackstepping::new(&vehicle, gains.map(|gains| gains.into())).unwrap();
-    let with = |hover_thrust_n| law.hover_thrust_n(&Integral { hover_thrust_n, ..Integral::default() }, 4.7, 0.0);
+    let with =
+        |hover_thrust_n| law.hover_thrust_n(&IntegralMemory { hover_thrust_n, ..IntegralMemory::default() }, 4.7, 0.0);
     assert_eq!((with(None), with(Some(6.1))), (4.7, 6.1));
 }
 

@@ -3,12 +3,12 @@
 
 use afbc::adaptive::{Gains, Subsystem};
 use afbc::backstepping::{self, ideal, proportional};
-use afbc::fuzzy::{Basis, Membership};
+use afbc::fuzzy::{FuzzyBasis, Membership};
 use afbc::integral::IntegralBackstepping;
-use afbc::law::Context;
-use afbc::law::Tracking;
+use afbc::law::StepContext;
+use afbc::law::SubsystemTracking;
 use afbc::model::{Dynamics, ModelConstants, RollPitch};
-use afbc::{Adaptive, AdaptiveEstimate, Backstepping, Law, Profile, Safeguards};
+use afbc::{Adaptive, AdaptiveEstimate, Backstepping, Profile, Safeguards, SubsystemLaw};
 use afbc_control::Errors;
 use afbc_types::{Axis, Declaration, Parameters, PerAxis, State};
 use nalgebra::{Matrix3, Vector3};
@@ -17,9 +17,10 @@ use proptest::prelude::*;
 /// Rounding error of one `f32` operation, relative.
 const U: f64 = 1.0 / (1 << 24) as f64;
 
-fn tracking() -> impl Strategy<Value = Tracking> {
-    (-10.0_f32..10.0, -10.0_f32..10.0, -10.0_f32..10.0, -10.0_f32..10.0, -10.0_f32..10.0)
-        .prop_map(|(x1, x2, e1, x1d_dot, x1d_ddot)| Tracking { x1, x2, e1, x1d_dot, x1d_ddot, approach_1_s: None })
+fn tracking() -> impl Strategy<Value = SubsystemTracking> {
+    (-10.0_f32..10.0, -10.0_f32..10.0, -10.0_f32..10.0, -10.0_f32..10.0, -10.0_f32..10.0).prop_map(
+        |(x1, x2, e1, x1d_dot, x1d_ddot)| SubsystemTracking { x1, x2, e1, x1d_dot, x1d_ddot, approach_1_s: None },
+    )
 }
 
 fn gains() -> impl Strategy<Value = Gains> {
@@ -104,7 +105,7 @@ proptest! {
     ) {
         let gains = PerAxis::from_fn(|_| backstepping::Gains { alpha1, alpha2, stiffness });
         let law = Backstepping::new(&Parameters::PAPER.to_f32(), gains).unwrap();
-        let context = Context {
+        let context = StepContext {
             state: &State::default(),
             roll_pitch: RollPitch::new(&State::default()),
             rotor_residual_rad_s: 0.0,
@@ -115,7 +116,7 @@ proptest! {
             known: None,
         };
         let approach = law.approach(Axis::X, None);
-        let at_limit = Tracking { approach_1_s: Some(approach), ..tracking };
+        let at_limit = SubsystemTracking { approach_1_s: Some(approach), ..tracking };
         let (u, errors) = law.input(Axis::X, &at_limit, &context, &mut ());
         let [e1, rate, r, a1, a2] = [tracking.e1, errors.e1_dot, approach, alpha1, alpha2].map(f64::from);
         let lack = rate + r * e1;
@@ -148,7 +149,7 @@ proptest! {
         let gains = Gains { backstepping, ..gains };
         let state = State { attitude_rad: angles.into(), rates_rad_s: rates.into(), ..State::default() };
         let model = ModelConstants::new(&vehicle);
-        let context = Context {
+        let context = StepContext {
             state: &state,
             roll_pitch: RollPitch::new(&state),
             rotor_residual_rad_s,
@@ -172,7 +173,7 @@ proptest! {
             let known = ideal(&backstepping, &errors, tracking.x1d_ddot, &Dynamics { f, ..nominal });
             let mut estimate = before;
             let (alone, _) = adaptive.input(axis, &tracking, &context, &mut estimate);
-            let with_model = Context { known: Some(&model), ..context };
+            let with_model = StepContext { known: Some(&model), ..context };
             let (whole, seen) = adaptive.input(axis, &tracking, &with_model, &mut estimate);
             let allowed = 4.0 * U * (f64::from(alone.abs()) + f64::from(known.abs()));
             prop_assert_eq!(seen, errors);
@@ -213,7 +214,7 @@ proptest! {
         prop_assert_eq!(terms.proportional, gains.backstepping.alpha2 * errors.e2); // (21)
 
         // (22): nine products, eight sums.
-        let w = Basis::new(gains.membership).unwrap().weights(inputs);
+        let w = FuzzyBasis::new(gains.membership).unwrap().weights(inputs);
         let products = w.zip_map(&estimate.theta, |w, theta| f64::from(w) * f64::from(theta));
         prop_assert!((f64::from(terms.fuzzy) - products.sum()).abs() <= 10.0 * U * products.abs().sum());
         // A weighted mean is between the smallest and the largest value.
@@ -236,7 +237,7 @@ proptest! {
     ) {
         let errors = tracking.errors(gains.backstepping.alpha1);
         let (_, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, 0.0);
-        let w = Basis::new(gains.membership).unwrap().weights(inputs);
+        let w = FuzzyBasis::new(gains.membership).unwrap().weights(inputs);
         let e2 = f64::from(errors.e2);
         for (rate, w) in rate.theta().iter().zip(w.iter()) {
             let wanted = f64::from(gains.gamma) * e2 * f64::from(*w);
@@ -279,7 +280,7 @@ proptest! {
             let (terms, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &before, 0.0);
 
             let mut frozen = before;
-            let context = Context {
+            let context = StepContext {
                 state: &state,
                 roll_pitch: RollPitch::new(&state),
                 rotor_residual_rad_s: 0.0,
@@ -293,7 +294,7 @@ proptest! {
             prop_assert_eq!((u, seen, frozen), (terms.sum(), errors, before));
 
             let mut moved = before;
-            let (u, _) = law.input(axis, &tracking, &Context { adapt: true, ..context }, &mut moved);
+            let (u, _) = law.input(axis, &tracking, &StepContext { adapt: true, ..context }, &mut moved);
             prop_assert_eq!(u, terms.sum());
             for ((moved, before), rate) in moved.theta.iter().zip(before.theta.iter()).zip(rate.theta().iter()) {
                 // The rate's factors round four times, the sum once.
@@ -350,7 +351,7 @@ fn an_error_is_approached_at_the_speed_that_the_law_holds() {
             [adaptive.approach(axis, Some(&model)), fixed.approach(axis, None), integral.approach(axis, None)]
         {
             // At e_1 = 1 m and this approach speed, the only input is the one against f.
-            let tracking = Tracking { x2: approach, e1: 1.0, ..Tracking::default() };
+            let tracking = SubsystemTracking { x2: approach, e1: 1.0, ..SubsystemTracking::default() };
             let errors = tracking.errors(of.alpha1);
             let u = ideal(&of, &errors, 0.0, &dynamics) + proportional(of.alpha2, &errors);
             let held = -dynamics.f / dynamics.g;

@@ -4,7 +4,7 @@
 use crate::common;
 use afbc::integral::IntegralBackstepping;
 use afbc::reference::ReferenceModel;
-use afbc::{Adaptive, Backstepping, Controller, Limits, Profile, Settings, backstepping};
+use afbc::{Adaptive, Backstepping, Controller, PositionControlLimits, Profile, Settings, backstepping};
 use afbc_control::{Errors, FlightController, Smoothing, Validated};
 use afbc_types::{Axis, Declaration, Declared, Parameters, PerAxis, Setpoint, State};
 use common::{Stepped, U, gains, limits, plausible, setpoint, settings, state, step};
@@ -26,7 +26,7 @@ fn direct() -> Settings {
     Settings { reference: ReferenceModel::DEFAULT, smoothing: Smoothing::DEFAULT, ..Profile::Flight.settings() }
 }
 
-fn flight(limits: Limits) -> Controller<Adaptive> {
+fn flight(limits: PositionControlLimits) -> Controller<Adaptive> {
     adaptive(Profile::Flight.gains(), Settings { limits, ..direct() })
 }
 
@@ -49,7 +49,7 @@ proptest! {
     ) {
         let controller = adaptive(gains, settings);
         let mut memory = Validated::default();
-        let Limits { tilt_max_rad, tilt_rate_max_rad_s, .. } = settings.limits;
+        let PositionControlLimits { tilt_max_rad, tilt_rate_max_rad_s, .. } = settings.limits;
         let tangent_max = f64::from(tilt_max_rad).tan() * (1.0 + ROTATION);
         let rate_max = f64::from(tilt_rate_max_rad_s);
         let mut before = None;
@@ -123,7 +123,7 @@ proptest! {
     ) {
         let settings = Settings { limits, feed_forward, ..direct() };
         let command = step(&adaptive(gains, settings), &mut Validated::default(), &state, &setpoint);
-        let Limits { speed_max_m_s, climb_max_m_s, .. } = limits;
+        let PositionControlLimits { speed_max_m_s, climb_max_m_s, .. } = limits;
         for (i, axis, max) in [(0, Axis::X, speed_max_m_s), (1, Axis::Y, speed_max_m_s), (2, Axis::Z, climb_max_m_s)] {
             let backstepping::Gains { alpha1, alpha2, stiffness } = gains[axis].backstepping;
             let [alpha1, alpha2, c, max] = [alpha1, alpha2, stiffness, max].map(f64::from);
@@ -153,7 +153,7 @@ proptest! {
         let error = |yaw_rad: f32, wanted_rad: f32| {
             let state = State { attitude_rad: Vector3::new(0.0, 0.0, yaw_rad), ..State::default() };
             let setpoint = Setpoint { yaw_rad: wanted_rad, ..Setpoint::default() };
-            step(&flight(Limits::NONE), &mut Validated::default(), &state, &setpoint).trace.errors.yaw.e1
+            step(&flight(PositionControlLimits::NONE), &mut Validated::default(), &state, &setpoint).trace.errors.yaw.e1
         };
         let turn = core::f32::consts::TAU * turns as f32;
         let short = error(yaw, wanted);
@@ -215,13 +215,13 @@ fn no_attitude_is_singular() {
 
 #[test]
 fn limits_out_of_range_are_refused_by_name() {
-    type Set = fn(&mut Limits, f32);
+    type Set = fn(&mut PositionControlLimits, f32);
     let cases: [(Declaration, Set); 5] = [
-        (Limits::TILT, |l, v| l.tilt_max_rad = v),
-        (Limits::RATE, |l, v| l.tilt_rate_max_rad_s = v),
-        (Limits::ACCEL, |l, v| l.acceleration_max_m_s2 = v),
-        (Limits::SPEED, |l, v| l.speed_max_m_s = v),
-        (Limits::CLIMB, |l, v| l.climb_max_m_s = v),
+        (PositionControlLimits::TILT, |l, v| l.tilt_max_rad = v),
+        (PositionControlLimits::RATE, |l, v| l.tilt_rate_max_rad_s = v),
+        (PositionControlLimits::ACCEL, |l, v| l.acceleration_max_m_s2 = v),
+        (PositionControlLimits::SPEED, |l, v| l.speed_max_m_s = v),
+        (PositionControlLimits::CLIMB, |l, v| l.climb_max_m_s = v),
     ];
     for (Declaration { range, .. }, set) in cases {
         let with = |value| {

@@ -1,6 +1,6 @@
 //! Compares the moment observer with its closed solution, and checks which effects it must not see as a moment.
 
-use afbc::disturbance::{AGE_S, DisturbanceObserver, MomentObserver, Turning};
+use afbc::disturbance::{AGE_S, DisturbanceObserver, MomentObserver, MomentObserverMemory, ObserverConditions};
 use afbc_types::{Inputs, Parameters};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -18,6 +18,10 @@ fn observer(rad_s: f32, disturbance_lag_s: f32) -> MomentObserver {
     MomentObserver::new(&settings, &Parameters::PAPER.to_f32(), THRUST_MAX_N, DT_S).unwrap()
 }
 
+fn conditions(fresh: bool, touches_ground: bool) -> ObserverConditions {
+    ObserverConditions { fresh, touches_ground }
+}
+
 fn effectiveness() -> Vector3<f32> {
     Parameters::PAPER.to_f32().effectiveness()
 }
@@ -28,7 +32,7 @@ struct Body {
     input: Vector3<f32>,
     lag_s: f32,
     share: f32,
-    memory: Option<Turning>,
+    memory: Option<MomentObserverMemory>,
 }
 
 impl Body {
@@ -38,8 +42,12 @@ impl Body {
 
     /// Turns one step with these inputs and moment \[rad/s2\]; returns the observer's output.
     fn step(&mut self, observer: &MomentObserver, u: &Vector3<f32>, f: &Vector3<f32>, effort: f32) -> Vector3<f32> {
-        let seen = observer.advance(&mut self.memory, &self.rates, &Vector3::zeros(), [true, false]);
-        observer.give(&mut self.memory, &Inputs { roll_n: u.x, pitch_n: u.y, yaw_n: u.z, thrust_n: 5.0 }, effort);
+        let seen = observer.advance(&mut self.memory, &self.rates, &Vector3::zeros(), conditions(true, false));
+        observer.record_inputs(
+            &mut self.memory,
+            &Inputs { roll_n: u.x, pitch_n: u.y, yaw_n: u.z, thrust_n: 5.0 },
+            effort,
+        );
         self.rates += (self.input.component_mul(&effectiveness()) * self.share + f) * DT_S;
         self.input += (u - self.input) * (1.0 - (-DT_S / self.lag_s).exp());
         seen
@@ -102,10 +110,15 @@ fn jumps_and_old_states_teach_nothing() {
         let seen = body.step(&observer, &zero, &f, 1.0);
         assert!((seen - before).abs().max() < 0.05, "{seen:?}, {before:?} before");
     }
-    let held = observer.advance(&mut body.memory, &(body.rates * 2.0), &Vector3::zeros(), [false, false]);
-    assert_eq!(observer.advance(&mut body.memory, &(body.rates * -3.0), &Vector3::zeros(), [false, false]), held);
-    assert_eq!(observer.advance(&mut body.memory, &body.rates, &Vector3::zeros(), [true, true]), zero);
-    assert!(observer.advance(&mut body.memory, &body.rates, &Vector3::zeros(), [true, false]).abs().max() < 0.5);
+    let held = observer.advance(&mut body.memory, &(body.rates * 2.0), &Vector3::zeros(), conditions(false, false));
+    assert_eq!(
+        observer.advance(&mut body.memory, &(body.rates * -3.0), &Vector3::zeros(), conditions(false, false)),
+        held
+    );
+    assert_eq!(observer.advance(&mut body.memory, &body.rates, &Vector3::zeros(), conditions(true, true)), zero);
+    assert!(
+        observer.advance(&mut body.memory, &body.rates, &Vector3::zeros(), conditions(true, false)).abs().max() < 0.5
+    );
 }
 
 proptest! {
@@ -119,9 +132,10 @@ proptest! {
         let (observer, mut memory) = (observer(w, lag_s), None);
         let most = effectiveness() * (0.5 * THRUST_MAX_N * 1.0001);
         for (p, r, u, effort) in steps {
-            let seen = observer.advance(&mut memory, &Vector3::new(p, -p, r), &Vector3::zeros(), [true, false]);
+            let rates = Vector3::new(p, -p, r);
+            let seen = observer.advance(&mut memory, &rates, &Vector3::zeros(), conditions(true, false));
             prop_assert!(seen.iter().zip(most.iter()).all(|(f, most)| f.abs() <= *most), "{seen:?}");
-            observer.give(&mut memory, &Inputs { roll_n: u, pitch_n: -u, yaw_n: u, thrust_n: 5.0 }, effort);
+            observer.record_inputs(&mut memory, &Inputs { roll_n: u, pitch_n: -u, yaw_n: u, thrust_n: 5.0 }, effort);
         }
     }
 }
@@ -132,15 +146,15 @@ proptest! {
 fn what_is_known_is_not_observed() {
     let (observer, vehicle) = (observer(60.0, 0.02), Parameters::PAPER.to_f32());
     let per_moment = vehicle.inertia_kg_m2.map(|inertia| vehicle.mass_kg / inertia);
-    let amplitude = observer.turns(&Vector3::new(0.02, -0.01, 0.005));
+    let amplitude = observer.angular_acceleration_rad_s2(&Vector3::new(0.02, -0.01, 0.005));
     assert!((amplitude - Vector3::new(0.02, -0.01, 0.005).component_mul(&per_moment)).norm() < 1e-5);
     for age_s in [0.0, AGE_S] {
-        let (mut memory, mut rates, mut seen_rates): (Option<Turning>, _, _) =
+        let (mut memory, mut rates, mut seen_rates): (Option<MomentObserverMemory>, _, _) =
             (None, Vector3::zeros(), Vector3::zeros());
         let mut largest = 0.0_f32;
         for k in 0..4_000 {
             let known = amplitude * (10.0 * k as f32 * DT_S).sin();
-            let seen = observer.advance(&mut memory, &seen_rates, &known, [true, false]);
+            let seen = observer.advance(&mut memory, &seen_rates, &known, conditions(true, false));
             largest = largest.max(seen.component_div(&amplitude).abs().max());
             rates += known * DT_S;
             seen_rates += (rates - seen_rates) * if age_s > 0.0 { 1.0 - (-DT_S / age_s).exp() } else { 1.0 };
@@ -149,6 +163,6 @@ fn what_is_known_is_not_observed() {
         assert!(if age_s > 0.0 { largest < 0.02 } else { (0.08..0.12).contains(&largest) }, "{age_s}: {largest}");
     }
     let found = Vector3::new(1.0, 2.0, -3.0);
-    let against = Vector3::from(observer.against(&found)).component_mul(&effectiveness());
+    let against = Vector3::from(observer.compensating_inputs_n(&found)).component_mul(&effectiveness());
     assert!((against + found).norm() < 1e-4, "{against}");
 }

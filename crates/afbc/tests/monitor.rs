@@ -2,8 +2,8 @@
 //! trip.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
-use afbc::monitor::{Bounds, Monitor, MonitorFigures, TRIM_SHARE};
-use afbc::{AdaptiveEstimate, Cascade, Profile, Settings, Trip};
+use afbc::monitor::{Monitor, MonitorBounds, MonitorFigures, TRIM_SHARE};
+use afbc::{AdaptiveEstimate, CascadeMemory, Profile, Settings, Trip};
 use afbc_types::{Axis, Inputs, Parameters, PerAxis};
 use nalgebra::Matrix3;
 use proptest::prelude::*;
@@ -12,11 +12,11 @@ use std::collections::BTreeSet;
 const DT_S: f32 = 0.001;
 const WEIGHT_N: f32 = 0.486 * 9.81;
 
-fn bounds() -> Bounds {
-    Bounds::new(&Profile::Flight.gains(), &Parameters::PAPER.to_f32(), &Profile::Flight.settings())
+fn bounds() -> MonitorBounds {
+    MonitorBounds::new(&Profile::Flight.gains(), &Parameters::PAPER.to_f32(), &Profile::Flight.settings())
 }
 
-fn monitor(bounds: Bounds) -> Monitor {
+fn monitor(bounds: MonitorBounds) -> Monitor {
     Monitor::new(bounds, DT_S).unwrap()
 }
 
@@ -40,9 +40,9 @@ fn look(
     estimates: PerAxis<AdaptiveEstimate>,
     seen: &Seen,
 ) -> Option<Trip> {
-    let mut cascade = Cascade::default();
+    let mut cascade = CascadeMemory::default();
     let PerAxis { roll, pitch, yaw, z, .. } = seen.inputs;
-    cascade.last.asked = Inputs { roll_n: roll, pitch_n: pitch, yaw_n: yaw, thrust_n: z };
+    cascade.last.commanded = Inputs { roll_n: roll, pitch_n: pitch, yaw_n: yaw, thrust_n: z };
     (cascade.estimates, cascade.last.distances) = (estimates, seen.distances);
     monitor.watch(figures, &cascade, seen.saturated)
 }
@@ -127,7 +127,7 @@ fn bounds_of_estimates_are_shares_of_what_carries_the_vehicle() {
     let (gains, vehicle) = (Profile::Flight.gains(), Parameters::PAPER.to_f32());
     for feed_forward in [true, false] {
         let settings = Settings { feed_forward, ..Profile::Flight.settings() };
-        let bounds = Bounds::new(&gains, &vehicle, &settings);
+        let bounds = MonitorBounds::new(&gains, &vehicle, &settings);
         for axis in Axis::ALL {
             let projection = 0.95 * gains[axis].safeguards.theta_max;
             let carries = if matches!(axis, Axis::X | Axis::Y) { 9.81 } else { WEIGHT_N };
@@ -258,14 +258,14 @@ fn every_reason_is_its_own_and_fits_a_status_text() {
 
 #[test]
 fn bounds_out_of_range_are_refused_by_name() {
-    type Set = fn(&mut Bounds, f32);
+    type Set = fn(&mut MonitorBounds, f32);
     let cases: [(afbc_types::Declaration, Set); 6] = [
-        (Bounds::THETA, |b, v| b.theta.yaw = v),
-        (Bounds::DELTA, |b, v| b.delta.x = v),
-        (Bounds::ERROR, |b, v| b.error.roll = v),
-        (Bounds::SAT_SHARE, |b, v| b.saturation_share = v),
-        (Bounds::SWING, |b, v| b.swing_n = v),
-        (Bounds::SWINGS, |b, v| b.swings_hz = v),
+        (MonitorBounds::THETA, |b, v| b.theta.yaw = v),
+        (MonitorBounds::DELTA, |b, v| b.delta.x = v),
+        (MonitorBounds::ERROR, |b, v| b.error.roll = v),
+        (MonitorBounds::SAT_SHARE, |b, v| b.saturation_share = v),
+        (MonitorBounds::SWING, |b, v| b.swing_n = v),
+        (MonitorBounds::SWINGS, |b, v| b.swings_hz = v),
     ];
     for (afbc_types::Declaration { range, .. }, set) in cases {
         let with = |value| {

@@ -3,9 +3,10 @@
 
 use afbc::adaptive::Gains;
 use afbc::fuzzy::Membership;
-use afbc::monitor::Bounds;
+use afbc::monitor::MonitorBounds;
 use afbc::{
-    Adaptive, Backstepping, Controller, Guarded, LAG_S, Limits, Profile, Safeguards, Settings, by_rule, slowness,
+    Adaptive, Backstepping, Controller, Guarded, LAG_S, PositionControlLimits, Profile, Safeguards, Settings, by_rule,
+    slowness,
 };
 use afbc_types::{Axis, Declared, Parameters, PerAxis};
 use nalgebra::Vector3;
@@ -27,7 +28,7 @@ fn the_printed_gains_are_those_of_section_iv() {
     // Nothing that is not in the paper.
     let Settings { limits, tilt_by_thrust, anti_windup, freeze_on_ground, bumpless, feed_forward, .. } =
         Profile::Paper.settings();
-    assert_eq!(limits, Limits::NONE);
+    assert_eq!(limits, PositionControlLimits::NONE);
     assert!(!(tilt_by_thrust || anti_windup || freeze_on_ground || bumpless || feed_forward));
     assert_eq!(Profile::Paper.settings_for(2.0, 0.1), Profile::Paper.settings());
 }
@@ -123,7 +124,7 @@ fn every_profile_is_valid() {
             assert!(Controller::<_, 4>::new(vehicle, settings, law).is_ok());
             let law = Backstepping::new(&vehicle, gains.map(|gains| gains.backstepping)).unwrap();
             assert!(Controller::<_, 4>::new(vehicle, settings, law).is_ok());
-            let bounds = Bounds::new(&gains, &vehicle, &settings);
+            let bounds = MonitorBounds::new(&gains, &vehicle, &settings);
             assert!(Guarded::<4>::new(vehicle, settings, gains, bounds).is_ok(), "{} {lag_s}", profile.name());
         }
     }

@@ -1,7 +1,7 @@
 //! Properties of the reference model.
 
-use afbc::limits::Limits;
-use afbc::reference::{Detours, ReferenceFilter, ReferenceModel};
+use afbc::limits::PositionControlLimits;
+use afbc::reference::{ReferenceFilter, ReferenceMemory, ReferenceModel};
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -10,8 +10,8 @@ const DT_S: f32 = 0.001;
 const SPEED_M_S: f32 = 5.0;
 const CLIMB_M_S: f32 = 3.0;
 
-fn limits() -> Limits {
-    Limits { speed_max_m_s: SPEED_M_S, climb_max_m_s: CLIMB_M_S, ..Limits::NONE }
+fn limits() -> PositionControlLimits {
+    PositionControlLimits { speed_max_m_s: SPEED_M_S, climb_max_m_s: CLIMB_M_S, ..PositionControlLimits::NONE }
 }
 
 fn any_model() -> impl Strategy<Value = ReferenceModel> {
@@ -131,12 +131,12 @@ proptest! {
     fn a_smooth_setpoint_is_tracked_as_it_is(model in any_model(), sines in sines(), away in -2.0_f32..2.0) {
         let reference = ReferenceFilter::new(&model, &limits(), DT_S).unwrap();
         let first = on_sines(&sines, 0.0);
-        let mut detours = reference.start(&on(&first), &first);
+        let mut memory = reference.start(&on(&first), &first);
         for step in 0..4000 {
             let setpoint = on_sines(&sines, f64::from(step) * f64::from(DT_S));
             let mut state = on(&setpoint);
             state.position_m.x += away;
-            let tracked = reference.advance(&mut detours, &state, &setpoint);
+            let tracked = reference.advance(&mut memory, &state, &setpoint);
             let [x, v, a, yaw] = apart(&tracked, &setpoint);
             prop_assert!(x < 1e-4 && v < 1e-4 && a < 2e-3 && yaw < 1e-4, "{x} {v} {a} {yaw} in step {step}");
         }
@@ -152,11 +152,11 @@ proptest! {
         let from = Setpoint::default();
         let by = Vector3::from(by);
         let to = Setpoint { position_m: by, yaw_rad: turn, ..from };
-        let mut detours = reference.start(&on(&from), &from);
-        let mut last = reference.advance(&mut detours, &on(&from), &from);
+        let mut memory = reference.start(&on(&from), &from);
+        let mut last = reference.advance(&mut memory, &on(&from), &from);
         for step in 0..40_000 {
             // The vehicle is on the reference.
-            let next = reference.advance(&mut detours, &on(&last), &to);
+            let next = reference.advance(&mut memory, &on(&last), &to);
             let mean_m_s = last.velocity_m_s + last.acceleration_m_s2 * (0.5 * DT_S);
             let moved = next.position_m - last.position_m - mean_m_s * DT_S;
             prop_assert!(moved.amax() < 1e-5, "jumped by {moved} in step {step}");
@@ -196,10 +196,10 @@ proptest! {
         };
         let jerks = |s: &Setpoint| [s.jerk_m_s3.x, s.jerk_m_s3.y, s.jerk_m_s3.z, 0.0].map(f64::from);
         let dt = f64::from(DT_S);
-        let mut detours = reference.start(&on(&near[0].1), &near[0].0);
+        let mut memory = reference.start(&on(&near[0].1), &near[0].0);
         let mut last: Option<(Setpoint, Setpoint)> = None;
         for (setpoint, vehicle) in &near {
-            let tracked = reference.advance(&mut detours, &on(vehicle), setpoint);
+            let tracked = reference.advance(&mut memory, &on(vehicle), setpoint);
             for i in 0..4 {
                 let (x, v) = (list(&tracked)[i], speeds(&tracked)[i]);
                 let (at, speed) = (list(vehicle)[i], speeds(vehicle)[i]);
@@ -215,8 +215,8 @@ proptest! {
                 let wanted = nearest(on_x(then), list(setpoint)[i] - on_x(setpoint_then), at);
                 prop_assert!((x - wanted).abs() < 1e-5, "{i}: at {x} instead of {wanted}");
                 let jump = speeds(setpoint)[i] - on_v(setpoint_then, jerks(setpoint_then)[i]);
-                // The setpoint's next velocity includes the setpoint's jerk; the detour's velocity does not include the
-                // detour's.
+                // The setpoint's next velocity includes the setpoint's jerk; the offset's velocity does not include the
+                // offset's.
                 let own = 0.5 * dt * dt * jerks(setpoint_then)[i];
                 let wanted = nearest(on_v(then, 0.0) + own, jump, speed);
                 prop_assert!((v - wanted).abs() < 1e-5, "{i}: {v} m/s instead of {wanted}");
@@ -231,16 +231,16 @@ proptest! {
     fn it_accelerates_no_more_than_it_may_or_the_setpoint_does(
         model in any_model(), sines in sines(), by in -20.0_f32..20.0,
     ) {
-        let reference = ReferenceFilter::new(&model, &Limits::NONE, DT_S).unwrap();
+        let reference = ReferenceFilter::new(&model, &PositionControlLimits::NONE, DT_S).unwrap();
         let first = on_sines(&sines, 0.0);
-        let mut detours = reference.start(&on(&first), &first);
+        let mut memory = reference.start(&on(&first), &first);
         let mut last = first;
         for step in 0..6000 {
             let mut setpoint = on_sines(&sines, f64::from(step) * f64::from(DT_S));
             if step > 500 {
                 setpoint.position_m += Vector3::new(by, -by, by);
             }
-            last = reference.advance(&mut detours, &on(&last), &setpoint);
+            last = reference.advance(&mut memory, &on(&last), &setpoint);
             for (own, all) in setpoint.acceleration_m_s2.iter().zip(last.acceleration_m_s2.iter()) {
                 let most = own.abs().max(model.reference_acceleration_m_s2) * 1.0001;
                 prop_assert!(all.abs() <= most, "{all} m/s2 with {own} m/s2 of the setpoint in step {step}");
@@ -257,8 +257,8 @@ proptest! {
         let sign = if back { -1.0 } else { 1.0 };
         let from = Setpoint::default();
         let to = Setpoint { position_m: Vector3::repeat(sign * by), yaw_rad: sign * turn, ..from };
-        let mut detours = reference.start(&on(&from), &from);
-        let mut last = reference.advance(&mut detours, &on(&from), &from);
+        let mut memory = reference.start(&on(&from), &from);
+        let mut last = reference.advance(&mut memory, &on(&from), &from);
         let (a, yaw_a) = (model.reference_acceleration_m_s2, model.reference_turn_rad_s2);
         let coordinate = |w: f32, a: f32, v: f32, d: f32| Documented {
             w: f64::from(w),
@@ -272,7 +272,7 @@ proptest! {
             coordinate(model.reference_yaw_rad_s, yaw_a, model.reference_yaw_rate_rad_s, turn),
         ];
         for step in 0..8000 {
-            last = reference.advance(&mut detours, &on(&last), &to);
+            last = reference.advance(&mut memory, &on(&last), &to);
             let got = [
                 (last.position_m.x - to.position_m.x, last.velocity_m_s.x),
                 (last.position_m.z - to.position_m.z, last.velocity_m_s.z),
@@ -299,11 +299,11 @@ proptest! {
     ) {
         let reference = ReferenceFilter::new(&model, &limits(), DT_S).unwrap();
         let first = on_sines(&sines, begin);
-        let mut detours = reference.start(&on(&first), &first);
-        let _ = reference.advance(&mut detours, &on(&first), &first);
+        let mut memory = reference.start(&on(&first), &first);
+        let _ = reference.advance(&mut memory, &on(&first), &first);
         let after = on_sines(&sines, begin + length);
         let vehicle = on(if stands { &first } else { &after });
-        let tracked = reference.advance(&mut detours, &vehicle, &after);
+        let tracked = reference.advance(&mut memory, &vehicle, &after);
         let away = (tracked.position_m - vehicle.position_m).amax();
         // The expected position is a step ahead: 4.5 mm at the greatest speed.
         prop_assert!(away < 5e-3, "{away} m from the vehicle, {} m from the setpoint", apart(&tracked, &after)[0]);
@@ -317,7 +317,7 @@ proptest! {
         speeds in proptest::collection::vec(-1e3_f32..1e3, 40),
     ) {
         let reference = ReferenceFilter::new(&model, &limits(), DT_S).unwrap();
-        let mut detours: Option<Detours> = None;
+        let mut memory: Option<ReferenceMemory> = None;
         for (&x, &v) in positions.iter().zip(&speeds) {
             let mut setpoint = Setpoint::default();
             (setpoint.position_m, setpoint.velocity_m_s) = (Vector3::repeat(x), Vector3::repeat(v));
@@ -325,8 +325,8 @@ proptest! {
             let (position_m, velocity_m_s) = (Vector3::repeat(v), Vector3::repeat(-v));
             let mut state = State { position_m, velocity_m_s, ..State::default() };
             state.attitude_rad.z = -v;
-            let detours = detours.get_or_insert_with(|| reference.start(&state, &setpoint));
-            let tracked = reference.advance(detours, &state, &setpoint);
+            let memory = memory.get_or_insert_with(|| reference.start(&state, &setpoint));
+            let tracked = reference.advance(memory, &state, &setpoint);
             let sum = tracked.position_m.sum() + tracked.velocity_m_s.sum() + tracked.acceleration_m_s2.sum()
                 + tracked.jerk_m_s3.sum() + tracked.yaw_rad + tracked.yaw_rate_rad_s + tracked.yaw_acceleration_rad_s2;
             prop_assert!(sum.is_finite(), "{tracked:?}");
@@ -339,13 +339,13 @@ proptest! {
 fn a_small_jump_decays_as_the_model_says() {
     let w = 6.0_f64;
     let model = ReferenceModel { reference_xy_rad_s: w as f32, ..ReferenceModel::DEFAULT };
-    let reference = ReferenceFilter::new(&model, &Limits::NONE, DT_S).unwrap();
+    let reference = ReferenceFilter::new(&model, &PositionControlLimits::NONE, DT_S).unwrap();
     let (from, mut to) = (Setpoint::default(), Setpoint::default());
     to.position_m.x = 0.5;
-    let mut detours = reference.start(&on(&from), &from);
-    let mut tracked = reference.advance(&mut detours, &on(&from), &from);
+    let mut memory = reference.start(&on(&from), &from);
+    let mut tracked = reference.advance(&mut memory, &on(&from), &from);
     for step in 0..2000 {
-        tracked = reference.advance(&mut detours, &on(&tracked), &to);
+        tracked = reference.advance(&mut memory, &on(&tracked), &to);
         let t = w * f64::from(step) * f64::from(DT_S);
         let exact = 0.5 * (1.0 - (1.0 + t + 0.5 * t * t) * (-t).exp());
         assert!((f64::from(tracked.position_m.x) - exact).abs() < 3e-3, "{} instead of {exact}", tracked.position_m.x);
@@ -362,19 +362,19 @@ fn each_bandwidth_makes_a_model() {
         ReferenceModel { reference_z_rad_s: 1.0, ..none },
         ReferenceModel { reference_yaw_rad_s: 1.0, ..none },
     ] {
-        assert!(ReferenceFilter::new(&model, &Limits::NONE, DT_S).is_some(), "{model:?}");
+        assert!(ReferenceFilter::new(&model, &PositionControlLimits::NONE, DT_S).is_some(), "{model:?}");
     }
 }
 
 /// Without bandwidths there is no model; a coordinate without a bandwidth is tracked exactly.
 #[test]
 fn no_bandwidth_is_no_model() {
-    assert!(ReferenceFilter::new(&ReferenceModel::DEFAULT, &Limits::NONE, DT_S).is_none());
+    assert!(ReferenceFilter::new(&ReferenceModel::DEFAULT, &PositionControlLimits::NONE, DT_S).is_none());
     let only_yaw = ReferenceModel { reference_yaw_rad_s: 5.0, ..ReferenceModel::DEFAULT };
-    let reference = ReferenceFilter::new(&only_yaw, &Limits::NONE, DT_S).unwrap();
-    let mut detours = reference.start(&State::default(), &Setpoint::default());
+    let reference = ReferenceFilter::new(&only_yaw, &PositionControlLimits::NONE, DT_S).unwrap();
+    let mut memory = reference.start(&State::default(), &Setpoint::default());
     let far = Setpoint { position_m: Vector3::new(1.0, -2.0, 3.0), yaw_rad: 1.0, ..Setpoint::default() };
-    let tracked = reference.advance(&mut detours, &State::default(), &far);
+    let tracked = reference.advance(&mut memory, &State::default(), &far);
     assert_eq!(tracked.position_m, far.position_m);
     assert!(tracked.yaw_rad.abs() < 1e-6, "{}", tracked.yaw_rad);
 }

@@ -1,7 +1,7 @@
 //! Compares the attitude errors by rotation with quaternions and finite differences in double precision.
 
 use afbc::model::RollPitch;
-use afbc::rotation::{Turn, error};
+use afbc::rotation::{AttitudeTracking, error};
 use afbc_types::State;
 use nalgebra::{Matrix3, Rotation3, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -75,7 +75,7 @@ proptest! {
         eta_dot in vector(3.0),
         eta_ddot in vector(10.0),
     ) {
-        let turn = Turn::new(
+        let turn = AttitudeTracking::new(
             &matrix(&quaternion(&now)),
             &roll_pitch(&desired),
             heading(&desired),
@@ -108,7 +108,7 @@ proptest! {
         let angles = body.euler_angles();
         let now = Vector3::new(angles.0, angles.1, angles.2);
         prop_assume!(now.y.abs() < 1.3);
-        let turn = Turn::new(
+        let turn = AttitudeTracking::new(
             &matrix(&quaternion(&now)),
             &roll_pitch(&desired),
             heading(&desired),

@@ -4,25 +4,25 @@
 use crate::common::{U, gains_of_one};
 use afbc::adaptive::Gains;
 use afbc::disturbance::DisturbanceObserver;
-use afbc::fuzzy::{Basis, Firing};
-use afbc::law::Context;
-use afbc::law::Tracking;
+use afbc::fuzzy::{FiringStrengths, FuzzyBasis};
+use afbc::law::StepContext;
+use afbc::law::SubsystemTracking;
 use afbc::model::RollPitch;
-use afbc::{Adaptive, AdaptiveEstimate, Controller, Law, Profile, Safeguards, Settings};
+use afbc::{Adaptive, AdaptiveEstimate, Controller, Profile, Safeguards, Settings, SubsystemLaw};
 use afbc_control::{FlightController, Validated};
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 
 /// Returns a subsystem's tracking with e_2 = `e2` exactly: e_1 = 0, x_2 = -e_2.
-fn tracking(e2: f32) -> Tracking {
-    Tracking { x2: -e2, ..Tracking::default() }
+fn tracking(e2: f32) -> SubsystemTracking {
+    SubsystemTracking { x2: -e2, ..SubsystemTracking::default() }
 }
 
 /// Runs one step of the x subsystem; returns its u.
 fn step(gains: Gains, e2: f32, unallocated: f32, dt_s: f32, estimate: &mut AdaptiveEstimate) -> f32 {
     let law = Adaptive::new(PerAxis::from_fn(|_| gains)).unwrap();
-    let context = Context {
+    let context = StepContext {
         state: &State::default(),
         roll_pitch: RollPitch::new(&State::default()),
         rotor_residual_rad_s: 0.0,
@@ -42,7 +42,7 @@ fn reference(gains: &Gains, e2: f32, unallocated: f32, dt_s: f32, before: &Adapt
         [sigma, kappa, theta_max, delta_max, dead_zone].map(f64::from);
     let [gamma, eta, epsilon, dt] = [gains.gamma, gains.eta, gains.epsilon, dt_s].map(f64::from);
     // e_1 = 0, so its derivative is e_2.
-    let w = Basis::new(gains.membership).unwrap().weights([0.0, e2]).map(f64::from);
+    let w = FuzzyBasis::new(gains.membership).unwrap().weights([0.0, e2]).map(f64::from);
     let towards_limit = f64::from(e2) * f64::from(unallocated) > 0.0;
     let e2 = f64::from(e2);
     let e = if towards_limit { 0.0 } else { e2.signum() * (e2.abs() - dead_zone).max(0.0) };
@@ -128,7 +128,7 @@ proptest! {
     ) {
         let gains = Gains { safeguards: Safeguards::NONE, ..gains };
         let before = AdaptiveEstimate { theta: Matrix3::from_row_slice(&theta), delta };
-        let Firing { first, second, share } = Basis::new(gains.membership).unwrap().fire([0.0, e2]);
+        let FiringStrengths { first, second, share } = FuzzyBasis::new(gains.membership).unwrap().fire([0.0, e2]);
         let s = afbc_control::math::tanh(e2 * (1.0 / gains.epsilon));
         let printed = AdaptiveEstimate {
             theta: before.theta + first * (gains.gamma * e2 * share * dt_s) * second.transpose(),
@@ -259,8 +259,8 @@ fn noise_drives_the_printed_delta_hat_and_not_the_hardened() {
         [500 * SECOND, 500 * SECOND].map(|steps| {
             for _ in 0..steps {
                 let (x1, x2) = (x + 0.02 * noise(), v + 0.04 * noise());
-                let tracking = Tracking { x1, x2, e1: -x1, ..Tracking::default() };
-                let context = Context {
+                let tracking = SubsystemTracking { x1, x2, e1: -x1, ..SubsystemTracking::default() };
+                let context = StepContext {
                     state: &State::default(),
                     roll_pitch: RollPitch::new(&State::default()),
                     rotor_residual_rad_s: 0.0,

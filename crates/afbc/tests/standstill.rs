@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)] // a controller that cannot be built must stop the test
 
 use afbc::reference::ReferenceModel;
-use afbc::standstill::{IN_AIR_S, LEFT_M, LIFT_SHARE, STILL_M_S, STILL_S, Standstill};
+use afbc::standstill::{IN_AIR_S, LEFT_M, LIFT_SHARE, STILL_M_S, STILL_S, StandstillDetector};
 use afbc::{Adaptive, Controller, Profile, Settings};
 use afbc_control::Smoothing;
 use afbc_control::{FlightController, Validated};
@@ -19,11 +19,11 @@ fn moving(velocity_m_s: Vector3<f32>) -> State {
 
 /// Returns whether a vehicle with these values for `steps` steps counts as standing.
 fn stands(thrust_n: f32, velocity_m_s: Vector3<f32>, steps: usize) -> bool {
-    let mut standstill = Standstill::default();
+    let mut standstill = StandstillDetector::default();
     for _ in 0..steps {
         standstill.advance(thrust_n, WEIGHT_N, &moving(velocity_m_s), DT_S);
     }
-    standstill.stands()
+    standstill.is_standing()
 }
 
 proptest! {
@@ -46,17 +46,17 @@ proptest! {
 fn a_light_vehicle_that_hovers_does_not_stand_and_one_that_lifts_off_no_longer() {
     // 60 % of the nominal weight.
     assert!(!stands(0.6 * WEIGHT_N, Vector3::zeros(), 10_000));
-    let mut standstill = Standstill::default();
+    let mut standstill = StandstillDetector::default();
     for _ in 0..1000 {
         standstill.advance(0.0, WEIGHT_N, &State::default(), DT_S);
     }
-    assert!(standstill.stands());
+    assert!(standstill.is_standing());
     let mut rocking = standstill;
     rocking.advance(0.0, WEIGHT_N, &moving(Vector3::new(0.0, -0.49, 0.0)), DT_S);
-    assert!(rocking.stands(), "it rocks");
+    assert!(rocking.is_standing(), "it rocks");
     rocking.advance(0.0, WEIGHT_N, &moving(Vector3::new(0.0, 0.0, -0.51)), DT_S);
     standstill.advance(0.5 * WEIGHT_N, WEIGHT_N, &State::default(), DT_S);
-    assert!(!standstill.stands() && !rocking.stands());
+    assert!(!standstill.is_standing() && !rocking.is_standing());
 }
 
 /// A vehicle stands on the ground with its setpoint below it, until the setpoint is raised.
@@ -115,14 +115,14 @@ fn a_standing_vehicle_is_not_tipped_over() {
 #[test]
 fn a_vehicle_touches_the_ground_until_it_leaves_it() {
     let touches = |state: State, steps| {
-        let mut standstill = Standstill::default();
-        assert!(!standstill.touches(), "a law begins in the air");
+        let mut standstill = StandstillDetector::default();
+        assert!(!standstill.is_touching_ground(), "a law begins in the air");
         standstill.land();
         standstill.advance(WEIGHT_N, WEIGHT_N, &State::default(), DT_S);
         for _ in 0..steps {
             standstill.advance(WEIGHT_N, WEIGHT_N, &state, DT_S);
         }
-        standstill.touches()
+        standstill.is_touching_ground()
     };
     let at = |x, z| State { position_m: Vector3::new(x, 0.0, z), ..State::default() };
     assert!(touches(at(3.0, 0.9 * LEFT_M), 100), "it slid");
@@ -138,7 +138,7 @@ fn a_vehicle_touches_the_ground_until_it_leaves_it() {
 #[test]
 fn a_vehicle_that_has_just_risen_tilts_little() {
     let after = |z_m: f32, climb_m_s: f32, steps: u32| {
-        let mut standstill = Standstill::default();
+        let mut standstill = StandstillDetector::default();
         assert_eq!(standstill.tilt_max_tan(), f32::INFINITY, "a law begins in the air");
         standstill.land();
         standstill.advance(WEIGHT_N, WEIGHT_N, &State::default(), DT_S);

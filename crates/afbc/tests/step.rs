@@ -3,7 +3,7 @@
 
 use crate::common::{check_step, gains, plausible, setpoint, settings, state, step, value};
 use afbc::adaptive::Gains;
-use afbc::{Adaptive, AdaptiveEstimate, Backstepping, Cascade, Controller, Law, Profile, Settings};
+use afbc::{Adaptive, AdaptiveEstimate, Backstepping, CascadeMemory, Controller, Profile, Settings, SubsystemLaw};
 use afbc_control::{Health, Validated};
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
 use core::any::Any;
@@ -24,7 +24,7 @@ fn backstepping(gains: PerAxis<Gains>, settings: Settings) -> Controller<Backste
 }
 
 /// Returns AFBC's estimates, zero for a law without any.
-fn estimates<L: Law>(memory: &Validated<Cascade<L::Estimate>>) -> PerAxis<AdaptiveEstimate> {
+fn estimates<L: SubsystemLaw>(memory: &Validated<CascadeMemory<L::Estimate>>) -> PerAxis<AdaptiveEstimate> {
     let adaptive = |estimate: &dyn Any| estimate.downcast_ref().copied().unwrap_or_default();
     PerAxis::from_fn(|axis| adaptive(&memory.control.estimates[axis]))
 }
@@ -41,7 +41,7 @@ fn check_estimates(estimates: &PerAxis<AdaptiveEstimate>) -> Result<(), TestCase
 }
 
 /// Flies a sequence of random inputs, with the checks of every step and of rejected inputs.
-fn fly_anything<L: Law>(
+fn fly_anything<L: SubsystemLaw>(
     controller: &Controller<L>,
     settings: &Settings,
     inputs: &[(State, Setpoint)],

@@ -1,6 +1,6 @@
 //! Calibration of the accelerometer's offset and scale.
 
-use crate::rest::{Limits, Rest};
+use crate::rest::{RestLimits, RestSamples};
 use crate::side::{Side, Sides};
 use crate::{CalibrationEvent, CalibrationFailure, RawSample};
 use afbc_types::Mounting;
@@ -45,7 +45,7 @@ pub struct AccelerometerCalibration {
     gravity_m_s2: f32,
     /// Time at which the last side was finished \[us\].
     done_us: Option<u64>,
-    rest: Rest,
+    rest: RestSamples,
     /// Side of the present rest, once detected; true if the side is finished, now or before.
     detected: Option<(Option<Side>, bool)>,
     pending: Sides,
@@ -63,7 +63,7 @@ impl AccelerometerCalibration {
             to_body: mounting.r_body_sensor(),
             gravity_m_s2,
             done_us: None,
-            rest: Rest::default(),
+            rest: RestSamples::default(),
             detected: None,
             pending: Sides::ALL,
             read_m_s2: Matrix3x6::zeros(),
@@ -80,7 +80,7 @@ impl AccelerometerCalibration {
             tell(CalibrationEvent::Pending(Sides::ALL));
             sample.at_us
         });
-        let rests = sample.is_finite() && self.rest.add(sample, &Limits::HELD);
+        let rests = sample.is_finite() && self.rest.add(sample, &RestLimits::HELD);
         // Between two sides the vehicle is to be moved, so motion is reported only during a measurement.
         if !rests && matches!(self.detected.take(), Some((Some(_), false))) {
             tell(CalibrationEvent::Moved);

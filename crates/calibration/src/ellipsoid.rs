@@ -96,7 +96,8 @@ impl FieldSums {
         let (sphere, sphere_error) = self.sphere().ok_or(CalibrationFailure::TooFewDirections)?;
         let ellipsoid = self.ellipsoid().filter(|(_, error)| *error < WORTH * sphere_error);
         let (numbers, squared) = ellipsoid.unwrap_or((sphere, sphere_error));
-        let Surface { centre, matrix, strength } = Surface::of(&numbers).ok_or(CalibrationFailure::TooFewDirections)?;
+        let Ellipsoid { centre, matrix, strength } =
+            Ellipsoid::of(&numbers).ok_or(CalibrationFailure::TooFewDirections)?;
         if !self.covers(&centre, &matrix, strength) {
             return Err(CalibrationFailure::TooFewDirections);
         }
@@ -137,7 +138,7 @@ impl FieldSums {
 
     fn ellipsoid(&self) -> Option<(SVector<f64, 9>, f64)> {
         let numbers = self.normal.cholesky()?.solve(&self.right);
-        Surface::of(&numbers)?;
+        Ellipsoid::of(&numbers)?;
         Some((numbers, self.right_squared - self.right.dot(&numbers)))
     }
 
@@ -160,13 +161,13 @@ impl FieldSums {
 }
 
 /// Surface |matrix (x - centre)| = strength, in [`UNIT_UT`], with a matrix of determinant 1.
-struct Surface {
+struct Ellipsoid {
     centre: Vector3<f64>,
     matrix: Matrix3<f64>,
     strength: f64,
 }
 
-impl Surface {
+impl Ellipsoid {
     /// Returns the ellipsoid of these nine numbers, `None` if they describe another surface.
     fn of(numbers: &SVector<f64, 9>) -> Option<Self> {
         let [[u, v, d, e, f, g, h, i, k]] = numbers.data.0;
@@ -178,7 +179,7 @@ impl Surface {
         let mean = libm::cbrt(root.determinant());
         let strength = libm::sqrt(size) / mean;
         // NaN makes this false.
-        (size > 0.0 && mean > 0.0 && strength < 1e3).then_some(Surface { centre, matrix: root / mean, strength })
+        (size > 0.0 && mean > 0.0 && strength < 1e3).then_some(Ellipsoid { centre, matrix: root / mean, strength })
     }
 }
 

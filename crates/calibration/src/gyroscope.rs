@@ -1,6 +1,6 @@
 //! Calibration of the gyroscope's offset.
 
-use crate::rest::{Limits, Rest};
+use crate::rest::{RestLimits, RestSamples};
 use crate::{CalibrationEvent, CalibrationFailure, RawSample};
 use nalgebra::Vector3;
 
@@ -18,7 +18,7 @@ const STEP: u8 = 10;
 #[derive(Clone, Debug, Default)]
 pub struct GyroscopeCalibration {
     began_us: Option<u64>,
-    rest: Rest,
+    rest: RestSamples,
     told: u8,
 }
 
@@ -30,7 +30,7 @@ impl GyroscopeCalibration {
         mut tell: impl FnMut(CalibrationEvent),
     ) -> Option<Result<Vector3<f32>, CalibrationFailure>> {
         let began_us = *self.began_us.get_or_insert(sample.at_us);
-        if !sample.is_finite() || !self.rest.add(sample, &Limits::STANDING) {
+        if !sample.is_finite() || !self.rest.add(sample, &RestLimits::STANDING) {
             tell(CalibrationEvent::Moved);
         }
         if self.rest.elapsed_us() >= MEASURE_US {

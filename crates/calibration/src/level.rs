@@ -1,6 +1,6 @@
 //! Calibration of roll and pitch of the IMU's mounting.
 
-use crate::rest::{Limits, Rest};
+use crate::rest::{RestLimits, RestSamples};
 use crate::{CalibrationEvent, CalibrationFailure, RawSample};
 use afbc_types::{Mounting, SensorCalibration, euler_angles};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
@@ -20,7 +20,7 @@ pub struct LevelCalibration {
     mounting: Mounting,
     errors: SensorCalibration,
     began_us: Option<u64>,
-    rest: Rest,
+    rest: RestSamples,
     told: bool,
 }
 
@@ -28,7 +28,13 @@ impl LevelCalibration {
     /// Creates the calibration for a sensor with this presumed mounting and these errors.
     #[must_use]
     pub fn new(mounting: &Mounting, errors: &SensorCalibration) -> Self {
-        LevelCalibration { mounting: *mounting, errors: *errors, began_us: None, rest: Rest::default(), told: false }
+        LevelCalibration {
+            mounting: *mounting,
+            errors: *errors,
+            began_us: None,
+            rest: RestSamples::default(),
+            told: false,
+        }
     }
 
     /// Takes a sample. Returns roll, pitch and yaw of the mounting \[rad\], or the failure, at the end.
@@ -38,7 +44,7 @@ impl LevelCalibration {
         mut tell: impl FnMut(CalibrationEvent),
     ) -> Option<Result<Vector3<f32>, CalibrationFailure>> {
         let began_us = *self.began_us.get_or_insert(sample.at_us);
-        if !sample.is_finite() || !self.rest.add(sample, &Limits::STANDING) {
+        if !sample.is_finite() || !self.rest.add(sample, &RestLimits::STANDING) {
             tell(CalibrationEvent::Moved);
         }
         if self.rest.elapsed_us() >= MEASURE_US {

@@ -1,7 +1,7 @@
 //! Calibration of the magnetometer's offset and matrix.
 
 use crate::ellipsoid::{FieldFit, FieldSums};
-use crate::rest::{Limits, Rest};
+use crate::rest::{RestLimits, RestSamples};
 use crate::side::{Side, Sides};
 use crate::{CalibrationEvent, CalibrationFailure, RawSample};
 use afbc_types::{Mounting, SensorCalibration};
@@ -33,16 +33,16 @@ pub struct MagnetometerCalibration {
     done_us: Option<u64>,
     read_us: u64,
     last_us: u64,
-    rest: Rest,
+    rest: RestSamples,
     /// True if the present rest was already reported.
     told: bool,
-    turn: Option<Turn>,
+    turn: Option<SideTurn>,
     pending: Sides,
 }
 
 /// Turn on one side.
 #[derive(Clone, Copy, Debug)]
-struct Turn {
+struct SideTurn {
     side: Side,
     began_us: u64,
     /// Net angle \[turns\], and the parts that have a reading, one bit each.
@@ -61,7 +61,7 @@ impl MagnetometerCalibration {
             done_us: None,
             read_us: 0,
             last_us: 0,
-            rest: Rest::default(),
+            rest: RestSamples::default(),
             told: false,
             turn: None,
             pending: Sides::ALL,
@@ -119,7 +119,7 @@ impl MagnetometerCalibration {
             tell(CalibrationEvent::Pending(self.pending));
             return None;
         }
-        if !self.rest.add(sample, &Limits::HELD) {
+        if !self.rest.add(sample, &RestLimits::HELD) {
             self.told = false;
         }
         if self.rest.elapsed_us() >= DETECT_US && !self.told {
@@ -128,7 +128,7 @@ impl MagnetometerCalibration {
                 None => tell(CalibrationEvent::Askew),
                 Some(side) if !self.pending.contains(side) => tell(CalibrationEvent::Repeated(side)),
                 Some(side) => {
-                    self.turn = Some(Turn { side, began_us: at_us, turns: 0.0, parts: 0 });
+                    self.turn = Some(SideTurn { side, began_us: at_us, turns: 0.0, parts: 0 });
                     tell(CalibrationEvent::Detected(side));
                     tell(CalibrationEvent::Rotate);
                 }
@@ -138,7 +138,7 @@ impl MagnetometerCalibration {
     }
 }
 
-impl Turn {
+impl SideTurn {
     /// Takes the first reading of each part of the turn.
     fn take(&mut self, field_ut: &Vector3<f32>, sums: &mut FieldSums) {
         let share = self.turns - libm::floorf(self.turns);

@@ -5,22 +5,22 @@ use nalgebra::Vector3;
 
 /// Largest difference between samples at rest, per axis.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Limits {
+pub(crate) struct RestLimits {
     pub(crate) rates_rad_s: f32,
     pub(crate) specific_force_m_s2: f32,
 }
 
-impl Limits {
+impl RestLimits {
     /// Limits on the ground. Means over 20 ms of an MPU-6000, the noisiest sensor simulated here, differ by 0.005 rad/s
     /// and 0.15 m/s2 in thousands of samples.
-    pub(crate) const STANDING: Self = Limits { rates_rad_s: 0.03, specific_force_m_s2: 0.5 };
+    pub(crate) const STANDING: Self = RestLimits { rates_rad_s: 0.03, specific_force_m_s2: 0.5 };
     /// Limits when held by hand.
-    pub(crate) const HELD: Self = Limits { rates_rad_s: 0.3, specific_force_m_s2: 1.5 };
+    pub(crate) const HELD: Self = RestLimits { rates_rad_s: 0.3, specific_force_m_s2: 1.5 };
 }
 
 /// Sums of the samples since the vehicle came to rest.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Rest {
+pub(crate) struct RestSamples {
     since_us: u64,
     now_us: u64,
     samples: f32,
@@ -29,9 +29,9 @@ pub(crate) struct Rest {
     force: [Vector3<f32>; 3],
 }
 
-impl Rest {
+impl RestSamples {
     /// Takes a sample. Returns false if the vehicle has moved; the rest then starts again with this sample.
-    pub(crate) fn add(&mut self, sample: &RawSample, limits: &Limits) -> bool {
+    pub(crate) fn add(&mut self, sample: &RawSample, limits: &RestLimits) -> bool {
         let mut with = *self;
         with.now_us = sample.at_us;
         with.samples += 1.0;
@@ -44,7 +44,7 @@ impl Rest {
         // The first sample starts the rest and shows no motion.
         let moved = self.samples > 0.0;
         let (rates, force) = ([sample.rates_rad_s; 3], [sample.specific_force_m_s2; 3]);
-        *self = Rest { since_us: sample.at_us, now_us: sample.at_us, samples: 1.0, rates, force };
+        *self = RestSamples { since_us: sample.at_us, now_us: sample.at_us, samples: 1.0, rates, force };
         !moved
     }
 

@@ -7,13 +7,13 @@ use afbc_calibration::{
     AccelerometerCalibration, AccelerometerErrors, CalibrationEvent, CalibrationFailure, GyroscopeCalibration,
     LevelCalibration, RawSample, Side, Sides,
 };
-use afbc_plant::instruments::{Accelerometer as Accel, Imu};
+use afbc_plant::instruments::{AccelerometerModel as Accel, ImuModel};
 use afbc_types::{Mounting, SensorCalibration};
 use common::{GRAVITY, Hands, keep};
 use nalgebra::{Rotation3, Vector3};
 use proptest::prelude::*;
 
-const PRESETS: [Imu; 3] = [Imu::ICM_42688_P, Imu::BMI270, Imu::MPU_6000];
+const PRESETS: [ImuModel; 3] = [ImuModel::ICM_42688_P, ImuModel::BMI270, ImuModel::MPU_6000];
 
 fn gyroscope(
     hands: &mut Hands,
@@ -71,7 +71,7 @@ proptest! {
         // A board mounted in quarter turns.
         let attitude_rad = Vector3::new(0.0, 0.0, f64::from(turned) * std::f64::consts::FRAC_PI_2);
         let mounting = Mounting { attitude_rad, position_m: Vector3::zeros() };
-        let mut hands = Hands::with_imu(Imu { mounting, ..PRESETS[preset] }, seed);
+        let mut hands = Hands::with_imu(ImuModel { mounting, ..PRESETS[preset] }, seed);
         hands.tremor_rad = 0.004;
         let (found, told) = six_sides(&mut hands, &mounting.to_f32(), &sides, |n| [askew[2 * n], askew[2 * n + 1]]);
         let errors = found.unwrap().unwrap();
@@ -106,7 +106,7 @@ proptest! {
         askew in prop::array::uniform12(-0.25..0.25),
     ) {
         let (offset, scale) = (Vector3::from(offset), Vector3::from(scale));
-        let mut hands = Hands::with_imu(Imu::DEFAULT, 1);
+        let mut hands = Hands::with_imu(ImuModel::DEFAULT, 1);
         let (mut accelerometer, mut found) = (AccelerometerCalibration::new(&Mounting::PLAIN, GRAVITY as f32), None);
         for (number, side) in Side::ALL.into_iter().enumerate() {
             hands.put(side, [askew[2 * number], askew[2 * number + 1]]);
@@ -132,7 +132,7 @@ proptest! {
         let truth = Rotation3::from_euler_angles(off[0], off[1], 0.0) * thought;
         let angles = |it: &Rotation3<f64>| Vector3::from(<[f64; 3]>::from(it.euler_angles()));
         let mounting = |it| Mounting { attitude_rad: angles(it), position_m: Vector3::zeros() };
-        let mut hands = Hands::with_imu(Imu { mounting: mounting(&truth), ..Imu::DEFAULT }, seed);
+        let mut hands = Hands::with_imu(ImuModel { mounting: mounting(&truth), ..ImuModel::DEFAULT }, seed);
         let mut level = LevelCalibration::new(&mounting(&thought).to_f32(), &SensorCalibration::DEFAULT);
         let found = (0..120).find_map(|_| level.step(&hands.sample(), |_| ())).unwrap().unwrap();
         let found = Rotation3::from_euler_angles(found.x, found.y, found.z).cast::<f64>();
@@ -170,7 +170,7 @@ proptest! {
 /// If the vehicle is moved, the measurement starts again; without rest it fails after 20 s.
 #[test]
 fn a_moving_gyroscope_is_not_calibrated() {
-    let mut hands = Hands::with_imu(Imu::ICM_42688_P, 5);
+    let mut hands = Hands::with_imu(ImuModel::ICM_42688_P, 5);
     hands.tremor_rad = 0.01;
     let (found, told) = gyroscope(&mut hands, 1100);
     assert_eq!(found, Some(Err(CalibrationFailure::Moving)));
@@ -193,7 +193,7 @@ fn a_moving_gyroscope_is_not_calibrated() {
 /// At rest, the gyroscope calibration reports each tenth of its time once, and the level calibration the half.
 #[test]
 fn progress_is_told_at_rest() {
-    let mut hands = Hands::with_imu(Imu::DEFAULT, 5);
+    let mut hands = Hands::with_imu(ImuModel::DEFAULT, 5);
     let tenths: Vec<_> = (1..10).map(|tenth| CalibrationEvent::Progress(10 * tenth)).collect();
     assert_eq!(gyroscope(&mut hands, 160).1, tenths);
     let (mut level, mut told) = (LevelCalibration::new(&Mounting::PLAIN, &SensorCalibration::DEFAULT), Vec::new());
@@ -215,7 +215,7 @@ fn progress_is_told_at_rest() {
 /// before.
 #[test]
 fn a_moving_vehicle_has_no_level() {
-    let mut hands = Hands::with_imu(Imu::ICM_42688_P, 5);
+    let mut hands = Hands::with_imu(ImuModel::ICM_42688_P, 5);
     hands.tremor_rad = 0.05;
     let (mut level, mut told) = (LevelCalibration::new(&Mounting::PLAIN, &SensorCalibration::DEFAULT), Vec::new());
     let began_us = hands.sample().at_us;
@@ -231,7 +231,7 @@ fn a_moving_vehicle_has_no_level() {
 
     // The level calibration skips a NaN sample and reports a motion. Without a NaN sample it reports none.
     for broken in [false, true] {
-        let mut hands = Hands::with_imu(Imu::DEFAULT, 5);
+        let mut hands = Hands::with_imu(ImuModel::DEFAULT, 5);
         // The first sample is a mean of fewer readings, and differs.
         hands.sample();
         let (mut level, mut told) = (LevelCalibration::new(&Mounting::PLAIN, &SensorCalibration::DEFAULT), Vec::new());
@@ -249,7 +249,7 @@ fn a_moving_vehicle_has_no_level() {
 
 #[test]
 fn a_gyroscope_with_too_large_an_offset_is_broken() {
-    let mut hands = Hands::with_imu(Imu::DEFAULT, 5);
+    let mut hands = Hands::with_imu(ImuModel::DEFAULT, 5);
     hands.spin_rad_s = 0.9;
     assert_eq!(gyroscope(&mut hands, 160).0, Some(Err(CalibrationFailure::TooLarge)));
 }
@@ -257,7 +257,7 @@ fn a_gyroscope_with_too_large_an_offset_is_broken() {
 #[test]
 fn a_tilted_vehicle_is_not_level() {
     for (tilt_rad, fails) in [(0.25_f64, false), (0.28, true), (3.0, true)] {
-        let mut hands = Hands::with_imu(Imu::DEFAULT, 5);
+        let mut hands = Hands::with_imu(ImuModel::DEFAULT, 5);
         hands.put(Side::Down, [tilt_rad, 0.0]);
         let mut level = LevelCalibration::new(&Mounting::PLAIN, &SensorCalibration::DEFAULT);
         let found = (0..120).find_map(|_| level.step(&hands.sample(), |_| ())).unwrap();
@@ -269,7 +269,7 @@ fn a_tilted_vehicle_is_not_level() {
 #[test]
 fn level_knows_the_accelerometers_errors() {
     let accel = Accel { bias_m_s2: 0.5, ..Accel::DEFAULT };
-    let mut hands = Hands::with_imu(Imu { accel, ..Imu::DEFAULT }, 7);
+    let mut hands = Hands::with_imu(ImuModel { accel, ..ImuModel::DEFAULT }, 7);
     let accel_offset_m_s2 = hands.instruments.imu_bias().unwrap().specific_force_m_s2.cast();
     let tilt = |errors: &SensorCalibration, hands: &mut Hands| {
         let mut level = LevelCalibration::new(&Mounting::PLAIN, errors);
@@ -283,7 +283,7 @@ fn level_knows_the_accelerometers_errors() {
 /// Reports a repeated side, a vehicle between sides, a vehicle moved during a measurement, and a timeout.
 #[test]
 fn what_an_operator_does_wrong_is_told() {
-    let mut hands = Hands::with_imu(Imu::ICM_42688_P, 3);
+    let mut hands = Hands::with_imu(ImuModel::ICM_42688_P, 3);
     let at = |_| [0.0; 2];
     let (found, told) = six_sides(&mut hands, &Mounting::PLAIN, &[Side::Left, Side::Down, Side::Left], at);
     assert_eq!((found, told.last()), (None, Some(&CalibrationEvent::Repeated(Side::Left))));
@@ -312,7 +312,7 @@ fn what_an_operator_does_wrong_is_told() {
 #[test]
 fn a_board_between_the_axes_is_refused() {
     let mounting = Mounting { attitude_rad: Vector3::new(0.0, 0.0, 0.785), position_m: Vector3::zeros() };
-    let mut hands = Hands::with_imu(Imu { mounting, ..Imu::ICM_42688_P }, 3);
+    let mut hands = Hands::with_imu(ImuModel { mounting, ..ImuModel::ICM_42688_P }, 3);
     let (found, _) = six_sides(&mut hands, &mounting.to_f32(), &Side::ALL, |_| [0.0; 2]);
     assert_eq!(found, Some(Err(CalibrationFailure::TooFewDirections)));
 }
@@ -321,7 +321,7 @@ fn a_board_between_the_axes_is_refused() {
 fn a_broken_accelerometer_is_refused() {
     let accel = Accel { bias_m_s2: 2.0, ..Accel::DEFAULT };
     let refused = (0..20).filter(|seed| {
-        let mut hands = Hands::with_imu(Imu { accel, ..Imu::DEFAULT }, *seed);
+        let mut hands = Hands::with_imu(ImuModel { accel, ..ImuModel::DEFAULT }, *seed);
         let bias = hands.instruments.imu_bias().unwrap().specific_force_m_s2.amax();
         let (found, _) = six_sides(&mut hands, &Mounting::PLAIN, &Side::ALL, |_| [0.0; 2]);
         assert!(bias < 2.0 || !matches!(found, Some(Ok(_))), "{bias}: {found:?}");

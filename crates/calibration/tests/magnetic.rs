@@ -7,14 +7,14 @@ use afbc_calibration::{
     CalibrationEvent, CalibrationFailure, FieldFit, FieldSums, MagnetometerCalibration, RawSample, Side,
 };
 use afbc_plant::InstrumentSuite;
-use afbc_plant::instruments::{Imu, Magnetometer as Part};
+use afbc_plant::instruments::{ImuModel, MagnetometerModel as Part};
 use afbc_types::{Mounting, SensorCalibration};
 use common::{Hands, keep};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
 
 fn hands(part: Part, seed: u64) -> Hands {
-    let imu = Some(Imu::MPU_6000);
+    let imu = Some(ImuModel::MPU_6000);
     Hands::new(&InstrumentSuite { imu, magnetometer: Some(part), ..InstrumentSuite::default() }, seed)
 }
 

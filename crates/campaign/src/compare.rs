@@ -7,9 +7,9 @@ use afbc_files::read::words::cure;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::{Contender, ControllerKind, MONITORED};
 use afbc_sim::flight::Lost;
-use afbc_sim::flown::Flown;
+use afbc_sim::flown::ScenarioFlight;
 use afbc_sim::metrics::Metrics;
-use afbc_sim::run::{Run, Tripped};
+use afbc_sim::run::{FlightResult, MonitorTrip};
 use afbc_types::OutOfRange;
 use rayon::prelude::*;
 
@@ -150,7 +150,7 @@ pub struct Comparison {
 #[derive(Clone, Debug)]
 pub struct Entry {
     /// The flight with the scenario's own seed, including its log.
-    pub first: Flown,
+    pub first: ScenarioFlight,
     /// Results of all flights, beginning with the first.
     pub flights: Vec<Outcome>,
 }
@@ -163,7 +163,7 @@ pub struct Outcome {
     /// Time and reason of the vehicle's loss, if any.
     pub lost: Option<Lost>,
     /// Time and reason of the monitor's switch to the fallback law, if any.
-    pub tripped: Option<Tripped>,
+    pub tripped: Option<MonitorTrip>,
     /// Errors and smoothness up to the end of the flight or the loss.
     pub metrics: Metrics,
 }
@@ -213,7 +213,7 @@ pub const MEASURES: [Measure; 6] = [
 
 impl Outcome {
     /// Returns the result of a flight of `scenario`.
-    pub(crate) fn of(scenario: &Scenario, run: &Run) -> Self {
+    pub(crate) fn of(scenario: &Scenario, run: &FlightResult) -> Self {
         Outcome { seed: scenario.seed, lost: run.lost, tripped: run.tripped, metrics: run.metrics }
     }
 }
@@ -313,17 +313,18 @@ pub fn fly_seeds(
     let outcome = |scenario: &Scenario, contender: &Contender, number: u64| {
         let scenario = Scenario { seed: scenario.seed + number, ..scenario.clone() };
         // Only the first flight is plotted. Logs of the others would only take memory.
-        let run = Run::fly(&scenario, contender, if number == 0 { log_every } else { u64::MAX })?;
+        let run = FlightResult::fly(&scenario, contender, if number == 0 { log_every } else { u64::MAX })?;
         progress();
         Ok((Outcome::of(&scenario, &run), (number == 0).then_some(run)))
     };
     let entry = |scenario: &Scenario, contender: &Contender, seeds: u64| {
-        let flown: Vec<(Outcome, Option<Run>)> = (0..seeds.max(1))
+        let flown: Vec<(Outcome, Option<FlightResult>)> = (0..seeds.max(1))
             .into_par_iter()
             .map(|number| outcome(scenario, contender, number))
             .collect::<Result<_, _>>()?;
         let flights = flown.iter().map(|(outcome, _)| *outcome).collect();
-        let first = flown.into_iter().find_map(|(_, run)| Some(Flown { scenario: scenario.clone(), run: run? }));
+        let first =
+            flown.into_iter().find_map(|(_, run)| Some(ScenarioFlight { scenario: scenario.clone(), run: run? }));
         Ok(first.map(|first| Entry { first, flights }))
     };
     let compare = |(scenario, seeds): (Scenario, u64)| {

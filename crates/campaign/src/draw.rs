@@ -2,7 +2,7 @@
 
 use crate::plan::{Campaign, NamedTrajectory, Spread};
 use crate::quantity::{self, QUANTITIES, Quantity};
-use afbc_plant::noise::{Noise, Stream};
+use afbc_plant::noise::{Noise, NoiseStream};
 use afbc_scenario::Scenario;
 use afbc_types::OutOfRange;
 
@@ -32,7 +32,7 @@ impl Campaign {
     /// Draws flight `flight`. The result depends only on the flight's index and the campaign's seed.
     pub fn draw(&self, flight: u64) -> Draw {
         let seed = mix(mix(self.seed).wrapping_add(flight)) >> 11;
-        let mut noise = Noise::new(seed, Stream::Scenario);
+        let mut noise = Noise::new(seed, NoiseStream::Scenario);
         let shares: Vec<f64> = QUANTITIES.iter().map(|_| noise.uniform()).collect();
         let value = |spread: &Spread| {
             let share = shares.get(spread.quantity).copied().unwrap_or_default();

@@ -1,7 +1,9 @@
 //! Quantities that a campaign can draw.
 
-use afbc_plant::instruments::{Accelerometer, Barometer, Gyroscope, Imu, Magnetometer, Preset};
-use afbc_plant::{Deviations, Dropouts, Environment, InstrumentSuite, Payload, RotorFault, Turbulence};
+use afbc_plant::instruments::{
+    AccelerometerModel, BarometerModel, GyroscopeModel, ImuModel, MagnetometerModel, Preset,
+};
+use afbc_plant::{Deviations, Environment, InstrumentSuite, MeasurementDropouts, Payload, RotorFault, Turbulence};
 use afbc_scenario::Scenario;
 use afbc_types::{OutOfRange, Parameters, Range};
 use core::f64::consts::TAU;
@@ -154,7 +156,7 @@ pub static QUANTITIES: [Quantity; 35] = [
     quantity("sensor_delay_s", 0.0, 0.5, "delay from motion to measurement", |f, x| f.scenario.sensing.delay_s = x),
     quantity("dropout_rate_hz", 0.0, 1000.0, "rate of measurement dropouts", |f, rate_hz| {
         let dropouts = &mut f.scenario.sensing.dropouts;
-        *dropouts = Some(Dropouts { rate_hz, ..dropouts.unwrap_or_default() });
+        *dropouts = Some(MeasurementDropouts { rate_hz, ..dropouts.unwrap_or_default() });
     }),
     needing(
         "dropout_rate_hz",
@@ -178,11 +180,11 @@ pub static QUANTITIES: [Quantity; 35] = [
         f.scenario.initial.position_m.z += x
     }),
     whole(quantity("imu_part", 1.0, 3.0, "inertial sensor: 1 ICM-42688-P, 2 BMI270, 3 MPU-6000", |f, x| {
-        let chosen = part(&Imu::PRESETS, x);
+        let chosen = part(&ImuModel::PRESETS, x);
         f.scenario.instruments.imu.iter_mut().zip(chosen).for_each(|(imu, chosen)| {
             // Vibration belongs to the vehicle, whichever sensor it has.
-            let gyro = Gyroscope { vibration_rad_s: imu.gyro.vibration_rad_s, ..chosen.gyro };
-            let accel = Accelerometer { vibration_m_s2: imu.accel.vibration_m_s2, ..chosen.accel };
+            let gyro = GyroscopeModel { vibration_rad_s: imu.gyro.vibration_rad_s, ..chosen.gyro };
+            let accel = AccelerometerModel { vibration_m_s2: imu.accel.vibration_m_s2, ..chosen.accel };
             (imu.gyro, imu.accel) = (gyro, accel);
         });
     })),
@@ -193,11 +195,11 @@ pub static QUANTITIES: [Quantity; 35] = [
         });
     }),
     whole(quantity("barometer_part", 1.0, 2.0, "barometer: 1 DPS310, 2 BMP388", |f, x| {
-        let chosen = part(&Barometer::PRESETS, x);
+        let chosen = part(&BarometerModel::PRESETS, x);
         f.scenario.instruments.barometer.iter_mut().zip(chosen).for_each(|(old, chosen)| *old = chosen);
     })),
     whole(quantity("magnetometer_part", 1.0, 2.0, "magnetometer: 1 IST8310, 2 QMC5883L", |f, x| {
-        let chosen = part(&Magnetometer::PRESETS, x);
+        let chosen = part(&MagnetometerModel::PRESETS, x);
         f.scenario.instruments.magnetometer.iter_mut().zip(chosen).for_each(|(old, chosen)| *old = chosen);
     })),
     quantity("tracker_delay_s", 0.0, 1.0, "mean delay of the tracker", |f, x| {

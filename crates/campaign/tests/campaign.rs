@@ -4,7 +4,7 @@
 
 use afbc::Profile;
 use afbc_campaign::{self as campaign, Campaign, CampaignFolder, Manifest, Row, Shard};
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -225,7 +225,7 @@ fn a_flight_flown_again_gives_the_figures_of_its_row() {
     for flight in 0..30 {
         let scenario = campaign.flight(flight).unwrap();
         for (row, contender) in campaign.rows(flight).unwrap().iter().zip(&scenario.contenders) {
-            let Run { metrics, lost: end, .. } = Run::fly(&scenario, contender, 10).unwrap();
+            let FlightResult { metrics, lost: end, .. } = FlightResult::fly(&scenario, contender, 10).unwrap();
             let number = |name| manifest.number(row, name);
             assert_eq!(row.contender, contender.name);
             assert_eq!(row.lost_reason.as_deref(), end.map(|lost| lost.reason));

@@ -5,7 +5,7 @@ use afbc::Profile;
 use afbc_campaign::Versus;
 use afbc_campaign::compare::{self, Comparison, DISTANCE, MEASURES, SEEDS, usual_seeds};
 use afbc_campaign::statistics::{Median, SignedRank};
-use afbc_plant::{Deviations, Dropouts, RotorFault, Sensing};
+use afbc_plant::{Deviations, MeasurementDropouts, RotorFault, Sensing};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::{BUILT_IN, Scenario};
 
@@ -28,7 +28,7 @@ fn a_seed_is_said_to_matter_where_it_does() {
     let still = Scenario { duration_s: 6.0, ..named("hover") };
     let sensing = |sensing: Sensing| Scenario { sensing, ..still.clone() };
     let some = Deviations { position_m: 0.01, ..Deviations::DEFAULT };
-    let lossy = Dropouts { rate_hz: 2.0, ..Dropouts::default() };
+    let lossy = MeasurementDropouts { rate_hz: 2.0, ..MeasurementDropouts::default() };
     let one_by_one = [
         sensing(Sensing { noise: some, ..Sensing::default() }),
         sensing(Sensing { bias: some, ..Sensing::default() }),

@@ -7,10 +7,10 @@
 use afbc::Profile;
 use afbc_campaign::{self as campaign, Campaign, Manifest, NamedTrajectory, Shard, Spread};
 use afbc_files::read::words;
-use afbc_plant::instruments::{Accelerometer, Gyroscope, Imu};
+use afbc_plant::instruments::{AccelerometerModel, GyroscopeModel, ImuModel};
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::{Contender, ControllerKind, Law};
-use afbc_types::{Axis, Declaration, Declared, Mounting, Parameters, Value};
+use afbc_types::{Axis, Declaration, Declared, DeclaredValue, Mounting, Parameters};
 use afbc_vehicles::Vehicle;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -243,7 +243,7 @@ fn each_key_counts<'t>(texts: impl IntoIterator<Item = &'t str>, read: Read) {
 /// Returns the declared parameters of a group as lines of a file, with their values.
 fn lines(parameters: &impl Declared, group: &str) -> String {
     let mut lines = String::new();
-    let Ok(()) = parameters.visit(&mut |declaration: &Declaration, value: Value<'_>| {
+    let Ok(()) = parameters.visit(&mut |declaration: &Declaration, value: DeclaredValue<'_>| {
         if declaration.group == group {
             writeln!(lines, "{} = {}", declaration.range.name, words::value(&value)).unwrap();
         }
@@ -328,11 +328,11 @@ fn every_key_of_a_vehicle_file_counts() {
     write!(all, "[gains.flight.cascade]\n{cascade}").unwrap();
     // With a named part, the estimator's settings follow from the part unless the file states them.
     let part = bare.replace("[imu]\n", "[imu]\npart = \"bmi270\"\n");
-    let imu = Imu::PRESETS[0].settings;
+    let imu = ImuModel::PRESETS[0].settings;
     // Large enough to stand out from the other errors, and from the least accepted value.
-    let gyro = Gyroscope { vibration_rad_s: 0.02, bias_rad_s: 0.1, ..imu.gyro };
-    let accel = Accelerometer { vibration_m_s2: 0.5, lsb_m_s2: 0.5, ..imu.accel };
-    let imu = Imu { gyro, accel, ..imu };
+    let gyro = GyroscopeModel { vibration_rad_s: 0.02, bias_rad_s: 0.1, ..imu.gyro };
+    let accel = AccelerometerModel { vibration_m_s2: 0.5, lsb_m_s2: 0.5, ..imu.accel };
+    let imu = ImuModel { gyro, accel, ..imu };
     let mut figures = bare.replace("[imu]\n", &format!("[imu]\n{}", lines_but(&["lever_m"], &imu, "")));
     write!(figures, "[imu.gyro]\n{}[imu.accel]\n{}", lines(&imu, "gyro"), lines(&imu, "accel")).unwrap();
     let texts = afbc_vehicles::BUILT_IN.iter().map(|known| known.text);

@@ -4,7 +4,7 @@
 
 use afbc::Profile;
 use afbc_campaign::rough::{self, CLASSES, FlownRough, Judgement, MIXTURE, Rough, RoughFlight, Venue};
-use afbc_plant::instruments::{Failure, Imu};
+use afbc_plant::instruments::{FailureKind, ImuModel};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_sim::flight::Lost;
 use afbc_vehicles::{BUILT_IN, Vehicle};
@@ -45,7 +45,7 @@ fn no_vehicle_is_told_what_is_drawn() {
     for flight in rough(1..5, 1).draw(&law()).unwrap() {
         let RoughFlight { class, place, scenario, .. } = &flight;
         let told = scenario.told();
-        let mut stated = Imu::ICM_42688_P;
+        let mut stated = ImuModel::ICM_42688_P;
         (stated.gyro.vibration_rad_s, stated.accel.vibration_m_s2) = (0.02, 1.0);
         assert_eq!(told.imu, Some(stated), "{class}");
         let of_calm = || nothing(&flight.vehicle, *place).scenario.estimation(0.001);
@@ -132,12 +132,12 @@ fn size(flight: &RoughFlight) -> f64 {
         "tracker-late" => tracker().delay_s,
         "tracker-stamps" => tracker().stamp_s.abs(),
         _ => match faults[0].failure {
-            Failure::ImuClipped { specific_force_m_s2, .. } => specific_force_m_s2,
-            Failure::ImuBiased { rates_bias_rad_s, .. } => rates_bias_rad_s.norm(),
-            Failure::MagnetometerDisturbed { field_ut } => field_ut.norm(),
-            Failure::GnssJumped { by_m } => by_m.norm(),
-            Failure::GnssMultipath { deviation_m, .. } => deviation_m,
-            Failure::TrackerJumped { by_m, yaw_rad } => by_m.norm().max(yaw_rad.abs()),
+            FailureKind::ImuClipped { specific_force_m_s2, .. } => specific_force_m_s2,
+            FailureKind::ImuBiased { rates_bias_rad_s, .. } => rates_bias_rad_s.norm(),
+            FailureKind::MagnetometerDisturbed { field_ut } => field_ut.norm(),
+            FailureKind::GnssJumped { by_m } => by_m.norm(),
+            FailureKind::GnssMultipath { deviation_m, .. } => deviation_m,
+            FailureKind::TrackerJumped { by_m, yaw_rad } => by_m.norm().max(yaw_rad.abs()),
             other => panic!("{other:?}"),
         },
     }

@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 use afbc_campaign::{self as campaign, Campaign, QUANTITIES};
-use afbc_scenario::Told;
+use afbc_scenario::AssumedInstruments;
 use std::path::Path;
 
 /// Returns a campaign that draws every quantity of the instruments.
@@ -33,7 +33,7 @@ fn what_is_told_does_not_depend_on_what_is_drawn() {
     for flight in 0..200 {
         let flight = campaign.flight(flight).unwrap();
         let (told, there) = (flight.told(), flight.instruments);
-        assert_eq!(flight.told, Told::Suite(Box::new(stated)));
+        assert_eq!(flight.told, AssumedInstruments::Suite(Box::new(stated)));
         assert_eq!(told.imu, stated.imu);
         assert_eq!(told.tracker, stated.tracker.filter(|_| there.tracker.is_some()));
         assert_eq!(told.gnss, stated.gnss.filter(|_| there.gnss.is_some()));
@@ -45,7 +45,7 @@ fn what_is_told_does_not_depend_on_what_is_drawn() {
     // A table `told` takes precedence over the instruments.
     let own = all("told = { imu = \"bmi270\" }\n");
     let told = own.flight(3).unwrap().told();
-    assert_eq!(told.imu, Some(afbc_plant::instruments::Imu::BMI270));
+    assert_eq!(told.imu, Some(afbc_plant::instruments::ImuModel::BMI270));
 }
 
 /// With `told = "drawn"`, the estimator's settings follow from the drawn instruments of the flight. The draws are the

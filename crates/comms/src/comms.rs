@@ -22,14 +22,14 @@ use crate::services::unanswered::Unanswered;
 use crate::setup::Setup;
 use crate::transferring::{Outcome, Transferring};
 use crate::transfers::Transfers;
-use afbc::monitor::Norm;
+use afbc::monitor::EstimateNorms;
 use afbc_calibration::RawSample;
 use afbc_flight_core::{Tracker, rate};
-use afbc_guidance::fence::Braking;
-use afbc_guidance::{BatteryReading, FenceView, Limits};
+use afbc_guidance::fence::BrakingLimits;
+use afbc_guidance::{BatteryReading, FenceStatus, MotionLimits};
 use afbc_mavlink::{
-    Address, ChannelsOverride, Counters, Decoder, Downlink, InertialSample, MavSeverity, MissionItem, Reboot,
-    SIGNED_FRAME_MAX, Sender, SetupSigning, Uplink,
+    Address, ChannelsOverride, Counters, Decoder, Downlink, Encoder, InertialSample, MavSeverity, MissionItem, Reboot,
+    SIGNED_FRAME_MAX, SetupSigning, Uplink,
 };
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{Configuration, EscTelemetry};
@@ -68,7 +68,7 @@ const ROTORS: u64 = 10;
 
 /// Receives and sends the vehicle's MAVLink messages.
 pub struct Comms {
-    sender: Sender,
+    sender: Encoder,
     signing: Signing,
     /// Counts of all decoders together.
     frames: Counters,
@@ -81,7 +81,7 @@ pub struct Comms {
     pub(crate) missions: Missions,
     /// State of the geofence. `braking` has the limits with which stopping paths are computed.
     fence: FenceWatch,
-    pub(crate) braking: Braking,
+    pub(crate) braking: BrakingLimits,
     /// Radius and height of the cylindrical geofence around home \[m\]; 0 for none.
     pub(crate) cylinder_m: [f32; 2],
     /// Response curves of a station's joystick, and whether a joystick is accepted.
@@ -89,7 +89,7 @@ pub struct Comms {
     pub(crate) takes_joystick: bool,
     /// Channels of RC_CHANNELS_OVERRIDE, until radio control takes them.
     pub(crate) overrides: Option<ChannelsOverride>,
-    fence_given: FenceView,
+    fence_given: FenceStatus,
     /// Nearest safe place for a return \[m\], the one that the guidance knows, and the time of the last search \[us\].
     safe_m: Option<Vector2<f32>>,
     safe_given_m: Option<Vector2<f32>>,
@@ -129,7 +129,7 @@ pub struct Comms {
     /// True if a state has arrived since the last rotor command.
     state_is_news: bool,
     failsafes: Failsafes,
-    norms: PerAxis<Norm>,
+    norms: PerAxis<EstimateNorms>,
     fallback: Option<&'static str>,
     rate: rate::RateReport,
     /// Number of bytes that may still be sent after this tick.
@@ -155,7 +155,7 @@ impl Comms {
     pub fn with(setup: Setup) -> Self {
         let me = Address { system: setup.system, component: AUTOPILOT };
         Comms {
-            sender: Sender::new(me),
+            sender: Encoder::new(me),
             signing: Signing::default(),
             frames: Counters::default(),
             me,
@@ -165,12 +165,12 @@ impl Comms {
             control: OperatorControl::default(),
             missions: Missions::default(),
             fence: FenceWatch::default(),
-            braking: Limits::DEFAULT.braking(),
+            braking: MotionLimits::DEFAULT.braking(),
             cylinder_m: [0.0; 2],
             curves: StickCurves::DEFAULT,
             takes_joystick: true,
             overrides: None,
-            fence_given: FenceView::default(),
+            fence_given: FenceStatus::default(),
             safe_m: None,
             safe_given_m: None,
             safe_us: 0,
@@ -301,9 +301,9 @@ impl Comms {
     pub fn parameters(&mut self, table: &mut ParameterTable, mut send: impl FnMut(&[u8])) -> Option<RecordChange> {
         let change = self.grant(table);
         // COM_DL_LOSS_T. Its range is checked, so the conversion is safe.
-        let silent_us = (table.configuration().guidance.net.station_lost_s * 1e6) as u64;
+        let silent_us = (table.configuration().guidance.failsafe.station_lost_s * 1e6) as u64;
         self.control.set_silence(silent_us);
-        let afbc_guidance::Settings { limits, net, .. } = &table.configuration().guidance;
+        let afbc_guidance::Settings { limits, failsafe: net, .. } = &table.configuration().guidance;
         self.braking = limits.braking();
         self.cylinder_m = [net.fence_radius_m, net.fence_height_m];
         let radio = &table.configuration().radio;

@@ -3,7 +3,7 @@
 use crate::services::log_transfer::LogTransfer;
 use crate::services::storage::LogStore;
 use crate::transferring::{Outcome, TransferRequests, Transferring};
-use afbc_mavlink::{Address, LogMessage, LogRequest, Question, Uplink};
+use afbc_mavlink::{Address, LogMessage, LogRequest, ServiceRequest, Uplink};
 use core::task::Poll;
 
 /// Text to a station that wants to erase logs while the vehicle is armed.
@@ -45,14 +45,17 @@ impl LogServer {
 impl TransferRequests for LogServer {
     fn wants(&self, message: &Uplink) -> bool {
         // A log stream's acknowledgement is no request to this service.
-        matches!(message, Uplink::Question(Question::Log(request)) if !matches!(request, LogRequest::Received(_)))
+        matches!(
+            message,
+            Uplink::ServiceRequest(ServiceRequest::Log(request)) if !matches!(request, LogRequest::Received(_))
+        )
     }
 
     fn take(&mut self, _: Address, message: &Uplink, _: &[u8], may_change: bool) -> bool {
         match message {
             // A station that is not in control has already been warned.
-            Uplink::Question(Question::Log(LogRequest::Erase)) => self.erases |= may_change,
-            Uplink::Question(Question::Log(request)) => self.transfer.hear(*request),
+            Uplink::ServiceRequest(ServiceRequest::Log(LogRequest::Erase)) => self.erases |= may_change,
+            Uplink::ServiceRequest(ServiceRequest::Log(request)) => self.transfer.hear(*request),
             _ => return false,
         }
         true

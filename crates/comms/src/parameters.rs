@@ -33,7 +33,7 @@ impl Heard {
 
     /// Answers that there is no such parameter.
     fn unknown(name: ParameterName, place: i16) -> Self {
-        let error = ParameterError { name, place, error: ParameterError::DOES_NOT_EXIST };
+        let error = ParameterError { name, index: place, error: ParameterError::DOES_NOT_EXIST };
         Heard { error: Some(error), ..Heard::default() }
     }
 }
@@ -60,11 +60,11 @@ impl Service {
         match ask {
             // A list in progress continues to its end and then restarts, so that every station gets all of it.
             ParameterRequest::List => self.left = table.count(),
-            ParameterRequest::ReadPlace(place) if table.at(place).is_some() => {
+            ParameterRequest::ReadIndex(place) if table.at(place).is_some() => {
                 self.dropped += count(self.read.push_back(place))
             }
             // A place has 15 bits on the wire.
-            ParameterRequest::ReadPlace(place) => return Heard::unknown([0; 16], place as i16),
+            ParameterRequest::ReadIndex(place) => return Heard::unknown([0; 16], place as i16),
             ParameterRequest::ReadName(name) => match named(name).and_then(|name| table.get(name)) {
                 Some(parameter) => self.dropped += count(self.read.push_back(parameter.place)),
                 None => return Heard::unknown(name, -1),
@@ -157,5 +157,5 @@ fn named(bytes: ParameterName) -> Option<RecordName> {
 
 fn value_message(parameter: &Parameter, count: u16) -> ParameterValue {
     let Parameter { name, place, kind, value, .. } = *parameter;
-    ParameterValue { name: name.to_bytes(), value: kind.encode(value), kind: kind.number(), count, place }
+    ParameterValue { name: name.to_bytes(), value: kind.encode(value), kind: kind.number(), count, index: place }
 }

@@ -227,7 +227,8 @@ impl Comms {
             }
             2 => CrsfTelemetry::Mode(status.flight_mode().name()),
             _ => {
-                let Some(Downlink::Telemetry(Telemetry::Global(global))) = compose(id::GLOBAL_POSITION_INT, status)
+                let Some(Downlink::Telemetry(Telemetry::GlobalPositionInt(global))) =
+                    compose(id::GLOBAL_POSITION_INT, status)
                 else {
                     return None;
                 };

@@ -1,6 +1,6 @@
 //! Interfaces of services that transfer files and logs.
 
-use afbc_mavlink::{Address, Message, Uplink};
+use afbc_mavlink::{Address, MessageSet, Uplink};
 
 /// Takes requests for files and logs. `()` takes none, so that they are refused.
 pub trait TransferRequests {
@@ -25,7 +25,7 @@ impl TransferRequests for () {
 /// Transfers files and logs between a storage and the link.
 pub(crate) trait Transferring {
     /// Type of the messages that are sent.
-    type Sent: Message;
+    type Sent: MessageSet;
 
     /// Returns the length of the longest frame that may be next \[bytes\].
     fn frame_max(&self) -> usize;

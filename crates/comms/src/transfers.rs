@@ -5,7 +5,9 @@ use crate::services::ftp::{FileTerms, Ftp, changes};
 use crate::services::log_stream::{LogStream, StreamEvent};
 use crate::services::storage::{FileStore, LogSource, LogStore};
 use crate::transferring::{Outcome, TransferRequests, Transferring};
-use afbc_mavlink::{Address, Command, ComponentMetadata, FilePacket, LogRequest, Question, Transfer, Uplink};
+use afbc_mavlink::{
+    Address, ComponentMetadata, FilePacket, LogRequest, ServiceRequest, Transfer, Uplink, VehicleCommand,
+};
 use heapless::Deque;
 
 /// Most queued requests for files, and of other kinds. Further ones are dropped, since stations repeat them.
@@ -59,8 +61,10 @@ impl<F: Copy, S: FileStore<File = F> + LogStore + LogSource> Transferring for (&
 /// Returns true if a request changes stored files or logs.
 pub(crate) fn is_change(message: &Uplink) -> bool {
     match message {
-        Uplink::Question(Question::Log(request)) => *request == LogRequest::Erase,
-        Uplink::Question(Question::File(operation)) => changes(afbc_mavlink::FileOpcode(operation.operation)),
+        Uplink::ServiceRequest(ServiceRequest::Log(request)) => *request == LogRequest::Erase,
+        Uplink::ServiceRequest(ServiceRequest::File(operation)) => {
+            changes(afbc_mavlink::FileOpcode(operation.operation))
+        }
         _ => false,
     }
 }
@@ -154,26 +158,30 @@ impl<F: Copy> Transfers<F> {
 impl<F: Copy> TransferRequests for Transfers<F> {
     fn wants(&self, message: &Uplink) -> bool {
         match message {
-            Uplink::Question(Question::File(_) | Question::Log(_)) => true,
-            Uplink::Command(Command::RequestMessage { message, .. }) => {
+            Uplink::ServiceRequest(ServiceRequest::File(_) | ServiceRequest::Log(_)) => true,
+            Uplink::Command(VehicleCommand::RequestMessage { message, .. }) => {
                 self.metadata.is_some() && METADATA.contains(message)
             }
-            Uplink::Command(Command::StartLogStream | Command::StopLogStream) => true,
+            Uplink::Command(VehicleCommand::StartLogStream | VehicleCommand::StopLogStream) => true,
             _ => false,
         }
     }
 
     fn take(&mut self, from: Address, message: &Uplink, payload: &[u8], may_change: bool) -> bool {
         let other = match message {
-            Uplink::Question(Question::File(_)) => {
+            Uplink::ServiceRequest(ServiceRequest::File(_)) => {
                 let packet = FilePacket::read(payload).0;
                 return self.files.push_back(FileRequest { from, packet, may_change }).is_ok();
             }
-            Uplink::Question(Question::Log(LogRequest::Received(sequence))) => OtherRequest::Received(from, *sequence),
-            Uplink::Question(Question::Log(_)) => return self.logs.take(from, message, payload, may_change),
-            Uplink::Command(Command::RequestMessage { message, .. }) => OtherRequest::Metadata(*message),
-            Uplink::Command(Command::StartLogStream) => OtherRequest::Stream(from, true),
-            Uplink::Command(Command::StopLogStream) => OtherRequest::Stream(from, false),
+            Uplink::ServiceRequest(ServiceRequest::Log(LogRequest::Received(sequence))) => {
+                OtherRequest::Received(from, *sequence)
+            }
+            Uplink::ServiceRequest(ServiceRequest::Log(_)) => {
+                return self.logs.take(from, message, payload, may_change);
+            }
+            Uplink::Command(VehicleCommand::RequestMessage { message, .. }) => OtherRequest::Metadata(*message),
+            Uplink::Command(VehicleCommand::StartLogStream) => OtherRequest::Stream(from, true),
+            Uplink::Command(VehicleCommand::StopLogStream) => OtherRequest::Stream(from, false),
             _ => return false,
         };
         self.others.push_back(other).is_ok()

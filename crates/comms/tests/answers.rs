@@ -5,7 +5,9 @@ use afbc::Trip;
 use afbc_comms::{ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, Comms, FORGOTTEN_US, NOT_IN_CONTROL, Setup};
 use afbc_flight_core::inbox::QUEUE_MAX;
 use afbc_flight_core::{EndReason, Mode, Refusal, Request};
-use afbc_mavlink::{Address, Answer, Command, Downlink, FRAME_MAX, MavSeverity, Sender, Text, Uplink};
+use afbc_mavlink::{
+    Address, CommandResult, Downlink, Encoder, FRAME_MAX, MavSeverity, StatusText, Uplink, VehicleCommand,
+};
 use afbc_onboard::Report;
 use afbc_types::{Axis, State};
 use proptest::prelude::*;
@@ -13,11 +15,11 @@ use proptest::prelude::*;
 const STATIONS: [Address; 3] = [STATION, Address { system: 254, component: 1 }, Address { system: 1, component: 191 }];
 
 /// An answer: command, result, receiver.
-type Told = (u16, Answer, Address);
+type Told = (u16, CommandResult, Address);
 
 fn answers(said: &[Downlink]) -> Vec<Told> {
     let answer = |message: &Downlink| match *message {
-        Downlink::Answer { command, answer, to } => Some((command, answer, to)),
+        Downlink::CommandAck { command, answer, to } => Some((command, answer, to)),
         _ => None,
     };
     said.iter().filter_map(answer).collect()
@@ -28,7 +30,7 @@ fn listen(bench: &mut Bench, ticks: usize) -> Vec<Told> {
     (0..ticks).flat_map(|_| answers(&bench.step().1)).collect()
 }
 
-fn texts(said: &[Downlink]) -> Vec<Text> {
+fn texts(said: &[Downlink]) -> Vec<StatusText> {
     let text = |message: &Downlink| match message {
         Downlink::Text { text, .. } => Some(*text),
         _ => None,
@@ -38,30 +40,30 @@ fn texts(said: &[Downlink]) -> Vec<Text> {
 
 /// Returns the expected answer of a vehicle that has just been switched on. The first station that asks to arm or
 /// engage takes control.
-fn expected(command: Command, from: Address, holder: &mut Option<Address>) -> Answer {
-    if matches!(command, Command::Arm | Command::Engage) && *holder.get_or_insert(from) != from {
-        return Answer::Refused(NOT_IN_CONTROL);
+fn expected(command: VehicleCommand, from: Address, holder: &mut Option<Address>) -> CommandResult {
+    if matches!(command, VehicleCommand::Arm | VehicleCommand::Engage) && *holder.get_or_insert(from) != from {
+        return CommandResult::Refused(NOT_IN_CONTROL);
     }
     match command {
-        Command::Arm => Answer::Refused(Refusal::StateStale as i32),
-        Command::Engage => Answer::Refused(Refusal::NotArmed as i32),
-        Command::Disarm | Command::Kill => Answer::Accepted,
-        Command::Denied(_) => Answer::Denied,
-        _ => Answer::Unsupported,
+        VehicleCommand::Arm => CommandResult::Refused(Refusal::StateStale as i32),
+        VehicleCommand::Engage => CommandResult::Refused(Refusal::NotArmed as i32),
+        VehicleCommand::Disarm | VehicleCommand::Kill => CommandResult::Accepted,
+        VehicleCommand::Denied(_) => CommandResult::Denied,
+        _ => CommandResult::Unsupported,
     }
 }
 
-fn is_request(command: Command) -> bool {
-    !matches!(command, Command::Denied(_) | Command::Other(_))
+fn is_request(command: VehicleCommand) -> bool {
+    !matches!(command, VehicleCommand::Denied(_) | VehicleCommand::Other(_))
 }
 
-fn commands() -> impl Strategy<Value = Command> {
+fn commands() -> impl Strategy<Value = VehicleCommand> {
     prop_oneof![
-        Just(Command::Arm),
-        Just(Command::Disarm),
-        Just(Command::Engage),
-        Just(Command::Denied(400)),
-        any::<u16>().prop_filter("not ours", |id| !Command::KNOWN.contains(id)).prop_map(Command::Other),
+        Just(VehicleCommand::Arm),
+        Just(VehicleCommand::Disarm),
+        Just(VehicleCommand::Engage),
+        Just(VehicleCommand::Denied(400)),
+        any::<u16>().prop_filter("not ours", |id| !VehicleCommand::KNOWN.contains(id)).prop_map(VehicleCommand::Other),
     ]
 }
 
@@ -128,9 +130,11 @@ proptest! {
     fn nothing_is_done_without_an_answer(
         burst in prop::collection::vec(
             prop_oneof![
-                2 => any::<u16>().prop_filter("not ours", |id| !Command::KNOWN.contains(id)).prop_map(Command::Other),
+                2 => any::<u16>()
+                    .prop_filter("not ours", |id| !VehicleCommand::KNOWN.contains(id))
+                    .prop_map(VehicleCommand::Other),
                 1 => (10_000..50_000_i32).prop_map(|interval_us| {
-                    Command::SetInterval { message: afbc_comms::services::streams::id::ATTITUDE, interval_us }
+                    VehicleCommand::SetInterval { message: afbc_comms::services::streams::id::ATTITUDE, interval_us }
                 }),
             ],
             0..150,
@@ -140,14 +144,15 @@ proptest! {
         bench.step();
         burst.iter().for_each(|command| bench.hear(Uplink::Command(*command)));
         let answers = listen(&mut bench, 150);
-        let accepted = answers.iter().filter(|(id, answer, _)| (*id, *answer) == (511, Answer::Accepted)).count();
+        let is_accepted = |id, answer| (id, answer) == (511, CommandResult::Accepted);
+        let accepted = answers.iter().filter(|(id, answer, _)| is_accepted(*id, *answer)).count();
         let set = burst.iter().filter_map(|command| match command {
-            Command::SetInterval { interval_us, .. } => Some(*interval_us),
+            VehicleCommand::SetInterval { interval_us, .. } => Some(*interval_us),
             _ => None,
         });
         // The first commands are accepted. Later ones find the queue full.
         let last = set.take(accepted).last().unwrap_or(20_000);
-        bench.hear(Uplink::Command(Command::GetInterval(afbc_comms::services::streams::id::ATTITUDE)));
+        bench.hear(Uplink::Command(VehicleCommand::GetInterval(afbc_comms::services::streams::id::ATTITUDE)));
         let interval = (0..5).flat_map(|_| bench.step().1).find_map(|message| match message {
             Downlink::Interval(interval) => Some(interval.interval_us),
             _ => None,
@@ -162,9 +167,10 @@ fn a_burst_of_one_command_is_answered_each_time() {
     for count in [32, 33, 60, 500] {
         let mut bench = Bench::new();
         bench.step();
-        let set = Command::SetInterval { message: afbc_comms::services::streams::id::ATTITUDE, interval_us: 100_000 };
+        let set =
+            VehicleCommand::SetInterval { message: afbc_comms::services::streams::id::ATTITUDE, interval_us: 100_000 };
         (0..count).for_each(|_| bench.hear(Uplink::Command(set)));
-        assert_eq!(listen(&mut bench, 200), vec![(511, Answer::Accepted, STATION); count]);
+        assert_eq!(listen(&mut bench, 200), vec![(511, CommandResult::Accepted, STATION); count]);
     }
 }
 
@@ -172,17 +178,17 @@ fn a_burst_of_one_command_is_answered_each_time() {
 fn two_commands_of_one_tick_are_answered_to_their_senders() {
     let mut bench = Bench::new();
     let [first, second, third] = STATIONS;
-    bench.hear_from(first, Uplink::Command(Command::Disarm));
-    bench.hear_from(second, Uplink::Command(Command::Arm));
-    bench.hear_from(third, Uplink::Command(Command::Other(60_000)));
-    bench.hear_from(first, Uplink::Command(Command::Denied(400)));
+    bench.hear_from(first, Uplink::Command(VehicleCommand::Disarm));
+    bench.hear_from(second, Uplink::Command(VehicleCommand::Arm));
+    bench.hear_from(third, Uplink::Command(VehicleCommand::Other(60_000)));
+    bench.hear_from(first, Uplink::Command(VehicleCommand::Denied(400)));
     assert_eq!(
         sorted(listen(&mut bench, 2)),
         sorted(vec![
-            (400, Answer::Accepted, first),
-            (400, Answer::Refused(Refusal::StateStale as i32), second),
-            (60_000, Answer::Unsupported, third),
-            (400, Answer::Denied, first),
+            (400, CommandResult::Accepted, first),
+            (400, CommandResult::Refused(Refusal::StateStale as i32), second),
+            (60_000, CommandResult::Unsupported, third),
+            (400, CommandResult::Denied, first),
         ])
     );
     assert_eq!(listen(&mut bench, 1000), []);
@@ -192,8 +198,9 @@ fn two_commands_of_one_tick_are_answered_to_their_senders() {
 #[test]
 fn every_command_number_is_answered_unless_addressed_to_others() {
     let mut bench = Bench::new();
-    for id in (0..=u16::MAX).step_by(7).filter(|id| !Command::KNOWN.contains(id)) {
-        let sent = Sender::new(STATION).send(&Uplink::Command(Command::Other(id)), &mut [0; FRAME_MAX]).to_vec();
+    for id in (0..=u16::MAX).step_by(7).filter(|id| !VehicleCommand::KNOWN.contains(id)) {
+        let sent =
+            Encoder::new(STATION).send(&Uplink::Command(VehicleCommand::Other(id)), &mut [0; FRAME_MAX]).to_vec();
         let to = |system, component| {
             let mut payload = sent[10..sent.len() - 2].to_vec();
             payload.resize(33, 0);
@@ -204,7 +211,7 @@ fn every_command_number_is_answered_unless_addressed_to_others() {
         };
         for (system, component, mine) in [(0, 0, true), (1, 1, true), (1, 0, true), (2, 1, false), (1, 2, false)] {
             bench.hear_bytes(&to(system, component));
-            let expected = if mine { vec![(id, Answer::Unsupported, STATION)] } else { vec![] };
+            let expected = if mine { vec![(id, CommandResult::Unsupported, STATION)] } else { vec![] };
             assert_eq!(listen(&mut bench, 1), expected);
         }
     }
@@ -221,15 +228,15 @@ fn crc(bytes: &[u8], extra: u8) -> u16 {
 #[test]
 fn only_the_forced_one_disarms_in_flight() {
     let mut bench = Bench::flying();
-    bench.hear(Uplink::Command(Command::Disarm));
+    bench.hear(Uplink::Command(VehicleCommand::Disarm));
     let (report, said) = bench.tick(&State::default());
     assert!(report.mode.armed());
-    assert_eq!(answers(&said), [(400, Answer::Refused(Refusal::InFlight as i32), STATION)]);
-    assert_eq!(texts(&said), [Text::from(Refusal::InFlight.reason())]);
-    bench.hear(Uplink::Command(Command::Kill));
+    assert_eq!(answers(&said), [(400, CommandResult::Refused(Refusal::InFlight as i32), STATION)]);
+    assert_eq!(texts(&said), [StatusText::from(Refusal::InFlight.reason())]);
+    bench.hear(Uplink::Command(VehicleCommand::Kill));
     let (report, said) = bench.tick(&State::default());
     assert_eq!((report.mode, report.ended), (Mode::Disarmed, Some(EndReason::Killed)));
-    assert_eq!(answers(&said), [(400, Answer::Accepted, STATION)]);
+    assert_eq!(answers(&said), [(400, CommandResult::Accepted, STATION)]);
 }
 
 /// Every refusal of the flight core is sent with its number and its text.
@@ -240,9 +247,9 @@ fn every_refusal_is_reported_with_its_reason() {
             let mut bench = Bench::new();
             let (idle, _) = bench.step();
             let (command, id) = match request {
-                Request::Engage => (Command::Engage, 31_010),
-                Request::Disarm => (Command::Disarm, 400),
-                _ => (Command::Arm, 400),
+                Request::Engage => (VehicleCommand::Engage, 31_010),
+                Request::Disarm => (VehicleCommand::Disarm, 400),
+                _ => (VehicleCommand::Arm, 400),
             };
             bench.hear(Uplink::Command(command));
             bench.inputs.take_into(&mut bench.taken);
@@ -250,8 +257,8 @@ fn every_refusal_is_reported_with_its_reason() {
             assert_eq!(asked.value, request);
             let answer = afbc_flight_core::RequestAnswer { ticket: asked.ticket, request, result: Err(refusal) };
             let said = bench.said(&Report { answer: Some(answer), ..idle });
-            assert_eq!(answers(&said), [(id, Answer::Refused(refusal as i32), STATION)]);
-            assert_eq!(texts(&said), [Text::from(refusal.reason())]);
+            assert_eq!(answers(&said), [(id, CommandResult::Refused(refusal as i32), STATION)]);
+            assert_eq!(texts(&said), [StatusText::from(refusal.reason())]);
         }
     }
     assert!(Refusal::ALL.iter().all(|refusal| *refusal as i32 != BUSY));
@@ -262,21 +269,24 @@ fn every_refusal_is_reported_with_its_reason() {
 fn a_kill_is_always_accepted() {
     let mut bench = Bench::new();
     for _ in 0..20 {
-        bench.hear(Uplink::Command(Command::Arm));
+        bench.hear(Uplink::Command(VehicleCommand::Arm));
     }
     let [_, second, third] = STATIONS;
-    bench.hear_from(second, Uplink::Command(Command::Kill));
-    bench.hear_from(third, Uplink::Command(Command::Kill));
+    bench.hear_from(second, Uplink::Command(VehicleCommand::Kill));
+    bench.hear_from(third, Uplink::Command(VehicleCommand::Kill));
     assert!(bench.inputs.inbox.kills());
     let reported = listen(&mut bench, 30);
     assert_eq!(reported.len(), 22);
     let of = |answer| reported.iter().filter(|reported| **reported == (400, answer, STATION)).count();
-    assert_eq!(of(Answer::Refused(BUSY)), 20 - (QUEUE_MAX - 1));
+    assert_eq!(of(CommandResult::Refused(BUSY)), 20 - (QUEUE_MAX - 1));
     assert_eq!(
-        of(Answer::Refused(Refusal::Overtaken as i32)) + of(Answer::Refused(Refusal::StateStale as i32)),
+        of(CommandResult::Refused(Refusal::Overtaken as i32)) + of(CommandResult::Refused(Refusal::StateStale as i32)),
         QUEUE_MAX - 1
     );
-    assert!(reported.contains(&(400, Answer::Accepted, second)) && reported.contains(&(400, Answer::Accepted, third)));
+    assert!(
+        reported.contains(&(400, CommandResult::Accepted, second))
+            && reported.contains(&(400, CommandResult::Accepted, third))
+    );
 }
 
 /// If the link falls behind, reports are dropped. Requests answered in such reports fail, and their tickets become free
@@ -286,7 +296,7 @@ fn requests_whose_tick_went_unreported_fail() {
     let mut bench = Bench::new();
     for _ in 0..3 {
         for _ in 0..QUEUE_MAX - 1 {
-            bench.hear(Uplink::Command(Command::Disarm));
+            bench.hear(Uplink::Command(VehicleCommand::Disarm));
         }
         for _ in 0..QUEUE_MAX {
             bench.now_us += 1000;
@@ -294,10 +304,10 @@ fn requests_whose_tick_went_unreported_fail() {
             bench.flight.tick(bench.now_us, &mut bench.taken, &afbc_onboard::Readings::NONE);
         }
         let reported = listen(&mut bench, FORGOTTEN_US as usize / 1000 + 10);
-        assert_eq!(reported, [(400, Answer::Failed, STATION); QUEUE_MAX - 1]);
+        assert_eq!(reported, [(400, CommandResult::Failed, STATION); QUEUE_MAX - 1]);
     }
-    bench.hear(Uplink::Command(Command::Disarm));
-    assert_eq!(listen(&mut bench, 2), [(400, Answer::Accepted, STATION)]);
+    bench.hear(Uplink::Command(VehicleCommand::Disarm));
+    assert_eq!(listen(&mut bench, 2), [(400, CommandResult::Accepted, STATION)]);
 }
 
 /// The largest possible output of a tick fits and is sent completely, as [`Bench::said`] checks.
@@ -312,9 +322,9 @@ fn the_largest_output_of_a_tick_is_sent_completely() {
         bench.now_us += 1000;
         bench.measure(&State::default());
         for _ in 0..5 {
-            bench.hear(Uplink::Command(Command::Other(u16::MAX)));
+            bench.hear(Uplink::Command(VehicleCommand::Other(u16::MAX)));
         }
-        bench.hear(Uplink::Command(Command::Arm));
+        bench.hear(Uplink::Command(VehicleCommand::Arm));
         let odd = round % 2 == 1;
         let mode = if odd { Mode::Coasting } else { Mode::Disarmed };
         let ended = odd.then_some(EndReason::StateLost);

@@ -5,9 +5,12 @@ use afbc_comms::services::{health::sensor, modes, status::SensorBits};
 use afbc_comms::{AuxSensors, CALIBRATES, Comms, Setup};
 use afbc_estimator::Measurement;
 use afbc_flight_core::Refusal;
-use afbc_guidance::{FlightMode, Net, Settings};
+use afbc_guidance::{FailsafeSettings, FlightMode, Settings};
 use afbc_mavlink::telemetry::BatteryStatus;
-use afbc_mavlink::{Address, Answer, CalibrationRequest, Command, Downlink, ParameterRequest, Telemetry, Text, Uplink};
+use afbc_mavlink::{
+    Address, CalibrationRequest, CommandResult, Downlink, ParameterRequest, StatusText, Telemetry, Uplink,
+    VehicleCommand,
+};
 use afbc_onboard::{Aged, Configuration, Flight, Readings};
 use afbc_types::State;
 use nalgebra::Vector3;
@@ -17,8 +20,8 @@ const ARM_DISARM: u16 = 400;
 
 /// Returns a vehicle with a monitored three-cell battery, inside its geofence of 10 m.
 fn bench() -> Bench {
-    let net = Net { cells: 3, fence_radius_m: 10.0, ..Net::DEFAULT };
-    let guidance = Settings { net, ..Settings::DEFAULT };
+    let net = FailsafeSettings { cells: 3, fence_radius_m: 10.0, ..FailsafeSettings::DEFAULT };
+    let guidance = Settings { failsafe: net, ..Settings::DEFAULT };
     let mut bench = Bench::new();
     bench.flight = Flight::new(&Configuration { guidance, ..Configuration::default() }).expect("valid");
     charge(&mut bench, 12_000);
@@ -48,18 +51,18 @@ fn report(bench: &mut Bench, present: u32, healthy: u32) {
 }
 
 /// Returns the answer to an arm command, and whether SYS_STATUS showed the vehicle as ready just before.
-fn arm(bench: &mut Bench, state: &State) -> (Answer, bool) {
-    bench.hear(Uplink::Command(Command::RequestMessage { message: 1, index: 0 }));
+fn arm(bench: &mut Bench, state: &State) -> (CommandResult, bool) {
+    bench.hear(Uplink::Command(VehicleCommand::RequestMessage { message: 1, index: 0 }));
     let said = stand(bench, 3, state, &Readings::NONE);
     let system = said.iter().rev().find_map(|message| match message {
         Downlink::Telemetry(Telemetry::System(system)) => Some(*system),
         _ => None,
     });
     let armable = system.expect("sent").healthy & sensor::ARMING != 0;
-    bench.hear(Uplink::Command(Command::Arm));
+    bench.hear(Uplink::Command(VehicleCommand::Arm));
     let said = stand(bench, 3, state, &Readings::NONE);
     let answer = said.iter().find_map(|message| match message {
-        Downlink::Answer { command: ARM_DISARM, answer, .. } => Some(*answer),
+        Downlink::CommandAck { command: ARM_DISARM, answer, .. } => Some(*answer),
         _ => None,
     });
     (answer.expect("answered"), armable)
@@ -77,7 +80,7 @@ fn a_faulty_sensor_is_not_started_with() {
         stand(&mut bench, 1500, &here, &Readings::NONE);
         assert_eq!(arm(&mut bench, &here), refused(Refusal::SensorFailed), "{faulty:#x}");
         report(&mut bench, all, all);
-        assert_eq!(arm(&mut bench, &here), (Answer::Accepted, true), "{faulty:#x}");
+        assert_eq!(arm(&mut bench, &here), (CommandResult::Accepted, true), "{faulty:#x}");
     }
 }
 
@@ -87,30 +90,30 @@ fn self_tests_are_for_a_disarmed_vehicle() {
     const SELF_TEST: u16 = 31_011;
     let here = State::default();
     let ask = |bench: &mut Bench| {
-        bench.hear(Uplink::Command(Command::SelfTest));
+        bench.hear(Uplink::Command(VehicleCommand::SelfTest));
         let said = stand(bench, 3, &here, &Readings::NONE);
         let answer = said.iter().find_map(|message| match message {
-            Downlink::Answer { command: SELF_TEST, answer, .. } => Some(*answer),
+            Downlink::CommandAck { command: SELF_TEST, answer, .. } => Some(*answer),
             _ => None,
         });
         (answer.expect("answered"), [(); 2].map(|()| bench.comms.wants_self_tests()))
     };
     let mut without = bench();
-    assert_eq!(ask(&mut without), (Answer::Unsupported, [false; 2]));
+    assert_eq!(ask(&mut without), (CommandResult::Unsupported, [false; 2]));
     let mut bench = bench();
     bench.comms = Comms::with(Setup { calibrates: true, ..Setup::default() });
     charge(&mut bench, 12_000);
     stand(&mut bench, 1500, &here, &Readings::NONE);
-    assert_eq!(ask(&mut bench), (Answer::Accepted, [true, false]));
-    bench.hear(Uplink::Command(Command::Calibrate(CalibrationRequest::Gyroscope)));
-    assert_eq!(ask(&mut bench), (Answer::Refused(CALIBRATES), [false; 2]));
-    bench.hear(Uplink::Command(Command::Calibrate(CalibrationRequest::Cancel)));
-    assert_eq!(arm(&mut bench, &here).0, Answer::Accepted);
-    assert_eq!(ask(&mut bench), (Answer::Refused(Refusal::AlreadyArmed as i32), [false; 2]));
+    assert_eq!(ask(&mut bench), (CommandResult::Accepted, [true, false]));
+    bench.hear(Uplink::Command(VehicleCommand::Calibrate(CalibrationRequest::Gyroscope)));
+    assert_eq!(ask(&mut bench), (CommandResult::Refused(CALIBRATES), [false; 2]));
+    bench.hear(Uplink::Command(VehicleCommand::Calibrate(CalibrationRequest::Cancel)));
+    assert_eq!(arm(&mut bench, &here).0, CommandResult::Accepted);
+    assert_eq!(ask(&mut bench), (CommandResult::Refused(Refusal::AlreadyArmed as i32), [false; 2]));
 }
 
-fn refused(refusal: Refusal) -> (Answer, bool) {
-    (Answer::Refused(refusal as i32), false)
+fn refused(refusal: Refusal) -> (CommandResult, bool) {
+    (CommandResult::Refused(refusal as i32), false)
 }
 
 #[test]
@@ -118,7 +121,7 @@ fn the_guidance_refuses_with_its_reason_and_stations_know_before() {
     let here = State::default();
     let mut well = bench();
     stand(&mut well, 1500, &here, &Readings::NONE);
-    assert_eq!(arm(&mut well, &here), (Answer::Accepted, true));
+    assert_eq!(arm(&mut well, &here), (CommandResult::Accepted, true));
 
     let mut empty = bench();
     charge(&mut empty, 10_900);
@@ -126,11 +129,11 @@ fn the_guidance_refuses_with_its_reason_and_stations_know_before() {
     assert_eq!(arm(&mut empty, &here), refused(Refusal::BatteryLow));
 
     let mut lands = bench();
-    lands.hear(Uplink::Command(Command::SelectMode(modes::custom(FlightMode::Land))));
+    lands.hear(Uplink::Command(VehicleCommand::SelectMode(modes::custom(FlightMode::Land))));
     stand(&mut lands, 1500, &here, &Readings::NONE);
     assert_eq!(
         arm(&mut lands, &here),
-        (Answer::Accepted, true),
+        (CommandResult::Accepted, true),
         "a landing on the ground is refused, and leaves no trace"
     );
 
@@ -148,7 +151,7 @@ fn the_guidance_refuses_with_its_reason_and_stations_know_before() {
     stand(&mut silent, 1500, &here, &Readings::NONE);
     assert_eq!(arm(&mut silent, &here), refused(Refusal::SensorFailed));
     stand(&mut silent, 1, &here, &readings);
-    assert_eq!(arm(&mut silent, &here), (Answer::Accepted, true));
+    assert_eq!(arm(&mut silent, &here), (CommandResult::Accepted, true));
 }
 
 /// A vehicle that reports itself ready can be armed. It is ready after 1.1 s at rest.
@@ -161,7 +164,7 @@ fn what_is_reported_agrees_with_the_answer() {
         stand(&mut bench, 2000, &moves, &Readings::NONE);
         stand(&mut bench, rest_ms, &here, &Readings::NONE);
         let (answer, reported) = arm(&mut bench, &here);
-        assert!(!reported || answer == Answer::Accepted, "{rest_ms} ms: {answer:?}");
+        assert!(!reported || answer == CommandResult::Accepted, "{rest_ms} ms: {answer:?}");
         armable.push(reported);
     }
     assert_eq!((armable.first(), armable.last()), (Some(&false), Some(&true)));
@@ -171,23 +174,23 @@ fn what_is_reported_agrees_with_the_answer() {
 /// Results of a check, a status request and an arm command at once: the answer, the texts in order, and whether
 /// SYS_STATUS shows the vehicle as ready.
 struct Told {
-    answer: Answer,
-    checks: Vec<Text>,
+    answer: CommandResult,
+    checks: Vec<StatusText>,
     armable: bool,
 }
 
 /// Requests the arming checks and SYS_STATUS and arms in one tick, then stops the motors.
 fn ask(bench: &mut Bench, from: Address, stands: &Stands) -> Told {
-    bench.hear_from(from, Uplink::Command(Command::CheckArming));
-    bench.hear_from(from, Uplink::Command(Command::RequestMessage { message: 1, index: 0 }));
-    bench.hear_from(from, Uplink::Command(Command::Arm));
+    bench.hear_from(from, Uplink::Command(VehicleCommand::CheckArming));
+    bench.hear_from(from, Uplink::Command(VehicleCommand::RequestMessage { message: 1, index: 0 }));
+    bench.hear_from(from, Uplink::Command(VehicleCommand::Arm));
     let mut said = stands.tick(bench).1;
     for _ in 0..4 {
-        bench.hear_from(from, Uplink::Command(Command::Kill));
+        bench.hear_from(from, Uplink::Command(VehicleCommand::Kill));
         said.extend(stands.tick(bench).1);
     }
     let answer = said.iter().find_map(|message| match message {
-        Downlink::Answer { command: ARM_DISARM, answer, .. } => Some(*answer),
+        Downlink::CommandAck { command: ARM_DISARM, answer, .. } => Some(*answer),
         _ => None,
     });
     let armable = said.iter().find_map(|message| match message {
@@ -229,7 +232,7 @@ impl Stands {
     fn begin(&self, bench: &mut Bench) {
         charge(bench, self.voltage_mv);
         if let Some(mode) = self.mode {
-            bench.hear(Uplink::Command(Command::SelectMode(modes::custom(mode))));
+            bench.hear(Uplink::Command(VehicleCommand::SelectMode(modes::custom(mode))));
         }
         if let Some((name, value)) = self.limit {
             let mut padded = [0; 16];
@@ -281,7 +284,7 @@ fn stands() -> impl Strategy<Value = Stands> {
 
 /// Returns a vehicle with these arming limits and a link fast enough for every text.
 fn limited(limits: &[f32; 4]) -> Bench {
-    let net = Net { cells: 3, fence_radius_m: 10.0, ..Net::DEFAULT };
+    let net = FailsafeSettings { cells: 3, fence_radius_m: 10.0, ..FailsafeSettings::DEFAULT };
     let [speed_max_m_s, rate_max_rad_s, tilt_max_rad, setpoint_distance_max_m] = *limits;
     let arming = afbc_onboard::ArmingLimits {
         tilt_max_rad: tilt_max_rad.clamp(0.01, 0.8),
@@ -290,7 +293,7 @@ fn limited(limits: &[f32; 4]) -> Bench {
         rate_max_rad_s: rate_max_rad_s.max(0.01),
     };
     let configuration =
-        Configuration { guidance: Settings { net, ..Settings::DEFAULT }, arming, ..Configuration::default() };
+        Configuration { guidance: Settings { failsafe: net, ..Settings::DEFAULT }, arming, ..Configuration::default() };
     let mut bench = Bench::new();
     bench.flight = Flight::new(&configuration).expect("valid");
     bench.table = afbc_onboard::parameters::ParameterTable::new(configuration);
@@ -318,16 +321,16 @@ proptest! {
             let Told { answer, checks, armable } = ask(&mut bench, STATION, spell);
             let first = checks.first().copied();
             let expected = match answer {
-                Answer::Accepted => Text::from("ready to arm"),
-                Answer::Refused(number) => {
+                CommandResult::Accepted => StatusText::from("ready to arm"),
+                CommandResult::Refused(number) => {
                     let refusal = Refusal::ALL.into_iter().find(|refusal| *refusal as i32 == number);
-                    Text::from(refusal.expect("the flight core's").reason())
+                    StatusText::from(refusal.expect("the flight core's").reason())
                 }
                 answer => return Err(TestCaseError::fail(format!("{answer:?}"))),
             };
             prop_assert_eq!(first, Some(expected), "{:?}, {:?}", answer, checks);
-            prop_assert_eq!(armable, answer == Answer::Accepted);
-            prop_assert_eq!(checks.contains(&Text::from("ready to arm")), answer == Answer::Accepted);
+            prop_assert_eq!(armable, answer == CommandResult::Accepted);
+            prop_assert_eq!(checks.contains(&StatusText::from("ready to arm")), answer == CommandResult::Accepted);
         }
     }
 }
@@ -353,12 +356,12 @@ fn the_limits_of_the_parameters_count() {
         }
         let reported = ask(&mut bench, STATION, &spell);
         let (answer, text) = if ready {
-            (Answer::Accepted, "ready to arm")
+            (CommandResult::Accepted, "ready to arm")
         } else {
-            (Answer::Refused(Refusal::NotAtRest as i32), Refusal::NotAtRest.reason())
+            (CommandResult::Refused(Refusal::NotAtRest as i32), Refusal::NotAtRest.reason())
         };
         assert_eq!((reported.answer, reported.armable), (answer, ready));
-        assert_eq!(reported.checks.first(), Some(&Text::from(text)));
+        assert_eq!(reported.checks.first(), Some(&StatusText::from(text)));
     }
 }
 
@@ -380,14 +383,14 @@ fn a_station_that_may_not_arm_does_not_read_that_it_may() {
     for _ in 0..spell.ticks {
         spell.tick(&mut bench);
     }
-    let mine = Text::from("ready to arm");
-    let theirs = Text::from("245/190 may not arm: 255/190 is in control");
+    let mine = StatusText::from("ready to arm");
+    let theirs = StatusText::from("245/190 may not arm: 255/190 is in control");
     let reported = ask(&mut bench, OTHER, &spell);
-    assert_eq!(reported.answer, Answer::Refused(afbc_comms::NOT_IN_CONTROL));
+    assert_eq!(reported.answer, CommandResult::Refused(afbc_comms::NOT_IN_CONTROL));
     assert!(reported.checks.contains(&theirs) && !reported.checks.contains(&mine), "{:?}", reported.checks);
     // If both stations ask at once, each gets its text.
-    bench.hear_from(OTHER, Uplink::Command(Command::CheckArming));
+    bench.hear_from(OTHER, Uplink::Command(VehicleCommand::CheckArming));
     let reported = ask(&mut bench, STATION, &spell);
-    assert_eq!(reported.answer, Answer::Accepted);
+    assert_eq!(reported.answer, CommandResult::Accepted);
     assert!(reported.checks.contains(&theirs) && reported.checks.contains(&mine), "{:?}", reported.checks);
 }

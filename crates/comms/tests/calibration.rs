@@ -4,7 +4,7 @@ use crate::common::Bench;
 use afbc_calibration::{RawSample, Side};
 use afbc_comms::{BUSY, Calibrator, Comms, Setup};
 use afbc_flight_core::{Mode, Refusal};
-use afbc_mavlink::{Answer, CalibrationRequest, Command, Downlink, MavSeverity, Storage, Uplink};
+use afbc_mavlink::{CalibrationRequest, CommandResult, Downlink, MavSeverity, Storage, Uplink, VehicleCommand};
 use afbc_onboard::Report;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
@@ -19,7 +19,7 @@ struct Vehicle {
     calibrator: Calibrator,
     idle: Report,
     mode: Mode,
-    answers: Vec<Answer>,
+    answers: Vec<CommandResult>,
     texts: Vec<(MavSeverity, String)>,
 }
 
@@ -39,7 +39,7 @@ impl Vehicle {
     }
 
     fn ask(&mut self, what: CalibrationRequest) {
-        self.bench.hear(Uplink::Command(Command::Calibrate(what)));
+        self.bench.hear(Uplink::Command(VehicleCommand::Calibrate(what)));
     }
 
     /// Runs a tick of 20 ms with a sample, if there is one.
@@ -52,7 +52,7 @@ impl Vehicle {
         comms.calibrate(&mut self.calibrator, sample, table, |_| panic!("no station has asked for the samples"));
         for message in said {
             match message {
-                Downlink::Answer { command: CALIBRATION, answer, .. } => self.answers.push(answer),
+                Downlink::CommandAck { command: CALIBRATION, answer, .. } => self.answers.push(answer),
                 Downlink::Text { severity, text } => {
                     self.texts.push((severity, text.to_str().expect("words").to_owned()));
                 }
@@ -98,7 +98,10 @@ fn the_gyroscopes_offset_is_found() {
     assert!((vehicle.values("CAL_GYRO0_OFF_") - offset).amax() < 1e-5);
     // Each value is set once, and no others.
     assert_eq!(vehicle.set().len(), 3, "{:?}", vehicle.set());
-    assert_eq!((vehicle.answers.as_slice(), vehicle.bench.comms.takes_samples()), (&[Answer::Accepted][..], false));
+    assert_eq!(
+        (vehicle.answers.as_slice(), vehicle.bench.comms.takes_samples()),
+        (&[CommandResult::Accepted][..], false)
+    );
     // The next calibration starts afresh and finds its own offset.
     vehicle.ask(CalibrationRequest::Gyroscope);
     let texts = vehicle.pass(4.0, Some(RawSample { rates_rad_s: -offset, ..level() }));
@@ -242,7 +245,7 @@ fn a_failure_is_told_with_its_reason() {
     vehicle.answers.clear();
     vehicle.ask(CalibrationRequest::Gyroscope);
     assert!(vehicle.pass(4.0, Some(level())).is_empty());
-    assert_eq!(vehicle.answers, [Answer::Refused(Refusal::AlreadyArmed as i32)]);
+    assert_eq!(vehicle.answers, [CommandResult::Refused(Refusal::AlreadyArmed as i32)]);
     assert_eq!(vehicle.set(), Vec::<String>::new());
 }
 
@@ -257,7 +260,7 @@ fn a_result_is_what_the_parameters_have() {
         !vehicle.bench.changes.is_empty()
     });
     assert!(found);
-    vehicle.bench.hear(Uplink::Command(Command::Storage(Storage::Reset)));
+    vehicle.bench.hear(Uplink::Command(VehicleCommand::Storage(Storage::Reset)));
     vehicle.pass(5.0, Some(offset));
     assert_eq!(vehicle.texts.last(), Some(&(WARNING, "[cal] calibration failed: values not accepted".to_owned())));
 }
@@ -269,9 +272,9 @@ fn one_is_calibrated_at_a_time() {
     vehicle.ask(CalibrationRequest::Level);
     vehicle.tick(Some(level()));
     vehicle.ask(CalibrationRequest::Gyroscope);
-    vehicle.bench.hear(Uplink::Command(Command::Arm));
+    vehicle.bench.hear(Uplink::Command(VehicleCommand::Arm));
     vehicle.pass(0.1, Some(level()));
-    assert_eq!(vehicle.answers, [Answer::Accepted, Answer::Refused(BUSY)]);
+    assert_eq!(vehicle.answers, [CommandResult::Accepted, CommandResult::Refused(BUSY)]);
     assert_eq!(
         vehicle.texts,
         [(INFO, "[cal] calibration started: 2 level".into()), (WARNING, "arming refused: calibrating".into())]
@@ -281,7 +284,7 @@ fn one_is_calibrated_at_a_time() {
         vehicle.pass(0.1, Some(level()));
     }
     assert_eq!(vehicle.texts[2..], [(INFO, "[cal] calibration cancelled".to_owned())]);
-    assert_eq!(vehicle.answers[2..], [Answer::Accepted; 2]);
+    assert_eq!(vehicle.answers[2..], [CommandResult::Accepted; 2]);
     assert!(vehicle.pass(4.0, Some(level())).is_empty());
     // A vehicle without sensors supports neither calibration nor its cancellation.
     let mut without = Vehicle::new();
@@ -291,5 +294,5 @@ fn one_is_calibrated_at_a_time() {
         without.tick(None);
         without.tick(None);
     }
-    assert_eq!((without.answers, without.texts), (vec![Answer::Unsupported; 2], vec![]));
+    assert_eq!((without.answers, without.texts), (vec![CommandResult::Unsupported; 2], vec![]));
 }

@@ -4,7 +4,7 @@
 use crate::common::Bench;
 use afbc_comms::services::mission::{check, to_guidance};
 use afbc_comms::services::origin::EarthOrigin;
-use afbc_mavlink::{Address, Answer, Command, Decoder, Downlink, MissionItem, Uplink};
+use afbc_mavlink::{Address, CommandResult, Decoder, Downlink, MissionItem, Uplink, VehicleCommand};
 
 /// Handling of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,7 +101,7 @@ fn frames(id: u16, parameters: [f32; 7]) -> Vec<Vec<u8>> {
     frames
 }
 
-fn read(frame: &[u8]) -> Command {
+fn read(frame: &[u8]) -> VehicleCommand {
     let mut command = None;
     Decoder::new(Address { system: 1, component: 1 }).feed(frame, |_, message| match message {
         Uplink::Command(read) => command = Some(read),
@@ -111,13 +111,13 @@ fn read(frame: &[u8]) -> Command {
 }
 
 /// Returns the vehicle's first answer.
-fn answer(frame: &[u8]) -> Answer {
+fn answer(frame: &[u8]) -> CommandResult {
     let mut bench = Bench::new();
     bench.step();
     bench.hear_bytes(frame);
     let said: Vec<_> = (0..5).flat_map(|_| bench.step().1).collect();
     let answer = said.iter().find_map(|message| match message {
-        Downlink::Answer { answer, .. } => Some(*answer),
+        Downlink::CommandAck { answer, .. } => Some(*answer),
         _ => None,
     });
     answer.expect("answered")
@@ -127,10 +127,17 @@ fn answer(frame: &[u8]) -> Answer {
 fn every_parameter_of_every_command_is_used_or_refused() {
     let mut rows: Vec<u16> = COMMANDS.iter().map(|Row(id, ..)| *id).collect();
     rows.dedup();
-    assert!(Command::KNOWN.iter().all(|id| rows.contains(id)) && rows.len() == Command::KNOWN.len(), "{rows:?}");
+    assert!(
+        VehicleCommand::KNOWN.iter().all(|id| rows.contains(id)) && rows.len() == VehicleCommand::KNOWN.len(),
+        "{rows:?}"
+    );
     for Row(id, parameters, uses) in COMMANDS {
         for (kind, usual) in frames(*id, *parameters).iter().enumerate() {
-            assert!(!matches!(read(usual), Command::Denied(_) | Command::Other(_)), "{id}: {:?}", read(usual));
+            assert!(
+                !matches!(read(usual), VehicleCommand::Denied(_) | VehicleCommand::Other(_)),
+                "{id}: {:?}",
+                read(usual)
+            );
             for (place, use_of) in uses.iter().enumerate() {
                 for value in ASKING.into_iter().chain([0.0, NAN]) {
                     let mut asked = *parameters;
@@ -138,7 +145,7 @@ fn every_parameter_of_every_command_is_used_or_refused() {
                     let Some(sent) = frames(*id, asked).get(kind).cloned() else { continue };
                     let (found, usual) = (format!("{:?}", read(&sent)), format!("{:?}", read(usual)));
                     let what = format!("{id}, parameter {}: {value}, by message {kind}", place + 1);
-                    let denied = found == format!("{:?}", Command::Denied(*id));
+                    let denied = found == format!("{:?}", VehicleCommand::Denied(*id));
                     if *use_of == No {
                         assert_eq!(denied, !(value == 0.0 || value.is_nan()), "{what}: {found}");
                     } else if !denied && found == usual {
@@ -150,7 +157,7 @@ fn every_parameter_of_every_command_is_used_or_refused() {
                         assert!(asks_for_nothing || same, "{what} is ignored");
                     }
                     if denied {
-                        assert_eq!(answer(&sent), Answer::Denied, "{what}");
+                        assert_eq!(answer(&sent), CommandResult::Denied, "{what}");
                     }
                 }
             }
@@ -166,7 +173,7 @@ fn a_kill_is_one_whatever_else_it_says() {
             let mut parameters = [0.0, 21_196.0, 0.0, 0.0, 0.0, 0.0, 0.0];
             parameters[place] = value;
             for sent in frames(400, parameters) {
-                assert_eq!((read(&sent), answer(&sent)), (Command::Kill, Answer::Accepted));
+                assert_eq!((read(&sent), answer(&sent)), (VehicleCommand::Kill, CommandResult::Accepted));
             }
         }
     }

@@ -9,8 +9,9 @@ use afbc_flight_core::Refusal;
 use afbc_guidance::{FlightMode, Order, OrderRefusal};
 use afbc_mavlink::telemetry::BatteryStatus;
 use afbc_mavlink::{
-    Address, Answer, AttitudeAndThrust, Axes, Command, Datum, Downlink, ExternalTarget, Height, ManualControl, Mission,
-    MissionItem, MissionResult, Place, Plan, PositionTarget, Reboot, Storage, Telemetry, Uplink,
+    Address, AttitudeAndThrust, CommandResult, Datum, Downlink, ExternalTarget, GlobalPosition, Height, ManualControl,
+    MissionItem, MissionMessage, MissionResult, MissionType, PositionTarget, Reboot, Storage, TargetFrame, Telemetry,
+    Uplink, VehicleCommand,
 };
 use afbc_onboard::Report;
 use afbc_onboard::parameters::RecordChange;
@@ -50,20 +51,20 @@ pub(crate) fn step(bench: &mut Bench) -> Vec<Downlink> {
 }
 
 /// Returns the orders that follow from a command, and the answer if it does not come from the guidance.
-pub(crate) fn orders(bench: &mut Bench, command: Command) -> (Vec<Order>, Option<Answer>) {
+pub(crate) fn orders(bench: &mut Bench, command: VehicleCommand) -> (Vec<Order>, Option<CommandResult>) {
     // Earlier commands are completed first.
     (0..5).for_each(|_| drop(step(bench)));
     bench.hear(Uplink::Command(command));
     let orders = bench.inputs.orders.given.iter().map(|given| given.value).collect::<Vec<_>>();
     let said = step(bench);
     let answer = said.iter().find_map(|message| match message {
-        Downlink::Answer { answer, to: STATION, .. } => Some(*answer),
+        Downlink::CommandAck { answer, to: STATION, .. } => Some(*answer),
         _ => None,
     });
     (orders, answer.filter(|_| bench.inputs.orders.given.is_empty()))
 }
 
-pub(crate) fn leads_to(bench: &mut Bench, command: Command, expected: &[Order]) {
+pub(crate) fn leads_to(bench: &mut Bench, command: VehicleCommand, expected: &[Order]) {
     let (found, _) = orders(bench, command);
     // Texts are compared since NaN is not equal to itself. Places are rounded to 2 cm, since degrees on the wire are
     // inexact.
@@ -87,17 +88,21 @@ pub(crate) fn leads_to(bench: &mut Bench, command: Command, expected: &[Order]) 
     assert_eq!(rounded(&found), rounded(expected), "{command:?}");
 }
 
-pub(crate) fn refused(bench: &mut Bench, command: Command, expected: Answer) {
+pub(crate) fn refused(bench: &mut Bench, command: VehicleCommand, expected: CommandResult) {
     assert_eq!(orders(bench, command), (vec![], Some(expected)), "{command:?}");
 }
 
-fn place(local: [f32; 3], above: Datum, metres: f32) -> Place {
+fn place(local: [f32; 3], above: Datum, metres: f32) -> GlobalPosition {
     let [latitude_e7, longitude_e7] = origin().global(&local.into()).e7();
-    Place { latitude_e7, longitude_e7, height: Height { metres, above } }
+    GlobalPosition { latitude_e7, longitude_e7, height: Height { metres, above } }
 }
 
-fn height(metres: f32, above: Datum) -> Place {
-    Place { latitude_e7: Place::AS_IT_IS, longitude_e7: Place::AS_IT_IS, height: Height { metres, above } }
+fn height(metres: f32, above: Datum) -> GlobalPosition {
+    GlobalPosition {
+        latitude_e7: GlobalPosition::AS_IT_IS,
+        longitude_e7: GlobalPosition::AS_IT_IS,
+        height: Height { metres, above },
+    }
 }
 
 #[test]
@@ -109,26 +114,26 @@ fn each_command_is_its_order() {
         (4.0, Datum::Home, Some(4.0 + HOME[2] - HERE[2])),
         (500.0, Datum::Sea, Some(500.0 - 488.0 - HERE[2])),
     ] {
-        leads_to(&mut bench, Command::TakeOff(Height { metres, above }), &[Order::TakeOff(height)]);
+        leads_to(&mut bench, VehicleCommand::TakeOff(Height { metres, above }), &[Order::TakeOff(height)]);
     }
-    leads_to(&mut bench, Command::Land, &[Order::Select(FlightMode::Land)]);
-    leads_to(&mut bench, Command::Return, &[Order::Select(FlightMode::Return)]);
+    leads_to(&mut bench, VehicleCommand::Land, &[Order::Select(FlightMode::Land)]);
+    leads_to(&mut bench, VehicleCommand::Return, &[Order::Select(FlightMode::Return)]);
     for mode in FlightMode::ALL {
-        leads_to(&mut bench, Command::SelectMode(modes::custom(mode)), &[Order::Select(mode)]);
+        leads_to(&mut bench, VehicleCommand::SelectMode(modes::custom(mode)), &[Order::Select(mode)]);
         match modes::standard(mode) {
-            0 => refused(&mut bench, Command::SelectStandardMode(0), Answer::Denied),
-            number => leads_to(&mut bench, Command::SelectStandardMode(number), &[Order::Select(mode)]),
+            0 => refused(&mut bench, VehicleCommand::SelectStandardMode(0), CommandResult::Denied),
+            number => leads_to(&mut bench, VehicleCommand::SelectStandardMode(number), &[Order::Select(mode)]),
         }
     }
-    refused(&mut bench, Command::SelectMode(0x0909_0000), Answer::Denied);
-    refused(&mut bench, Command::SelectStandardMode(99), Answer::Denied);
-    leads_to(&mut bench, Command::Speed(3.5), &[Order::Speed(3.5)]);
-    leads_to(&mut bench, Command::Home(None), &[Order::Home(None)]);
+    refused(&mut bench, VehicleCommand::SelectMode(0x0909_0000), CommandResult::Denied);
+    refused(&mut bench, VehicleCommand::SelectStandardMode(99), CommandResult::Denied);
+    leads_to(&mut bench, VehicleCommand::Speed(3.5), &[Order::Speed(3.5)]);
+    leads_to(&mut bench, VehicleCommand::Home(None), &[Order::Home(None)]);
     let there = place([40.0, -30.0, 0.0], Datum::Sea, 495.0);
-    leads_to(&mut bench, Command::Home(Some(there)), &[Order::Home(Some(Vector3::new(40.0, -30.0, 7.0)))]);
+    leads_to(&mut bench, VehicleCommand::Home(Some(there)), &[Order::Home(Some(Vector3::new(40.0, -30.0, 7.0)))]);
     // From here on home is the ordered place, 7 m high.
     for (above, metres, z) in [(Datum::Sea, 500.0, 12.0), (Datum::Home, 5.0, 12.0)] {
-        let go = Command::Reposition {
+        let go = VehicleCommand::Reposition {
             place: place([40.0, -30.0, 0.0], above, metres),
             yaw_rad: 0.5,
             speed_m_s: Some(2.0),
@@ -143,20 +148,24 @@ fn each_command_is_its_order() {
 #[test]
 fn without_an_origin_there_are_heights_only() {
     let mut bench = bench(false);
-    let go = |place| Command::Reposition { place, yaw_rad: f32::NAN, speed_m_s: None, changes_mode: true };
-    let unknown = Answer::Refused(NO_ORIGIN);
+    let go = |place| VehicleCommand::Reposition { place, yaw_rad: f32::NAN, speed_m_s: None, changes_mode: true };
+    let unknown = CommandResult::Refused(NO_ORIGIN);
     for above in [Datum::Sea, Datum::Home] {
         refused(&mut bench, go(place([4.0, 3.0, 0.0], above, 5.0)), unknown);
     }
     refused(&mut bench, go(height(500.0, Datum::Sea)), unknown);
-    refused(&mut bench, Command::TakeOff(Height { metres: 500.0, above: Datum::Sea }), unknown);
-    refused(&mut bench, Command::Home(Some(place([4.0, 3.0, 0.0], Datum::Sea, 500.0))), unknown);
+    refused(&mut bench, VehicleCommand::TakeOff(Height { metres: 500.0, above: Datum::Sea }), unknown);
+    refused(&mut bench, VehicleCommand::Home(Some(place([4.0, 3.0, 0.0], Datum::Sea, 500.0))), unknown);
     let position_m = Vector3::new(f32::NAN, f32::NAN, 5.0 + HOME[2]);
     let order = Order::GoTo { position_m, yaw_rad: f32::NAN, speed_m_s: None };
     leads_to(&mut bench, go(height(5.0, Datum::Home)), &[order]);
-    leads_to(&mut bench, Command::TakeOff(Height { metres: 4.0, above: Datum::Here }), &[Order::TakeOff(Some(4.0))]);
+    leads_to(
+        &mut bench,
+        VehicleCommand::TakeOff(Height { metres: 4.0, above: Datum::Here }),
+        &[Order::TakeOff(Some(4.0))],
+    );
     let order = Order::TakeOff(Some(4.0 + HOME[2] - HERE[2]));
-    leads_to(&mut bench, Command::TakeOff(Height { metres: 4.0, above: Datum::Home }), &[order]);
+    leads_to(&mut bench, VehicleCommand::TakeOff(Height { metres: 4.0, above: Datum::Home }), &[order]);
 }
 
 pub(crate) fn item(number: u16, command: u16) -> MissionItem {
@@ -168,15 +177,15 @@ pub(crate) fn item(number: u16, command: u16) -> MissionItem {
 
 /// Uploads these items. Returns the last acknowledgement.
 pub(crate) fn upload(bench: &mut Bench, items: &[MissionItem]) -> Option<MissionResult> {
-    bench.hear(Uplink::Mission(Mission::Count(items.len() as u16, Plan::MISSION)));
+    bench.hear(Uplink::Mission(MissionMessage::Count(items.len() as u16, MissionType::MISSION)));
     let mut result = None;
     for _ in 0..10 * (items.len() + 1) {
         for message in step(bench) {
             match message {
-                Downlink::Mission { message: Mission::Request(number, _), to: STATION } => {
-                    bench.hear(Uplink::Mission(Mission::Item(items[usize::from(number)], Plan::MISSION)));
+                Downlink::Mission { message: MissionMessage::Request(number, _), to: STATION } => {
+                    bench.hear(Uplink::Mission(MissionMessage::Item(items[usize::from(number)], MissionType::MISSION)));
                 }
-                Downlink::Mission { message: Mission::Ack(reported, _), to: STATION } => result = Some(reported),
+                Downlink::Mission { message: MissionMessage::Ack(reported, _), to: STATION } => result = Some(reported),
                 _ => (),
             }
         }
@@ -187,24 +196,24 @@ pub(crate) fn upload(bench: &mut Bench, items: &[MissionItem]) -> Option<Mission
 #[test]
 fn missions_begin_and_go_on_at_items_that_there_are() {
     let mut bench = bench(true);
-    let none = Answer::Refused(OrderRefusal::NoMission as i32);
-    refused(&mut bench, Command::StartMission(0, None), none);
+    let none = CommandResult::Refused(OrderRefusal::NoMission as i32);
+    refused(&mut bench, VehicleCommand::StartMission(0, None), none);
     for (number, resets) in [(Some(0), false), (None, false), (None, true)] {
-        refused(&mut bench, Command::SetCurrent(number, resets), none);
+        refused(&mut bench, VehicleCommand::SetCurrent(number, resets), none);
     }
     assert!(!bench.comms.has_mail());
     assert_eq!(upload(&mut bench, &[item(0, 16), item(1, 16)]), Some(MissionResult::ACCEPTED));
     let select = Order::Select(FlightMode::Mission);
-    leads_to(&mut bench, Command::StartMission(0, None), &[select]);
-    leads_to(&mut bench, Command::StartMission(1, Some(1)), &[Order::Resume(1), select]);
-    leads_to(&mut bench, Command::SetCurrent(Some(1), false), &[Order::Resume(1)]);
-    leads_to(&mut bench, Command::SetCurrent(Some(0), true), &[Order::Resume(0)]);
+    leads_to(&mut bench, VehicleCommand::StartMission(0, None), &[select]);
+    leads_to(&mut bench, VehicleCommand::StartMission(1, Some(1)), &[Order::Resume(1), select]);
+    leads_to(&mut bench, VehicleCommand::SetCurrent(Some(1), false), &[Order::Resume(1)]);
+    leads_to(&mut bench, VehicleCommand::SetCurrent(Some(0), true), &[Order::Resume(0)]);
     // Commands about the present item do not change it, with or without a reset.
-    refused(&mut bench, Command::SetCurrent(None, false), Answer::Accepted);
-    refused(&mut bench, Command::SetCurrent(None, true), Answer::Accepted);
-    refused(&mut bench, Command::StartMission(2, None), none);
-    refused(&mut bench, Command::StartMission(0, Some(2)), none);
-    refused(&mut bench, Command::SetCurrent(Some(2), true), none);
+    refused(&mut bench, VehicleCommand::SetCurrent(None, false), CommandResult::Accepted);
+    refused(&mut bench, VehicleCommand::SetCurrent(None, true), CommandResult::Accepted);
+    refused(&mut bench, VehicleCommand::StartMission(2, None), none);
+    refused(&mut bench, VehicleCommand::StartMission(0, Some(2)), none);
+    refused(&mut bench, VehicleCommand::SetCurrent(Some(2), true), none);
 }
 
 /// The guidance gets the item that it asks for once. Then there are no inputs without bytes.
@@ -220,7 +229,7 @@ fn the_wanted_item_is_handed_over_once() {
     };
     // The item was handed over with the first state after the upload.
     assert_eq!((bench.comms.has_mail(), legs(&mut bench)), (false, None));
-    bench.hear(Uplink::Command(Command::SetCurrent(Some(1), false)));
+    bench.hear(Uplink::Command(VehicleCommand::SetCurrent(Some(1), false)));
     bench.step();
     assert!(bench.comms.has_mail(), "it wants the other one");
     let leg = legs(&mut bench).expect("handed over");
@@ -237,10 +246,10 @@ pub(crate) trait Current {
 impl Current for Bench {
     /// Requests MISSION_CURRENT.
     fn comms_current(&mut self) -> afbc_mavlink::MissionCurrent {
-        self.hear(Uplink::Command(Command::RequestMessage { message: id::MISSION_CURRENT, index: 0 }));
+        self.hear(Uplink::Command(VehicleCommand::RequestMessage { message: id::MISSION_CURRENT, index: 0 }));
         let said = step(self);
         let current = said.iter().find_map(|message| match message {
-            Downlink::Mission { message: Mission::Current(current), .. } => Some(*current),
+            Downlink::Mission { message: MissionMessage::Current(current), .. } => Some(*current),
             _ => None,
         });
         current.expect("sent")
@@ -251,41 +260,43 @@ impl Current for Bench {
 #[test]
 fn orders_are_for_the_station_in_control() {
     let mut bench = bench(true);
-    leads_to(&mut bench, Command::Speed(2.0), &[Order::Speed(2.0)]);
+    leads_to(&mut bench, VehicleCommand::Speed(2.0), &[Order::Speed(2.0)]);
     let mut reported = |command| {
         bench.hear_from(OTHER, Uplink::Command(command));
         assert!(bench.inputs.orders.given.is_empty());
         let said = step(&mut bench);
         said.into_iter().find_map(|message| match message {
-            Downlink::Answer { answer, to: OTHER, .. } => Some(answer),
+            Downlink::CommandAck { answer, to: OTHER, .. } => Some(answer),
             _ => None,
         })
     };
     for command in [
-        Command::Land,
-        Command::Return,
-        Command::Speed(1.0),
-        Command::Home(None),
-        Command::SelectMode(0x0304_0000),
-        Command::SelectStandardMode(7),
-        Command::StartMission(0, None),
-        Command::SetCurrent(Some(0), false),
-        Command::Reboot(Reboot::Program),
-        Command::Reboot(Reboot::BootLoader),
-        Command::Arm,
-        Command::Engage,
-        Command::SelfTest,
-        Command::Storage(Storage::Reset),
-        Command::TakeOff(Height { metres: 2.0, above: Datum::Here }),
+        VehicleCommand::Land,
+        VehicleCommand::Return,
+        VehicleCommand::Speed(1.0),
+        VehicleCommand::Home(None),
+        VehicleCommand::SelectMode(0x0304_0000),
+        VehicleCommand::SelectStandardMode(7),
+        VehicleCommand::StartMission(0, None),
+        VehicleCommand::SetCurrent(Some(0), false),
+        VehicleCommand::Reboot(Reboot::Program),
+        VehicleCommand::Reboot(Reboot::BootLoader),
+        VehicleCommand::Arm,
+        VehicleCommand::Engage,
+        VehicleCommand::SelfTest,
+        VehicleCommand::Storage(Storage::Reset),
+        VehicleCommand::TakeOff(Height { metres: 2.0, above: Datum::Here }),
     ] {
-        assert_eq!(reported(command), Some(Answer::Refused(NOT_IN_CONTROL)), "{command:?}");
+        assert_eq!(reported(command), Some(CommandResult::Refused(NOT_IN_CONTROL)), "{command:?}");
     }
-    for command in [Command::Disarm, Command::Kill, Command::CheckArming, Command::RequestProtocol] {
-        assert_eq!(reported(command), Some(Answer::Accepted), "{command:?}");
+    for command in
+        [VehicleCommand::Disarm, VehicleCommand::Kill, VehicleCommand::CheckArming, VehicleCommand::RequestProtocol]
+    {
+        assert_eq!(reported(command), Some(CommandResult::Accepted), "{command:?}");
     }
     assert_eq!(
-        [Command::Denied(178), Command::Other(9)].map(reported),
-        [Some(Answer::Denied), Some(Answer::Unsupported)]
+        [VehicleCommand::Denied(178), VehicleCommand::Other(9)].map(reported),
+        [Some(CommandResult::Denied), Some(CommandResult::Unsupported)]
     );
 }
 
@@ -293,44 +304,44 @@ fn orders_are_for_the_station_in_control() {
 #[test]
 fn its_own_messages_are_not_heard() {
     let mut bench = bench(true);
-    bench.hear_from(VEHICLE, Uplink::Command(Command::Other(60_000)));
+    bench.hear_from(VEHICLE, Uplink::Command(VehicleCommand::Other(60_000)));
     let said = step(&mut bench);
-    assert!(!said.iter().any(|message| matches!(message, Downlink::Answer { .. })), "{said:?}");
+    assert!(!said.iter().any(|message| matches!(message, Downlink::CommandAck { .. })), "{said:?}");
 }
 
 #[test]
 fn messages_on_request_are_sent_or_refused_with_the_reason() {
     let mut bench = bench(true);
     let ask = |bench: &mut Bench, message, index| {
-        let (none, answer) = orders(bench, Command::RequestMessage { message, index });
+        let (none, answer) = orders(bench, VehicleCommand::RequestMessage { message, index });
         assert_eq!(none, []);
         answer.expect("answered")
     };
     for index in 0..=u32::from(modes::COUNT) {
-        assert_eq!(ask(&mut bench, id::AVAILABLE_MODES, index), Answer::Accepted);
+        assert_eq!(ask(&mut bench, id::AVAILABLE_MODES, index), CommandResult::Accepted);
     }
-    assert_eq!(ask(&mut bench, id::AVAILABLE_MODES, u32::from(modes::COUNT) + 1), Answer::Denied);
-    assert_eq!(ask(&mut bench, 9_999, 0), Answer::Unsupported);
-    assert_eq!(ask(&mut bench, id::BATTERY_STATUS, 0), Answer::Refused(NOT_KNOWN));
+    assert_eq!(ask(&mut bench, id::AVAILABLE_MODES, u32::from(modes::COUNT) + 1), CommandResult::Denied);
+    assert_eq!(ask(&mut bench, 9_999, 0), CommandResult::Unsupported);
+    assert_eq!(ask(&mut bench, id::BATTERY_STATUS, 0), CommandResult::Refused(NOT_KNOWN));
     let battery =
         BatteryStatus { voltage_mv: 11_100, current_ca: -1, remaining_percent: -1, consumed_mah: -1, charge: 0 };
     bench.comms.set_aux_sensors(AuxSensors { battery: Some(battery), origin: Some(origin()), ..AuxSensors::default() });
-    assert_eq!(ask(&mut bench, id::BATTERY_STATUS, 0), Answer::Accepted);
+    assert_eq!(ask(&mut bench, id::BATTERY_STATUS, 0), CommandResult::Accepted);
     // A request for all modes is answered by each mode in order.
     (0..20).for_each(|_| drop(step(&mut bench)));
-    bench.hear(Uplink::Command(Command::RequestMessage { message: id::AVAILABLE_MODES, index: 0 }));
+    bench.hear(Uplink::Command(VehicleCommand::RequestMessage { message: id::AVAILABLE_MODES, index: 0 }));
     let places: Vec<_> = (0..20)
         .flat_map(|_| step(&mut bench))
         .filter_map(|message| match message {
-            Downlink::AvailableMode(mode) => Some(mode.place),
+            Downlink::AvailableMode(mode) => Some(mode.index),
             _ => None,
         })
         .collect();
     assert!(places.iter().copied().eq(1..=modes::COUNT), "{places:?}");
     // Two messages have request commands of their own.
     for (command, is_it) in [
-        (Command::RequestProtocol, (|it| *it == Telemetry::Protocol) as fn(&Telemetry) -> bool),
-        (Command::RequestCapabilities, |it| matches!(it, Telemetry::Version(_))),
+        (VehicleCommand::RequestProtocol, (|it| *it == Telemetry::Protocol) as fn(&Telemetry) -> bool),
+        (VehicleCommand::RequestCapabilities, |it| matches!(it, Telemetry::Version(_))),
     ] {
         bench.hear(Uplink::Command(command));
         let said: Vec<_> = (0..5).flat_map(|_| step(&mut bench)).collect();
@@ -338,29 +349,29 @@ fn messages_on_request_are_sent_or_refused_with_the_reason() {
         assert!(sent, "{command:?}: {said:?}");
     }
     // A message without an index cannot be requested with one.
-    assert_eq!(ask(&mut bench, id::ATTITUDE, 1), Answer::Denied);
+    assert_eq!(ask(&mut bench, id::ATTITUDE, 1), CommandResult::Denied);
     (0..20).for_each(|_| drop(step(&mut bench)));
     // There are more requests than the queue has room for.
     for _ in 0..40 {
-        bench.hear(Uplink::Command(Command::RequestProtocol));
+        bench.hear(Uplink::Command(VehicleCommand::RequestProtocol));
     }
     let said: Vec<_> = (0..30).flat_map(|_| step(&mut bench)).collect();
-    let count = |wanted: Answer| {
+    let count = |wanted: CommandResult| {
         said.iter()
-            .filter(|it| matches!(it, Downlink::Answer { command: 519, answer, .. } if *answer == wanted))
+            .filter(|it| matches!(it, Downlink::CommandAck { command: 519, answer, .. } if *answer == wanted))
             .count()
     };
-    assert_eq!((count(Answer::Accepted), count(Answer::Refused(BUSY))), (16, 24));
+    assert_eq!((count(CommandResult::Accepted), count(CommandResult::Refused(BUSY))), (16, 24));
 }
 
 #[test]
 fn intervals_are_set_and_reported_on_the_wire() {
     let mut bench = bench(true);
-    let set = |message, interval_us| Command::SetInterval { message, interval_us };
-    refused(&mut bench, set(id::ATTITUDE, 5_000), Answer::Accepted);
-    refused(&mut bench, set(9_999, 5_000), Answer::Unsupported);
+    let set = |message, interval_us| VehicleCommand::SetInterval { message, interval_us };
+    refused(&mut bench, set(id::ATTITUDE, 5_000), CommandResult::Accepted);
+    refused(&mut bench, set(9_999, 5_000), CommandResult::Unsupported);
     for (message, expected) in [(id::ATTITUDE, 5_000), (9_999, 0), (id::GPS_GLOBAL_ORIGIN, -1)] {
-        bench.hear(Uplink::Command(Command::GetInterval(message)));
+        bench.hear(Uplink::Command(VehicleCommand::GetInterval(message)));
         let said: Vec<_> = (0..3).flat_map(|_| step(&mut bench)).collect();
         let interval = said.iter().find_map(|it| match it {
             Downlink::Interval(interval) => Some((interval.message, interval.interval_us)),
@@ -375,23 +386,23 @@ fn intervals_are_set_and_reported_on_the_wire() {
 fn it_reboots_where_it_can_and_disarmed_only() {
     let both: &[Reboot] = &[Reboot::Program, Reboot::BootLoader];
     for (reboots, into, armed, expected) in [
-        (&[] as &[_], Reboot::Program, false, Answer::Unsupported),
-        (&[Reboot::Program], Reboot::BootLoader, false, Answer::Unsupported),
-        (&[Reboot::Program], Reboot::BootLoader, true, Answer::Unsupported),
-        (&[Reboot::Program], Reboot::Program, false, Answer::Accepted),
-        (both, Reboot::Program, false, Answer::Accepted),
-        (both, Reboot::BootLoader, false, Answer::Accepted),
-        (both, Reboot::Program, true, Answer::Refused(Refusal::AlreadyArmed as i32)),
-        (both, Reboot::BootLoader, true, Answer::Refused(Refusal::AlreadyArmed as i32)),
+        (&[] as &[_], Reboot::Program, false, CommandResult::Unsupported),
+        (&[Reboot::Program], Reboot::BootLoader, false, CommandResult::Unsupported),
+        (&[Reboot::Program], Reboot::BootLoader, true, CommandResult::Unsupported),
+        (&[Reboot::Program], Reboot::Program, false, CommandResult::Accepted),
+        (both, Reboot::Program, false, CommandResult::Accepted),
+        (both, Reboot::BootLoader, false, CommandResult::Accepted),
+        (both, Reboot::Program, true, CommandResult::Refused(Refusal::AlreadyArmed as i32)),
+        (both, Reboot::BootLoader, true, CommandResult::Refused(Refusal::AlreadyArmed as i32)),
     ] {
         let mut bench = if armed { Bench::flying() } else { Bench::new() };
         bench.comms = Comms::with(Setup { reboots, ..Setup::default() });
         bench.step();
-        bench.hear(Uplink::Command(Command::Reboot(into)));
+        bench.hear(Uplink::Command(VehicleCommand::Reboot(into)));
         // The answer is sent before the shell reboots.
         let said = bench.step().1;
-        let answered = said.iter().any(|it| matches!(it, Downlink::Answer { answer, .. } if *answer == expected));
-        let wanted = Some(into).filter(|_| expected == Answer::Accepted);
+        let answered = said.iter().any(|it| matches!(it, Downlink::CommandAck { answer, .. } if *answer == expected));
+        let wanted = Some(into).filter(|_| expected == CommandResult::Accepted);
         assert!(answered && bench.comms.wants_reboot() == wanted, "{reboots:?} {into:?} {armed}: {said:?}");
     }
 }
@@ -400,15 +411,15 @@ fn it_reboots_where_it_can_and_disarmed_only() {
 fn stored_parameters_are_restored_disarmed_only() {
     let mut disarmed = bench(true);
     for (storage, changes) in [(Storage::Load, 0), (Storage::Save, 0), (Storage::Reset, 1)] {
-        refused(&mut disarmed, Command::Storage(storage), Answer::Accepted);
+        refused(&mut disarmed, VehicleCommand::Storage(storage), CommandResult::Accepted);
         assert_eq!(disarmed.changes.len(), changes);
     }
     assert_eq!(disarmed.changes, [RecordChange::Restored]);
     let mut armed = Bench::flying();
-    armed.hear(Uplink::Command(Command::Storage(Storage::Reset)));
+    armed.hear(Uplink::Command(VehicleCommand::Storage(Storage::Reset)));
     let said = armed.tick(&State::default()).1;
-    let refusal = Answer::Refused(Refusal::AlreadyArmed as i32);
-    assert!(said.iter().any(|it| matches!(it, Downlink::Answer { answer, .. } if *answer == refusal)), "{said:?}");
+    let refusal = CommandResult::Refused(Refusal::AlreadyArmed as i32);
+    assert!(said.iter().any(|it| matches!(it, Downlink::CommandAck { answer, .. } if *answer == refusal)), "{said:?}");
     assert_eq!(armed.changes, []);
 }
 
@@ -434,11 +445,11 @@ fn targets_and_sticks_reach_the_guidance() {
         (target, sticks)
     };
     for (axes, position_m, velocity_m_s, flown_m, body) in [
-        (Axes::Local, step_m, fast, step_m, false),
-        (Axes::Offset, step_m, fast, Vector3::from(HERE) + step_m, false),
-        (Axes::Body, nan, fast, nan, true),
-        (Axes::Body, step_m, nan, step_m, false),
-        (Axes::BodyOffset, step_m, nan, step_m, true),
+        (TargetFrame::Local, step_m, fast, step_m, false),
+        (TargetFrame::Offset, step_m, fast, Vector3::from(HERE) + step_m, false),
+        (TargetFrame::Body, nan, fast, nan, true),
+        (TargetFrame::Body, step_m, nan, step_m, false),
+        (TargetFrame::BodyOffset, step_m, nan, step_m, true),
     ] {
         let (target, _) =
             reported(STATION, Uplink::Target(ExternalTarget::Motion(motion(axes, position_m, velocity_m_s))));
@@ -447,7 +458,8 @@ fn targets_and_sticks_reach_the_guidance() {
         assert_eq!(format!("{found:?}"), format!("{:?}", (flown_m, velocity_m_s, 0.25, body)), "{axes:?}");
     }
     let there = place([40.0, -30.0, 0.0], Datum::Sea, 500.0);
-    let (target, _) = reported(STATION, Uplink::Target(ExternalTarget::Place(there, motion(Axes::Local, nan, fast))));
+    let (target, _) =
+        reported(STATION, Uplink::Target(ExternalTarget::GlobalPosition(there, motion(TargetFrame::Local, nan, fast))));
     let Some(afbc_guidance::OffboardTarget::Motion(target)) = target else { panic!("{target:?}") };
     assert!((target.position_m - Vector3::new(40.0, -30.0, 12.0)).norm() < 0.02, "{target:?}");
     assert_eq!((target.velocity_m_s, target.body), (fast, false));
@@ -474,7 +486,7 @@ fn an_offset_from_nowhere_is_no_target() {
     let mut bench = Bench::new();
     bench.step();
     let nan = Vector3::from_element(f32::NAN);
-    for (axes, taken) in [(Axes::Offset, false), (Axes::Local, true)] {
+    for (axes, taken) in [(TargetFrame::Offset, false), (TargetFrame::Local, true)] {
         let motion = PositionTarget {
             axes,
             position_m: Vector3::new(1.0, 2.0, 3.0),
@@ -492,7 +504,7 @@ fn an_offset_from_nowhere_is_no_target() {
 #[test]
 fn the_guidance_hears_of_the_station_in_control() {
     let mut bench = bench(true);
-    leads_to(&mut bench, Command::Speed(2.0), &[Order::Speed(2.0)]);
+    leads_to(&mut bench, VehicleCommand::Speed(2.0), &[Order::Speed(2.0)]);
     let mut heard = |from: Address| {
         let mut times = Vec::new();
         for _ in 0..1000 {
@@ -541,16 +553,19 @@ fn a_mission_reports_how_far_it_is() {
     report.guided.reached = Some(0);
     let said = bench.said(&report);
     let reached = |said: &[Downlink], number| {
-        said.iter().any(
-            |it| matches!(it, Downlink::Mission { message: Mission::Reached(reported), .. } if *reported == number),
-        )
+        said.iter().any(|it| {
+            matches!(
+                it,
+                Downlink::Mission { message: MissionMessage::Reached(reported), .. } if *reported == number
+            )
+        })
     };
     assert!(reached(&said, 0), "{said:?}");
     let current = |bench: &mut Bench, report: &Report| {
-        bench.hear(Uplink::Command(Command::RequestMessage { message: id::MISSION_CURRENT, index: 0 }));
+        bench.hear(Uplink::Command(VehicleCommand::RequestMessage { message: id::MISSION_CURRENT, index: 0 }));
         let said = bench.said(report);
         let current = said.iter().find_map(|it| match it {
-            Downlink::Mission { message: Mission::Current(it), .. } => Some((it.number, it.state, it.mode)),
+            Downlink::Mission { message: MissionMessage::Current(it), .. } => Some((it.number, it.state, it.mode)),
             _ => None,
         });
         current.expect("sent")
@@ -568,7 +583,7 @@ fn a_mission_reports_how_far_it_is() {
 /// This checks the test's own conversion of places.
 #[test]
 fn places_of_the_test_are_where_they_say() {
-    let Place { latitude_e7, longitude_e7, .. } = place([40.0, -30.0, 0.0], Datum::Sea, 0.0);
+    let GlobalPosition { latitude_e7, longitude_e7, .. } = place([40.0, -30.0, 0.0], Datum::Sea, 0.0);
     let back = origin().local(&Global::of_e7([latitude_e7, longitude_e7], 488.0));
     assert!((back - Vector3::new(40.0, -30.0, 0.0)).norm() < 0.02, "{back}");
 }

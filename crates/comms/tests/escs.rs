@@ -8,7 +8,7 @@ use afbc_estimator::OutputFilter;
 use afbc_flight_core::Mode;
 use afbc_guidance::{FlightMode, Order};
 use afbc_mavlink::telemetry::{EscInfo, EscStatus};
-use afbc_mavlink::{Command, Downlink, MavSeverity, Telemetry, Uplink};
+use afbc_mavlink::{Downlink, MavSeverity, Telemetry, Uplink, VehicleCommand};
 use afbc_onboard::{Configuration, EscSettings, Report, RotorFailure};
 use afbc_types::{ROTORS_MAX, RotorSpeeds};
 use nalgebra::SVector;
@@ -171,7 +171,7 @@ fn stations_see_what_controllers_tell() {
         messages
     };
     let mut ask = |message, index| {
-        vehicle.bench.hear(Uplink::Command(Command::RequestMessage { message, index }));
+        vehicle.bench.hear(Uplink::Command(VehicleCommand::RequestMessage { message, index }));
         let said: Vec<_> = (0..5).flat_map(|_| step(&mut vehicle)).collect();
         said.into_iter().find_map(|message| match message {
             Downlink::Telemetry(told @ (Telemetry::EscInfo(_) | Telemetry::EscStatus(_))) => Some(told),
@@ -195,7 +195,7 @@ fn stations_see_what_controllers_tell() {
         assert_eq!(temperatures_cc, [0; 4]);
     }
     // A stream sends the two groups in turn, one per interval.
-    vehicle.bench.hear(Uplink::Command(Command::SetInterval { message: id::ESC_STATUS, interval_us: 50_000 }));
+    vehicle.bench.hear(Uplink::Command(VehicleCommand::SetInterval { message: id::ESC_STATUS, interval_us: 50_000 }));
     let pages: Vec<_> = (0..1000)
         .flat_map(|_| step(&mut vehicle))
         .filter_map(|message| match message {
@@ -221,7 +221,7 @@ fn what_has_come_over_the_line_is_shown() {
         answer = if rotor < 3 { reading(rotor).to_bytes().to_vec() } else { Vec::new() };
     }
     for message in [id::ESC_STATUS, id::ESC_INFO] {
-        vehicle.bench.hear(Uplink::Command(Command::RequestMessage { message, index: 0 }));
+        vehicle.bench.hear(Uplink::Command(VehicleCommand::RequestMessage { message, index: 0 }));
     }
     let said: Vec<_> = (0..5).flat_map(|_| vehicle.tick(&EscsHeard::default()).1).collect();
     let status = said.iter().find_map(|message| match message {
@@ -265,7 +265,7 @@ fn a_failed_rotor_is_reported() {
         let mut failures = [None; ROTORS_MAX];
         failures[rotor] = Some(failure);
         assert_eq!(vehicle.bench.comms.esc_telemetry().failures, failures);
-        vehicle.bench.hear(Uplink::Command(Command::RequestMessage { message: id::ESC_INFO, index: 0 }));
+        vehicle.bench.hear(Uplink::Command(VehicleCommand::RequestMessage { message: id::ESC_INFO, index: 0 }));
         let heard = EscsHeard { bytes: &[], speeds_rev_min: electrical(&speeds) };
         let said: Vec<_> = (0..3).flat_map(|_| vehicle.tick(&heard).1).collect();
         let flags = said.iter().find_map(|message| match message {

@@ -2,7 +2,7 @@
 
 use crate::common::Bench;
 use afbc_flight_core::{EndReason, Mode};
-use afbc_guidance::Cause;
+use afbc_guidance::FailsafeCause;
 use afbc_mavlink::{Downlink, MavSeverity, Uplink};
 use afbc_onboard::Report;
 use afbc_types::{Setpoint, State};
@@ -114,7 +114,7 @@ fn other_states_are_reported_once_each_time() {
             true,
         ),
         (|report, on| report.shaken = on, &[(WARNING, "vibration above 4.9 m/s2: check rotors and mounts")], false),
-        (|report, on| report.guided.failsafe = on.then_some(Cause::Fence), &[], true),
+        (|report, on| report.guided.failsafe = on.then_some(FailsafeCause::Fence), &[], true),
     ];
     for (set, expected, is_failsafe) in cases {
         let mut bench = Bench::new();

@@ -4,10 +4,10 @@
 use crate::commands::{bench, origin};
 use crate::common::{Bench, STATION};
 use afbc_flight_core::Mode;
-use afbc_guidance::{FenceView, FlightMode, Item, Leg, OrderRefusal};
+use afbc_guidance::{FenceStatus, FlightMode, Item, OrderRefusal, RequestedItem};
 use afbc_mavlink::{
-    Answer, Command, Datum, Downlink, FRAME_MAX, Height, Mission, MissionItem, MissionResult, Place, Plan, Sender,
-    Uplink,
+    CommandResult, Datum, Downlink, Encoder, FRAME_MAX, GlobalPosition, Height, MissionItem, MissionMessage,
+    MissionResult, MissionType, Uplink, VehicleCommand,
 };
 use afbc_onboard::{ControlInputs, Report};
 use afbc_types::{PoseSigmas, Setpoint, State};
@@ -67,7 +67,7 @@ impl Vehicle {
 
     fn hear(&mut self, message: &Uplink) {
         let mut buffer = [0; FRAME_MAX];
-        let update = self.bench.receive(Sender::new(STATION).send(message, &mut buffer));
+        let update = self.bench.receive(Encoder::new(STATION).send(message, &mut buffer));
         self.inputs.merge(&update);
     }
 
@@ -88,16 +88,16 @@ impl Vehicle {
     }
 
     /// Uploads a plan. Returns the result.
-    pub(crate) fn upload(&mut self, plan: Plan, items: &[MissionItem]) -> MissionResult {
-        self.hear(&Uplink::Mission(Mission::Count(items.len() as u16, plan)));
+    pub(crate) fn upload(&mut self, plan: MissionType, items: &[MissionItem]) -> MissionResult {
+        self.hear(&Uplink::Mission(MissionMessage::Count(items.len() as u16, plan)));
         for _ in 0..10 * (items.len() + 1) {
             for message in self.tick() {
                 match message {
-                    Downlink::Mission { message: Mission::Request(number, _), .. } => {
+                    Downlink::Mission { message: MissionMessage::Request(number, _), .. } => {
                         let item = MissionItem { number, ..items[usize::from(number)] };
-                        self.hear(&Uplink::Mission(Mission::Item(item, plan)));
+                        self.hear(&Uplink::Mission(MissionMessage::Item(item, plan)));
                     }
-                    Downlink::Mission { message: Mission::Ack(result, _), .. } => return result,
+                    Downlink::Mission { message: MissionMessage::Ack(result, _), .. } => return result,
                     _ => (),
                 }
             }
@@ -106,7 +106,7 @@ impl Vehicle {
     }
 
     /// Returns true if a command's order reaches the guidance. Otherwise checks that the station is told the reason.
-    fn allows(&mut self, command: Command) -> bool {
+    fn allows(&mut self, command: VehicleCommand) -> bool {
         self.pass(5);
         self.inputs = ControlInputs::EMPTY;
         self.hear(&Uplink::Command(command));
@@ -115,14 +115,15 @@ impl Vehicle {
         let mut said = self.tick();
         self.report.guided.answer = None;
         said.extend(self.pass(2));
-        let is =
-            |wanted: Answer| said.iter().any(|it| matches!(it, Downlink::Answer { answer, .. } if *answer == wanted));
+        let is = |wanted: CommandResult| {
+            said.iter().any(|it| matches!(it, Downlink::CommandAck { answer, .. } if *answer == wanted))
+        };
         let text = said
             .iter()
             .any(|it| matches!(it, Downlink::Text { text, .. } if text.to_str().is_ok_and(|it| it.contains("fence"))));
-        let refused = is(Answer::Refused(OrderRefusal::OutsideFence as i32));
+        let refused = is(CommandResult::Refused(OrderRefusal::OutsideFence as i32));
         assert_eq!(
-            (refused, text, is(Answer::Accepted)),
+            (refused, text, is(CommandResult::Accepted)),
             (given.is_none(), given.is_none(), given.is_some()),
             "{said:?}"
         );
@@ -138,7 +139,7 @@ impl Vehicle {
     }
 
     /// Returns the mission item that the guidance gets when it asks for this one.
-    pub(crate) fn leg(&mut self, wanted: u16) -> Leg {
+    pub(crate) fn leg(&mut self, wanted: u16) -> RequestedItem {
         self.inputs = ControlInputs::EMPTY;
         self.report.guided.wanted = wanted;
         self.pass(3);
@@ -146,7 +147,7 @@ impl Vehicle {
     }
 
     /// Returns the state of the fence that the guidance is told while the vehicle moves at this velocity.
-    fn view(&mut self, position_m: [f32; 2], velocity_m_s: [f32; 2]) -> FenceView {
+    fn view(&mut self, position_m: [f32; 2], velocity_m_s: [f32; 2]) -> FenceStatus {
         self.put(position_m);
         (self.state.velocity_m_s.x, self.state.velocity_m_s.y) = velocity_m_s.into();
         self.pass(20);
@@ -154,16 +155,16 @@ impl Vehicle {
     }
 }
 
-fn go(place_m: [f32; 2]) -> Command {
+fn go(place_m: [f32; 2]) -> VehicleCommand {
     let [latitude_e7, longitude_e7] = at(place_m);
-    let place = Place { latitude_e7, longitude_e7, height: Height { metres: 5.0, above: Datum::Home } };
-    Command::Reposition { place, yaw_rad: f32::NAN, speed_m_s: None, changes_mode: true }
+    let place = GlobalPosition { latitude_e7, longitude_e7, height: Height { metres: 5.0, above: Datum::Home } };
+    VehicleCommand::Reposition { place, yaw_rad: f32::NAN, speed_m_s: None, changes_mode: true }
 }
 
-fn circle(centre_m: Option<[f32; 2]>, radius_m: f32) -> Command {
-    let [latitude_e7, longitude_e7] = centre_m.map_or([Place::AS_IT_IS; 2], at);
-    let place = Place { latitude_e7, longitude_e7, height: Height { metres: 5.0, above: Datum::Home } };
-    Command::Orbit { place, radius_m, speed_m_s: f32::NAN, angle_deg: 0, heading: 0 }
+fn circle(centre_m: Option<[f32; 2]>, radius_m: f32) -> VehicleCommand {
+    let [latitude_e7, longitude_e7] = centre_m.map_or([GlobalPosition::AS_IT_IS; 2], at);
+    let place = GlobalPosition { latitude_e7, longitude_e7, height: Height { metres: 5.0, above: Datum::Home } };
+    VehicleCommand::Orbit { place, radius_m, speed_m_s: f32::NAN, angle_deg: 0, heading: 0 }
 }
 
 /// The destination of an order and the straight path to it must be inside with a margin. A circle must be inside as a
@@ -206,11 +207,14 @@ fn orders_must_stay_inside() {
         }
         // These orders stay at the present place at another height, or have no place.
         let height = Height { metres: 20.0, above: Datum::Home };
-        let place = Place { latitude_e7: Place::AS_IT_IS, longitude_e7: Place::AS_IT_IS, height };
-        let up = Command::Reposition { place, yaw_rad: f32::NAN, speed_m_s: None, changes_mode: true };
-        assert!(vehicle.allows(up) && vehicle.allows(Command::Land) && vehicle.allows(Command::Speed(2.0)));
+        let place =
+            GlobalPosition { latitude_e7: GlobalPosition::AS_IT_IS, longitude_e7: GlobalPosition::AS_IT_IS, height };
+        let up = VehicleCommand::Reposition { place, yaw_rad: f32::NAN, speed_m_s: None, changes_mode: true };
+        assert!(
+            vehicle.allows(up) && vehicle.allows(VehicleCommand::Land) && vehicle.allows(VehicleCommand::Speed(2.0))
+        );
         if !has_fence {
-            assert_eq!(vehicle.upload(Plan::FENCE, &fence([30.0, 30.0], 5.0)), MissionResult::ACCEPTED);
+            assert_eq!(vehicle.upload(MissionType::FENCE, &fence([30.0, 30.0], 5.0)), MissionResult::ACCEPTED);
         }
     }
 }
@@ -220,20 +224,20 @@ fn orders_must_stay_inside() {
 fn a_return_must_have_a_clear_way() {
     let mut vehicle = Vehicle::new();
     vehicle.report.guided.airborne = true;
-    let back = Command::Return;
+    let back = VehicleCommand::Return;
     assert!(vehicle.allows(back));
-    assert_eq!(vehicle.upload(Plan::FENCE, &fence([30.0, 30.0], 5.0)), MissionResult::ACCEPTED);
+    assert_eq!(vehicle.upload(MissionType::FENCE, &fence([30.0, 30.0], 5.0)), MissionResult::ACCEPTED);
     assert!(vehicle.allows(back));
     let between = [0, 1].map(|axis| 0.5 * (HOME[axis] + HERE[axis]));
-    assert_eq!(vehicle.upload(Plan::FENCE, &fence(between, 2.0)), MissionResult::ACCEPTED);
+    assert_eq!(vehicle.upload(MissionType::FENCE, &fence(between, 2.0)), MissionResult::ACCEPTED);
     assert!(!vehicle.allows(back));
     vehicle.report.guided.airborne = false;
     assert!(vehicle.allows(back));
     vehicle.report.guided.airborne = true;
     // Home is inside an excluded disc. Then a nearer rally point with a clear path is added.
-    assert_eq!(vehicle.upload(Plan::FENCE, &fence(HOME, 2.0)), MissionResult::ACCEPTED);
+    assert_eq!(vehicle.upload(MissionType::FENCE, &fence(HOME, 2.0)), MissionResult::ACCEPTED);
     assert!(!vehicle.allows(back));
-    assert_eq!(vehicle.upload(Plan::RALLY, &[rally([15.0, -10.0])]), MissionResult::ACCEPTED);
+    assert_eq!(vehicle.upload(MissionType::RALLY, &[rally([15.0, -10.0])]), MissionResult::ACCEPTED);
     vehicle.pass(600);
     assert!(vehicle.allows(back));
 }
@@ -250,16 +254,16 @@ fn items_outside_are_handed_over_without_a_place() {
         .flat_map(|command| [way(command, inside), way(command, outside)])
         .chain([land_here])
         .collect();
-    let place = |leg: &Leg| match leg.item {
+    let place = |leg: &RequestedItem| match leg.item {
         Item::Waypoint { position_m, .. } | Item::TakeOffTo { position_m } | Item::Land { position_m } => position_m,
         Item::Turns { centre_m, .. } => centre_m,
         other => panic!("{other:?}"),
     };
     // The mission is uploaded first: an existing fence would refuse it.
-    assert_eq!(vehicle.upload(Plan::MISSION, &items), MissionResult::ACCEPTED);
+    assert_eq!(vehicle.upload(MissionType::MISSION, &items), MissionResult::ACCEPTED);
     for has_fence in [false, true] {
         if has_fence {
-            assert_eq!(vehicle.upload(Plan::FENCE, &fence([30.0, 30.0], 5.0)), MissionResult::ACCEPTED);
+            assert_eq!(vehicle.upload(MissionType::FENCE, &fence([30.0, 30.0], 5.0)), MissionResult::ACCEPTED);
         }
         for number in (0..items.len() as u16).rev() {
             let leg = vehicle.leg(number);
@@ -283,7 +287,7 @@ fn a_return_lands_at_the_nearest_place() {
     let mut vehicle = Vehicle::new();
     assert_eq!(vehicle.safe(1200), None, "home, which the guidance knows");
     let points = [[12.0, -6.0], [-40.0, 0.0], [60.0, 60.0]];
-    assert_eq!(vehicle.upload(Plan::RALLY, &points.map(rally)), MissionResult::ACCEPTED);
+    assert_eq!(vehicle.upload(MissionType::RALLY, &points.map(rally)), MissionResult::ACCEPTED);
     assert_eq!(vehicle.safe(501), Some(points[0]));
     assert_eq!((vehicle.safe(1200), vehicle.bench.comms.has_mail()), (None, false), "once");
     for (here_m, nearest) in [([-30.0, 3.0], points[1]), ([50.0, 70.0], points[2]), ([-8.0, 3.0], HOME)] {
@@ -301,10 +305,10 @@ fn a_return_lands_at_the_nearest_place() {
     vehicle.report.guided.mode = FlightMode::Hold;
     assert_eq!(vehicle.safe(10), Some(points[0]), "at once: it has not been looked for");
     // Without rally points it is home again.
-    vehicle.hear(&Uplink::Mission(Mission::Clear(Plan::RALLY)));
+    vehicle.hear(&Uplink::Mission(MissionMessage::Clear(MissionType::RALLY)));
     assert_eq!((vehicle.safe(510), vehicle.safe(1200)), (Some(HOME), None));
     // A vehicle without a position has no nearest place.
-    assert_eq!(vehicle.upload(Plan::RALLY, &points.map(rally)), MissionResult::ACCEPTED);
+    assert_eq!(vehicle.upload(MissionType::RALLY, &points.map(rally)), MissionResult::ACCEPTED);
     vehicle.report.health.state_age_us = u32::MAX;
     assert_eq!(vehicle.safe(1200), None);
 }
@@ -316,11 +320,11 @@ fn the_guidance_learns_whether_the_vehicle_leaves() {
     let mut vehicle = Vehicle::new();
     vehicle.pass(50);
     assert_eq!(vehicle.inputs.orders.fence, None, "there is none");
-    assert_eq!(vehicle.upload(Plan::FENCE, &fence([30.0, 30.0], 5.0)), MissionResult::ACCEPTED);
+    assert_eq!(vehicle.upload(MissionType::FENCE, &fence([30.0, 30.0], 5.0)), MissionResult::ACCEPTED);
     vehicle.pass(50);
     assert_eq!(vehicle.inputs.orders.fence, None, "well inside");
     let [well, leaves, outside] =
-        [(false, false), (true, false), (true, true)].map(|(leaves, outside)| FenceView { leaves, outside });
+        [(false, false), (true, false), (true, true)].map(|(leaves, outside)| FenceStatus { leaves, outside });
     assert_eq!(vehicle.view([45.0, 0.0], [8.0, 0.0]), leaves);
     assert_eq!(vehicle.view([55.0, 0.0], [8.0, 0.0]), outside);
     vehicle.inputs = ControlInputs::EMPTY;

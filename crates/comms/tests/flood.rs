@@ -8,10 +8,11 @@ use afbc_comms::services::origin::EarthOrigin;
 use afbc_comms::{AuxSensors, Comms, REPORT_MAX};
 use afbc_flight_core::inbox::QUEUE_MAX;
 use afbc_flight_core::{Refusal, Request, Ticketed};
-use afbc_guidance::{FlightMode, Guided, Order, OrderRefusal};
+use afbc_guidance::{FlightMode, GuidanceOutputs, Order, OrderRefusal};
 use afbc_mavlink::{
-    Address, Answer, Command, ControlRequest, Counters, Decoder, Downlink, ExternalTarget, FRAME_MAX, Key, Message,
-    Mission, ParameterRequest, SIGNED_FRAME_MAX, Sender, SetupSigning, Stamp, Uplink,
+    Address, CommandResult, ControlRequest, Counters, Decoder, Downlink, Encoder, ExternalTarget, FRAME_MAX,
+    MessageSet, MissionMessage, ParameterRequest, SIGNED_FRAME_MAX, SetupSigning, SigningKey, Stamp, Uplink,
+    VehicleCommand,
 };
 use afbc_onboard::parameters::ParameterTable;
 use afbc_onboard::{Configuration, ControlInputs, Flight, Readings, Report};
@@ -101,7 +102,7 @@ impl Model {
             Uplink::Command(command) => is_needed_for(*command),
             Uplink::Setpoint(_) | Uplink::Target(_) | Uplink::Control(ControlRequest::Take) => true,
             Uplink::Mission(message) => {
-                matches!(message, Mission::Count(..) | Mission::Clear(_) | Mission::SetCurrent(_))
+                matches!(message, MissionMessage::Count(..) | MissionMessage::Clear(_) | MissionMessage::SetCurrent(_))
             }
             Uplink::Parameter(message) => matches!(message, ParameterRequest::Set { .. }),
             _ => false,
@@ -156,7 +157,8 @@ fn every_command_is_answered_once_to_its_sender() {
             let mut payload: Vec<u8> = (0..length.div_ceil(4)).flat_map(|_| random.word()).collect();
             payload.truncate(length);
             if is_command {
-                let number = if random.below(8) == 0 { random.next() as u16 } else { random.of(&Command::KNOWN) };
+                let number =
+                    if random.below(8) == 0 { random.next() as u16 } else { random.of(&VehicleCommand::KNOWN) };
                 payload[28..30].copy_from_slice(&number.to_le_bytes());
                 payload[30..32].copy_from_slice(&random.of(&[[1, 1], [1, 0], [0, 0], [2, 1]]));
             }
@@ -213,12 +215,12 @@ fn every_command_is_answered_once_to_its_sender() {
             let declined = random.of(&[OrderRefusal::NotArmed, OrderRefusal::NoTargets, OrderRefusal::OutOfRange]);
             (order.ticket, if random.below(2) == 0 { Ok(()) } else { Err(declined) })
         });
-        let guided = Guided {
+        let guided = GuidanceOutputs {
             mode: random.of(&FlightMode::ALL),
             answer: ordered,
             wanted: random.below(4) as u16,
             reached: (random.below(50) == 0).then(|| random.below(4) as u16),
-            ..Guided::default()
+            ..GuidanceOutputs::default()
         };
         let estimate = (random.below(2) == 0).then(State::default);
         let report = Report { answer, guided, estimate, ..idle };
@@ -226,8 +228,8 @@ fn every_command_is_answered_once_to_its_sender() {
         let mut send = |frame: &[u8]| {
             bytes += frame.len();
             station.feed(frame, |_, message| match message {
-                Downlink::Answer { answer: Answer::InProgress, .. } => (),
-                Downlink::Answer { command, to, .. } => {
+                Downlink::CommandAck { answer: CommandResult::InProgress, .. } => (),
+                Downlink::CommandAck { command, to, .. } => {
                     answers += 1;
                     let count = due.entry((command, (to.system, to.component))).or_default();
                     *count -= 1;
@@ -272,11 +274,11 @@ fn nothing_commands_without_the_key() {
         // SETUP_SIGNING over a radio link is refused with a text.
         .filter(|(id, ..)| *id != SetupSigning::ID)
         .collect();
-    let (key, other, mut time_10us) = (Key([1; 32]), Key([2; 32]), 37_000_000_000_000);
+    let (key, other, mut time_10us) = (SigningKey([1; 32]), SigningKey([2; 32]), 37_000_000_000_000);
     let mut comms = Comms::new();
     let (mut wired, mut decoder) = (comms.decoder().wired(), comms.decoder());
     let setup = Uplink::Signing(SetupSigning { key: Some(key), time_10us });
-    let _ = comms.receive(&mut wired, Sender::new(STATIONS[0]).send(&setup, &mut [0; FRAME_MAX]));
+    let _ = comms.receive(&mut wired, Encoder::new(STATIONS[0]).send(&setup, &mut [0; FRAME_MAX]));
     let mut table: ParameterTable = ParameterTable::new(Configuration::default());
     let mut flight: Flight = Flight::new(&Configuration::default()).expect("valid");
     let mut taken = ControlInputs::EMPTY;
@@ -289,7 +291,7 @@ fn nothing_commands_without_the_key() {
             time_10us += 1;
             let stamp = Stamp { link: 0, time_10us };
             let mut buffer = [0; SIGNED_FRAME_MAX];
-            let frame = Sender::new(from).send_signed(&Uplink::Heartbeat, Some((&key, stamp)), &mut buffer).to_vec();
+            let frame = Encoder::new(from).send_signed(&Uplink::Heartbeat, Some((&key, stamp)), &mut buffer).to_vec();
             let _ = comms.receive(&mut decoder, &frame);
             captured.push(frame);
         }
@@ -311,7 +313,7 @@ fn nothing_commands_without_the_key() {
             2 => {
                 let Ok(message) = Uplink::read(id, &payload, VEHICLE) else { continue };
                 let (stamp, mut buffer) = (Stamp { link: 0, time_10us }, [0; SIGNED_FRAME_MAX]);
-                Sender::new(from).send_signed(&message, Some((&other, stamp)), &mut buffer).to_vec()
+                Encoder::new(from).send_signed(&message, Some((&other, stamp)), &mut buffer).to_vec()
             }
             _ => captured[random.below(captured.len())].clone(),
         };
@@ -326,7 +328,7 @@ fn nothing_commands_without_the_key() {
                     frame,
                     |frame| frame.is_signed_by(&key),
                     |_, message| {
-                        let asked = matches!(message, Downlink::Answer { .. } | Downlink::Parameter(_));
+                        let asked = matches!(message, Downlink::CommandAck { .. } | Downlink::Parameter(_));
                         assert!(!asked, "frame {sent}: {message:?}");
                     },
                 );

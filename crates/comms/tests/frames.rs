@@ -6,7 +6,10 @@ use crate::common::{Bench, STATION};
 use afbc_comms::services::control::is_needed_for;
 use afbc_flight_core::Request;
 use afbc_guidance::Orders;
-use afbc_mavlink::{Address, Answer, Command, Downlink, FRAME_MAX, Message, Mission, Plan, Reboot, Sender, Uplink};
+use afbc_mavlink::{
+    Address, CommandResult, Downlink, Encoder, FRAME_MAX, MessageSet, MissionMessage, MissionType, Reboot, Uplink,
+    VehicleCommand,
+};
 use afbc_types::State;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
@@ -60,7 +63,7 @@ fn numbers() -> impl Strategy<Value = f32> {
 
 /// Generates commands, most of them with a known number.
 fn commands() -> impl Strategy<Value = (u32, Vec<u8>)> {
-    let id = prop_oneof![4 => prop::sample::select(Command::KNOWN.as_slice()), 1 => any::<u16>()];
+    let id = prop_oneof![4 => prop::sample::select(VehicleCommand::KNOWN.as_slice()), 1 => any::<u16>()];
     let to = prop::sample::select([[1u8, 1], [1, 0], [0, 0], [2, 1]].as_slice());
     (prop::array::uniform7(numbers()), id, to, any::<bool>(), 0..8u8).prop_map(|(numbers, id, to, long, frame)| {
         let mut payload: Vec<u8> = numbers.into_iter().flat_map(f32::to_le_bytes).collect();
@@ -78,7 +81,7 @@ fn sent() -> impl Strategy<Value = Sent> {
 }
 
 /// Returns the command in a frame, if it is for the vehicle.
-fn command(sent: &Sent) -> Option<Command> {
+fn command(sent: &Sent) -> Option<VehicleCommand> {
     // Of a longer payload only the known part is read.
     let known = sent.payload.len().min(Uplink::format(sent.id)?.length_max);
     match Uplink::read(sent.id, &sent.payload[..known], VEHICLE) {
@@ -102,8 +105,8 @@ proptest! {
             for message in said {
                 match *message {
                     // "In progress" is not the final answer.
-                    Downlink::Answer { answer: Answer::InProgress, .. } => (),
-                    Downlink::Answer { command, to, .. } => {
+                    Downlink::CommandAck { answer: CommandResult::InProgress, .. } => (),
+                    Downlink::CommandAck { command, to, .. } => {
                         *reported.entry((command, to.system, to.component)).or_default() += 1;
                     }
                     Downlink::Health(health) => unanswered = health.unanswered,
@@ -160,9 +163,9 @@ proptest! {
     fn a_station_that_is_not_in_control_changes_nothing(frames in prop::collection::vec(sent(), 1..80)) {
         let mut bench = Bench::new();
         let say = |bench: &mut Bench, from, message| {
-            bench.receive(Sender::new(from).send(&message, &mut [0; FRAME_MAX]))
+            bench.receive(Encoder::new(from).send(&message, &mut [0; FRAME_MAX]))
         };
-        say(&mut bench, STATION, Uplink::Command(Command::Land));
+        say(&mut bench, STATION, Uplink::Command(VehicleCommand::Land));
         bench.step();
         for sent in frames {
             // States and poses of a tracker are no commands.
@@ -185,21 +188,27 @@ proptest! {
 #[test]
 fn commands_that_do_not_need_control() {
     let free = [
-        Command::Disarm,
-        Command::Kill,
-        Command::SetInterval { message: 30, interval_us: 0 },
-        Command::GetInterval(30),
-        Command::RequestMessage { message: 30, index: 0 },
-        Command::RequestProtocol,
-        Command::RequestCapabilities,
-        Command::CheckArming,
-        Command::StartLogStream,
-        Command::StopLogStream,
-        Command::Denied(400),
-        Command::Other(1),
+        VehicleCommand::Disarm,
+        VehicleCommand::Kill,
+        VehicleCommand::SetInterval { message: 30, interval_us: 0 },
+        VehicleCommand::GetInterval(30),
+        VehicleCommand::RequestMessage { message: 30, index: 0 },
+        VehicleCommand::RequestProtocol,
+        VehicleCommand::RequestCapabilities,
+        VehicleCommand::CheckArming,
+        VehicleCommand::StartLogStream,
+        VehicleCommand::StopLogStream,
+        VehicleCommand::Denied(400),
+        VehicleCommand::Other(1),
     ];
     assert!(free.into_iter().all(|command| !is_needed_for(command)));
-    let bound = [Command::Arm, Command::Engage, Command::SelfTest, Command::Land, Command::Reboot(Reboot::BootLoader)];
+    let bound = [
+        VehicleCommand::Arm,
+        VehicleCommand::Engage,
+        VehicleCommand::SelfTest,
+        VehicleCommand::Land,
+        VehicleCommand::Reboot(Reboot::BootLoader),
+    ];
     assert!(bound.into_iter().all(is_needed_for));
     let page = include_str!("../../../docs/security.md");
     for word in ["disarm", "kill", "message", "interval"] {
@@ -216,29 +225,31 @@ fn a_second_station_is_informed_once_and_follows() {
         let (mut answers, mut texts) = (Vec::new(), Vec::new());
         for message in (0..5).flat_map(|_| bench.step().1) {
             match message {
-                Downlink::Answer { answer, to, .. } => answers.push((answer, to)),
+                Downlink::CommandAck { answer, to, .. } => answers.push((answer, to)),
                 Downlink::Text { text, .. } => texts.push(text.to_str().expect("text").to_owned()),
                 _ => (),
             }
         }
         (answers, texts)
     };
-    bench.hear_from(first, Uplink::Command(Command::SetCurrent(Some(7), false)));
+    bench.hear_from(first, Uplink::Command(VehicleCommand::SetCurrent(Some(7), false)));
     heard(&mut bench);
     for times in 0..2 {
-        bench.hear_from(second, Uplink::Command(Command::Arm));
+        bench.hear_from(second, Uplink::Command(VehicleCommand::Arm));
         let (answers, texts) = heard(&mut bench);
-        assert_eq!(answers, [(Answer::Refused(afbc_comms::NOT_IN_CONTROL), second)]);
+        assert_eq!(answers, [(CommandResult::Refused(afbc_comms::NOT_IN_CONTROL), second)]);
         assert_eq!(texts.iter().filter(|text| *text == "245/190 ignored: 255/190 is in control").count(), 1 - times);
     }
     bench.hear_from(first, Uplink::Control(afbc_mavlink::ControlRequest::Release));
-    bench.hear_from(second, Uplink::Command(Command::Arm));
+    bench.hear_from(second, Uplink::Command(VehicleCommand::Arm));
     let (answers, _) = heard(&mut bench);
-    assert!(!answers.contains(&(Answer::Refused(afbc_comms::NOT_IN_CONTROL), second)), "{answers:?}");
+    assert!(!answers.contains(&(CommandResult::Refused(afbc_comms::NOT_IN_CONTROL), second)), "{answers:?}");
     // A station that is not in control cannot clear the mission.
-    bench.hear_from(first, Uplink::Mission(Mission::Clear(Plan::ALL)));
+    bench.hear_from(first, Uplink::Mission(MissionMessage::Clear(MissionType::ALL)));
     let said: Vec<_> = (0..5).flat_map(|_| bench.step().1).collect();
-    let denied =
-        |message: &Downlink| matches!(message, Downlink::Mission { message: Mission::Ack(..), to } if *to == first);
+    let denied = |message: &Downlink| {
+        let Downlink::Mission { message, to } = message else { return false };
+        matches!(message, MissionMessage::Ack(..)) && *to == first
+    };
     assert!(said.iter().any(denied));
 }

@@ -3,7 +3,7 @@
 use crate::common::{Bench, STATION};
 use afbc_calibration::RawSample;
 use afbc_comms::{Calibrator, Comms, Setup};
-use afbc_mavlink::{Command, Decoder, InertialSample, Uplink};
+use afbc_mavlink::{Decoder, InertialSample, Uplink, VehicleCommand};
 use afbc_onboard::Configuration;
 use afbc_onboard::parameters::ParameterTable;
 use afbc_types::{Mounting, SensorCalibration};
@@ -42,7 +42,7 @@ proptest! {
         let table = ParameterTable::new(Configuration { imu, calibration, ..Configuration::default() });
         let mut bench = Bench::new();
         bench.comms = Comms::with(Setup { calibrates: true, ..Setup::default() });
-        bench.hear(Uplink::Command(Command::RequestMessage { message: MESSAGE, index: 0 }));
+        bench.hear(Uplink::Command(VehicleCommand::RequestMessage { message: MESSAGE, index: 0 }));
         bench.step();
         let sample = RawSample {
             at_us: 1_234,

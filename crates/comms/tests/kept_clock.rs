@@ -1,7 +1,7 @@
 //! The signing clock is stored right after a flight and every two minutes on the ground, never in the air.
 
 use afbc_comms::services::signing::{SetupOutcome, Signing};
-use afbc_mavlink::{Key, SetupSigning};
+use afbc_mavlink::{SetupSigning, SigningKey};
 use proptest::prelude::*;
 
 /// 26 November 2026 \[s\].
@@ -16,7 +16,7 @@ proptest! {
     ) {
         let mut signing = Signing::default();
         let from_s = TODAY_S + seconds;
-        let setup = SetupSigning { key: Some(Key([42; 32])), time_10us: 100_000 * u64::from(from_s) };
+        let setup = SetupSigning { key: Some(SigningKey([42; 32])), time_10us: 100_000 * u64::from(from_s) };
         prop_assert_eq!(signing.set(0, &setup, false), SetupOutcome::Done("signing: on, key set"));
         // The key takes eight records, its check value and the clock one each.
         prop_assert_eq!((0..20).filter_map(|_| signing.record(0, false)).count(), 10);

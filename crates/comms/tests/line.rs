@@ -3,7 +3,7 @@
 use crate::common;
 use afbc_comms::services::streams::{DEFAULTS, id};
 use afbc_comms::{Comms, Setup};
-use afbc_mavlink::{Address, Command, Downlink, FRAME_MAX, ParameterRequest, Sender, Uplink};
+use afbc_mavlink::{Address, Downlink, Encoder, FRAME_MAX, ParameterRequest, Uplink, VehicleCommand};
 use afbc_onboard::parameters::ParameterTable;
 use afbc_onboard::{Configuration, Link};
 use afbc_types::State;
@@ -40,7 +40,7 @@ fn load(baud: usize, seconds: usize) -> Load {
     let mut bench = on(baud as u32);
     let line_per_ms = baud as f64 / 10_000.0;
     for (message, _) in DEFAULTS {
-        bench.hear(Uplink::Command(Command::SetInterval { message, interval_us: 1_000 }));
+        bench.hear(Uplink::Command(VehicleCommand::SetInterval { message, interval_us: 1_000 }));
         bench.step();
     }
     bench.hear(Uplink::Parameter(ParameterRequest::List));
@@ -54,22 +54,22 @@ fn load(baud: usize, seconds: usize) -> Load {
         if tick.is_multiple_of(50) {
             let (number, from) =
                 (20_000 + tick as u16 % 10_000, Address { system: 250 + (tick / 50 % 2) as u8, component: 1 });
-            bench.hear_from(from, Uplink::Command(Command::Other(number)));
+            bench.hear_from(from, Uplink::Command(VehicleCommand::Other(number)));
             asked_ms.insert(number, (from, tick));
             load.asked += 1;
         }
         // Requests for the arming checks cause many texts at once.
         if tick % 500 < 200 && tick.is_multiple_of(10) {
-            bench.hear(Uplink::Command(Command::CheckArming));
+            bench.hear(Uplink::Command(VehicleCommand::CheckArming));
         }
         let (_, said) = bench.step();
         let mut length = 0;
         let mut out = [0; FRAME_MAX];
         for message in &said {
-            length += Sender::new(common::STATION).send(message, &mut out).len();
+            length += Encoder::new(common::STATION).send(message, &mut out).len();
             let sent_ms = ((ring + length as f64) / line_per_ms) as usize;
             match message {
-                Downlink::Answer { command, to, .. } => {
+                Downlink::CommandAck { command, to, .. } => {
                     if let Some((from, asked)) = asked_ms.remove(command) {
                         assert_eq!(from, *to);
                         load.answered += 1;
@@ -117,7 +117,7 @@ fn rotor_commands_have_the_rest_of_a_fast_line() {
     let mut bench = on(921_600);
     let wanted = DEFAULTS.iter().map(|(message, _)| *message).chain([id::HIL_ACTUATOR_CONTROLS]);
     for message in wanted {
-        bench.hear(Uplink::Command(Command::SetInterval { message, interval_us: 1_000 }));
+        bench.hear(Uplink::Command(VehicleCommand::SetInterval { message, interval_us: 1_000 }));
         bench.step();
     }
     let (mut bytes, mut rotors) = (0, 0);
@@ -126,7 +126,7 @@ fn rotor_commands_have_the_rest_of_a_fast_line() {
             bench.measure(&State::default());
         }
         for message in bench.step().1 {
-            bytes += Sender::new(common::STATION).send(&message, &mut [0; FRAME_MAX]).len();
+            bytes += Encoder::new(common::STATION).send(&message, &mut [0; FRAME_MAX]).len();
             rotors += usize::from(matches!(message, Downlink::Rotors { .. }));
         }
     }

@@ -5,8 +5,8 @@ use crate::memory::{Memory, bytes};
 use afbc_comms::LogServer;
 use afbc_flight_core::Mode;
 use afbc_mavlink::{
-    Address, Decoder, Downlink, FRAME_MAX, Fault, LogMessage, LogRequest, Message, MessageFormat, Question, Sender,
-    Uplink,
+    Address, Decoder, Downlink, Encoder, FRAME_MAX, FrameFault, LogMessage, LogRequest, MessageFormat, MessageSet,
+    ServiceRequest, Uplink,
 };
 use afbc_onboard::Report;
 
@@ -18,12 +18,12 @@ enum Sent {
     Usual(Downlink),
 }
 
-impl Message for Sent {
+impl MessageSet for Sent {
     fn format(id: u32) -> Option<MessageFormat> {
         LogMessage::format(id).or_else(|| Downlink::format(id))
     }
 
-    fn read(id: u32, payload: &[u8], receiver: Address) -> Result<Self, Fault> {
+    fn read(id: u32, payload: &[u8], receiver: Address) -> Result<Self, FrameFault> {
         match LogMessage::format(id) {
             Some(_) => LogMessage::read(id, payload, receiver).map(Sent::Log),
             None => Downlink::read(id, payload, receiver).map(Sent::Usual),
@@ -51,15 +51,15 @@ impl Vehicle {
         Vehicle { bench, server: LogServer::default(), store, report, decoder: Decoder::new(STATION) }
     }
 
-    fn hear(&mut self, message: &impl Message) {
+    fn hear(&mut self, message: &impl MessageSet) {
         let mut buffer = [0; FRAME_MAX];
-        let frame = Sender::new(STATION).send(message, &mut buffer);
+        let frame = Encoder::new(STATION).send(message, &mut buffer);
         let Bench { comms, uplink, .. } = &mut self.bench;
         comms.receive_with_logs(uplink, frame, &mut self.server);
     }
 
     fn ask(&mut self, request: LogRequest) -> Vec<Sent> {
-        self.hear(&Uplink::Question(Question::Log(request)));
+        self.hear(&Uplink::ServiceRequest(ServiceRequest::Log(request)));
         self.pass(300)
     }
 

@@ -6,11 +6,12 @@ use crate::fence::{Vehicle, way};
 use afbc_flight_core::Mode;
 use afbc_guidance::{FlightMode, Item, Order, OrderRefusal};
 use afbc_mavlink::{
-    Answer, Command, Datum, Downlink, Height, Mission, MissionItem, MissionResult, Place, Plan, Uplink,
+    CommandResult, Datum, Downlink, GlobalPosition, Height, MissionItem, MissionMessage, MissionResult, MissionType,
+    Uplink, VehicleCommand,
 };
 
 /// Returns the mission item that the guidance was given last.
-fn leg(bench: &mut Bench) -> Option<afbc_guidance::Leg> {
+fn leg(bench: &mut Bench) -> Option<afbc_guidance::RequestedItem> {
     (0..3).for_each(|_| drop(step(bench)));
     let inputs = bench.receive(&[]);
     bench.inputs.merge(&inputs);
@@ -22,12 +23,16 @@ fn leg(bench: &mut Bench) -> Option<afbc_guidance::Leg> {
 /// guidance gets the first item of that.
 #[test]
 fn a_mission_that_is_cleared_is_withdrawn() {
-    for clear in [Mission::Clear(Plan::MISSION), Mission::Clear(Plan::ALL), Mission::Count(0, Plan::MISSION)] {
+    for clear in [
+        MissionMessage::Clear(MissionType::MISSION),
+        MissionMessage::Clear(MissionType::ALL),
+        MissionMessage::Count(0, MissionType::MISSION),
+    ] {
         let mut bench = bench(true);
         bench.hear(Uplink::Mission(clear));
         assert_eq!(leg(&mut bench), None, "there was none");
         assert_eq!(upload(&mut bench, &[item(0, 16), item(1, 16), item(2, 16)]), Some(MissionResult::ACCEPTED));
-        leads_to(&mut bench, Command::SetCurrent(Some(2), false), &[Order::Resume(2)]);
+        leads_to(&mut bench, VehicleCommand::SetCurrent(Some(2), false), &[Order::Resume(2)]);
         let handed = leg(&mut bench).expect("handed over");
         assert_eq!((handed.number, handed.is_last), (2, true));
         assert_eq!(upload(&mut bench, &[item(0, 16)]), Some(MissionResult::ACCEPTED));
@@ -49,8 +54,8 @@ fn a_mission_ends_with_the_item_that_is_to_be_the_last() {
     let items = [item(0, 16), item(1, 16), item(2, 16)];
     assert_eq!(upload(&mut bench, &items), Some(MissionResult::ACCEPTED));
     let ends = |bench: &mut Bench, last, at| {
-        let _ = orders(bench, Command::StartMission(0, last));
-        let _ = orders(bench, Command::SetCurrent(Some(at), false));
+        let _ = orders(bench, VehicleCommand::StartMission(0, last));
+        let _ = orders(bench, VehicleCommand::SetCurrent(Some(at), false));
         leg(bench).map(|leg| (leg.number, leg.is_last))
     };
     assert_eq!(ends(&mut bench, Some(1), 1), Some((1, true)));
@@ -58,7 +63,7 @@ fn a_mission_ends_with_the_item_that_is_to_be_the_last() {
     assert_eq!(ends(&mut bench, Some(1), 1), Some((1, true)));
     assert_eq!(ends(&mut bench, Some(1), 0), Some((0, false)));
     assert_eq!(upload(&mut bench, &items), Some(MissionResult::ACCEPTED));
-    let _ = orders(&mut bench, Command::SetCurrent(Some(1), false));
+    let _ = orders(&mut bench, VehicleCommand::SetCurrent(Some(1), false));
     assert_eq!(leg(&mut bench).map(|leg| (leg.number, leg.is_last)), Some((1, false)));
 }
 
@@ -82,17 +87,20 @@ fn what_cannot_be_flown_is_refused_at_upload() {
             assert_eq!(result, Some(MissionResult::INVALID_X), "{command} at {x} {y}");
         }
         let height = Height { metres: 500.0, above: Datum::Sea };
-        let place = Place { latitude_e7: x, longitude_e7: y, height };
-        let go = Command::Reposition { place, yaw_rad: f32::NAN, speed_m_s: None, changes_mode: true };
+        let place = GlobalPosition { latitude_e7: x, longitude_e7: y, height };
+        let go = VehicleCommand::Reposition { place, yaw_rad: f32::NAN, speed_m_s: None, changes_mode: true };
         let (given, _) = orders(&mut bench, go);
         let Some(Order::GoTo { position_m, .. }) = given.first() else { panic!("{given:?}") };
         assert!(!afbc_guidance::is_place(position_m), "{position_m}");
-        bench.hear(Uplink::Mission(Mission::Count(1, Plan::RALLY)));
+        bench.hear(Uplink::Mission(MissionMessage::Count(1, MissionType::RALLY)));
         let point = MissionItem { x, y, frame: 3, parameters: [0.0; 4], ..item(0, 5100) };
-        bench.hear(Uplink::Mission(Mission::Item(point, Plan::RALLY)));
+        bench.hear(Uplink::Mission(MissionMessage::Item(point, MissionType::RALLY)));
         let said: Vec<_> = (0..5).flat_map(|_| step(&mut bench)).collect();
         let refused = |it: &Downlink| {
-            matches!(it, Downlink::Mission { message: Mission::Ack(MissionResult::INVALID_X, Plan::RALLY), .. })
+            matches!(
+                it,
+                Downlink::Mission { message: MissionMessage::Ack(MissionResult::INVALID_X, MissionType::RALLY), .. }
+            )
         };
         assert!(said.iter().any(refused), "{said:?}");
     }
@@ -114,10 +122,10 @@ fn what_cannot_be_flown_is_refused_at_upload() {
         assert_eq!(upload(&mut bench, &[item(0, 16)]), Some(result), "{name} {value}");
     }
     // A mission that has become impossible is refused at its start.
-    leads_to(&mut bench, Command::StartMission(0, None), &[Order::Select(FlightMode::Mission)]);
+    leads_to(&mut bench, VehicleCommand::StartMission(0, None), &[Order::Select(FlightMode::Mission)]);
     set(&mut bench, "GF_MAX_HOR_DIST", 20.0);
-    for command in [Command::StartMission(0, None), Command::SelectStandardMode(6)] {
-        refused(&mut bench, command, Answer::Refused(OrderRefusal::OutOfRange as i32));
+    for command in [VehicleCommand::StartMission(0, None), VehicleCommand::SelectStandardMode(6)] {
+        refused(&mut bench, command, CommandResult::Refused(OrderRefusal::OutOfRange as i32));
     }
 }
 
@@ -126,11 +134,11 @@ fn what_cannot_be_flown_is_refused_at_upload() {
 fn other_plans_leave_the_mission_alone() {
     let mut vehicle = Vehicle::new();
     let place = [20.0, -20.0];
-    assert_eq!(vehicle.upload(Plan::MISSION, &[way(16, place), way(16, place)]), MissionResult::ACCEPTED);
+    assert_eq!(vehicle.upload(MissionType::MISSION, &[way(16, place), way(16, place)]), MissionResult::ACCEPTED);
     let upload = vehicle.leg(1).upload;
     let disc = MissionItem { frame: 5, z: 0.0, parameters: [5.0, 0.0, 0.0, 0.0], ..way(5004, [40.0, 0.0]) };
     let rally = MissionItem { frame: 3, parameters: [0.0; 4], ..way(5100, place) };
-    for (plan, item) in [(Plan::FENCE, disc), (Plan::RALLY, rally)] {
+    for (plan, item) in [(MissionType::FENCE, disc), (MissionType::RALLY, rally)] {
         assert_eq!(vehicle.upload(plan, &[item]), MissionResult::ACCEPTED);
         assert_eq!([vehicle.leg(0), vehicle.leg(1)].map(|leg| leg.upload), [upload; 2], "{plan:?}");
     }
@@ -142,7 +150,7 @@ fn jumps_begin_anew_with_each_flight() {
     let mut vehicle = Vehicle::new();
     let jump = MissionItem { command: 177, parameters: [0.0, 1.0, 0.0, 0.0], x: 0, y: 0, z: 0.0, ..item(1, 177) };
     let items = [way(16, [20.0, -20.0]), jump, way(16, [30.0, -20.0])];
-    assert_eq!(vehicle.upload(Plan::MISSION, &items), MissionResult::ACCEPTED);
+    assert_eq!(vehicle.upload(MissionType::MISSION, &items), MissionResult::ACCEPTED);
     // Returns the target of the jump, and then makes the jump.
     let jump = |vehicle: &mut Vehicle| {
         vehicle.leg(2);

@@ -138,7 +138,7 @@ fn what_was_kept_as_a_float_counts() {
     let (table, _, notices) = restarted(store, &Kept::NOW);
     assert_eq!(notices, [""; 0]);
     let Configuration { settings, guidance, link, .. } = table.configuration();
-    let net = &guidance.net;
+    let net = &guidance.failsafe;
     assert_eq!((net.fence_action, net.sticks_action), (FenceAction::Return, SticksAction::Return));
     assert_eq!((net.battery_action, net.cells), (BatteryAction::Warn, 4));
     assert_eq!((link.system, link.baud, settings.bumpless), (7, 57_600, false));
@@ -191,7 +191,7 @@ fn a_disarmed_vehicle_flies_what_is_set() {
             }
             if tick == 1100 {
                 bench.follow();
-                bench.hear(afbc_mavlink::Uplink::Command(afbc_mavlink::Command::Arm));
+                bench.hear(afbc_mavlink::Uplink::Command(afbc_mavlink::VehicleCommand::Arm));
             }
             let above = State { position_m: nalgebra::Vector3::new(0.1, 0.0, 0.2), ..State::default() };
             reports.push(bench.tick(&above).0);
@@ -210,7 +210,7 @@ fn a_disarmed_vehicle_flies_what_is_set() {
         .map(|tick| {
             if tick == 1100 {
                 plain.follow();
-                plain.hear(afbc_mavlink::Uplink::Command(afbc_mavlink::Command::Arm));
+                plain.hear(afbc_mavlink::Uplink::Command(afbc_mavlink::VehicleCommand::Arm));
             }
             let above = State { position_m: nalgebra::Vector3::new(0.1, 0.0, 0.2), ..State::default() };
             plain.tick(&above).0
@@ -267,7 +267,7 @@ fn a_list_is_complete_and_leaves_the_link_to_others() {
         assert!(share > 0.2 && share < 0.5, "{baud}: {share}");
         assert!(most_in_a_second <= bytes_s / 2 + 4 * VALUE_BYTES * 10, "{baud}: {most_in_a_second}");
         assert_eq!(LINK_SHARE, 40);
-        let places: Vec<u16> = list.iter().map(|reported| reported.place).collect();
+        let places: Vec<u16> = list.iter().map(|reported| reported.index).collect();
         assert_eq!(places, (0..table.count()).collect::<Vec<_>>());
         for (reported, parameter) in list.iter().zip(all(&table)) {
             assert_eq!((reported.count, reported.name), (table.count(), parameter.name.to_bytes()));
@@ -285,7 +285,7 @@ fn two_stations_hear_everything() {
     reported(&mut service, &mut now_us, 300, 5760, &table);
     service.hear(ParameterRequest::List, &mut table, true);
     let second: BTreeSet<u16> =
-        reported(&mut service, &mut now_us, 10_000, 5760, &table).iter().map(|reported| reported.place).collect();
+        reported(&mut service, &mut now_us, 10_000, 5760, &table).iter().map(|reported| reported.index).collect();
     assert_eq!(second.len(), usize::from(table.count()));
 }
 
@@ -293,26 +293,26 @@ fn two_stations_hear_everything() {
 fn gaps_are_filled_by_place_and_by_name() {
     let (mut table, mut service, mut now_us) = (table(), Service::default(), 0);
     for ask in [
-        ParameterRequest::ReadPlace(3),
+        ParameterRequest::ReadIndex(3),
         ParameterRequest::ReadName(padded("V_MASS")),
-        ParameterRequest::ReadPlace(table.count() - 1),
+        ParameterRequest::ReadIndex(table.count() - 1),
     ] {
         assert_eq!(service.hear(ask, &mut table, false), Default::default());
     }
     // An error names the missing parameter.
     for (ask, name, place) in [
-        (ParameterRequest::ReadPlace(table.count()), [0; 16], table.count() as i16),
-        (ParameterRequest::ReadPlace(u16::MAX), [0; 16], -1),
+        (ParameterRequest::ReadIndex(table.count()), [0; 16], table.count() as i16),
+        (ParameterRequest::ReadIndex(u16::MAX), [0; 16], -1),
         (ParameterRequest::ReadName(padded("NOTHING")), padded("NOTHING"), -1),
         (ParameterRequest::ReadName([0xFF; 16]), [0xFF; 16], -1),
         (ParameterRequest::ReadName([0; 16]), [0; 16], -1),
     ] {
         let heard = service.hear(ask, &mut table, false);
-        let error = ParameterError { name, place, error: ParameterError::DOES_NOT_EXIST };
+        let error = ParameterError { name, index: place, error: ParameterError::DOES_NOT_EXIST };
         assert_eq!((heard.error, heard.change, heard.refused), (Some(error), None, None));
     }
     let said = reported(&mut service, &mut now_us, 1000, 5760, &table);
-    assert_eq!(said.iter().map(|reported| reported.place).collect::<Vec<_>>(), [3, 0, table.count() - 1]);
+    assert_eq!(said.iter().map(|reported| reported.index).collect::<Vec<_>>(), [3, 0, table.count() - 1]);
 }
 
 #[test]
@@ -377,7 +377,7 @@ proptest! {
             let known = all[usize::from(place) % all.len()].name.to_bytes();
             let ask = match way {
                 0 => ParameterRequest::List,
-                1 => ParameterRequest::ReadPlace(place % 300),
+                1 => ParameterRequest::ReadIndex(place % 300),
                 2 => ParameterRequest::ReadName(known),
                 3 => ParameterRequest::Set { name: known, value, kind: kind % 11 },
                 _ => {
@@ -520,7 +520,7 @@ fn values_with_which_the_vehicle_could_not_fly_are_left_out() {
 /// Messages that do not fit the queues are counted once each. Answered messages are not counted.
 #[test]
 fn what_is_dropped_is_counted() {
-    for ask in [ParameterRequest::ReadPlace(3), ParameterRequest::ReadName(padded("V_MASS")), real("V_MASS", 0.486)] {
+    for ask in [ParameterRequest::ReadIndex(3), ParameterRequest::ReadName(padded("V_MASS")), real("V_MASS", 0.486)] {
         let (mut table, mut service) = (table(), Service::default());
         for number in 0..40 {
             service.hear(ask, &mut table, true);

@@ -3,7 +3,7 @@
 use crate::common::Bench;
 use afbc_estimator::Measurement;
 use afbc_flight_core::{Mode, Refusal};
-use afbc_mavlink::{Answer, Command, Downlink, Uplink};
+use afbc_mavlink::{CommandResult, Downlink, Uplink, VehicleCommand};
 use afbc_onboard::{Aged, Readings, Report};
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 use nalgebra::Vector3;
@@ -60,14 +60,14 @@ fn message(by: By, sent_us: u64, state: State, sigmas: PoseSigmas) -> Uplink {
 }
 
 /// Returns the answer to an arm command, with a setpoint at the vehicle's place.
-fn arm(bench: &mut Bench, from_ms: u64) -> Option<Answer> {
+fn arm(bench: &mut Bench, from_ms: u64) -> Option<CommandResult> {
     let setpoint = Setpoint { position_m: PLACE_M, yaw_rad: YAW_RAD, ..Setpoint::default() };
     bench.hear(Uplink::Setpoint(setpoint));
-    bench.hear(Uplink::Command(Command::Arm));
+    bench.hear(Uplink::Command(VehicleCommand::Arm));
     (from_ms..from_ms + 3).find_map(|ms| {
         let (_, said) = bench.sense(&sample(ms, 0.0));
         said.into_iter().find_map(|message| match message {
-            Downlink::Answer { answer, .. } => Some(answer),
+            Downlink::CommandAck { answer, .. } => Some(answer),
             _ => None,
         })
     })
@@ -91,7 +91,7 @@ fn a_vehicle_knows_where_it_is() {
         assert!((reported.position_m - PLACE_M).amax() < 0.005, "{by:?}: {reported:?}");
         assert!((reported.attitude_rad - Vector3::new(0.0, 0.0, YAW_RAD)).amax() < 0.02, "{by:?}: {reported:?}");
         assert!(reported.velocity_m_s.amax() < 0.05, "{by:?}: {reported:?}");
-        assert_eq!(arm(&mut bench, START_MS), Some(Answer::Accepted), "{by:?}");
+        assert_eq!(arm(&mut bench, START_MS), Some(CommandResult::Accepted), "{by:?}");
     }
 }
 
@@ -102,7 +102,7 @@ fn without_poses_it_does_not() {
     for ms in 0..START_MS {
         bench.sense(&sample(ms, 0.0));
     }
-    assert_eq!(arm(&mut bench, START_MS), Some(Answer::Refused(Refusal::HeadingUnknown as i32)));
+    assert_eq!(arm(&mut bench, START_MS), Some(CommandResult::Refused(Refusal::HeadingUnknown as i32)));
 }
 
 /// A vehicle without an IMU ignores poses, even plausible ones of a tracker in use.
@@ -232,7 +232,7 @@ fn outlives(left: Left) -> (Vec<Mode>, Vec<String>, Report) {
         bench.hear(Uplink::Setpoint(Setpoint { position_m: PLACE_M, yaw_rad: YAW_RAD, ..Setpoint::default() }));
         if ms == START_MS {
             bench.follow();
-            bench.hear(Uplink::Command(Command::Arm));
+            bench.hear(Uplink::Command(VehicleCommand::Arm));
         }
         let (report, said) = bench.sense(&readings);
         modes.push(report.mode);
@@ -283,7 +283,7 @@ fn the_sensor_comes_back() {
         bench.hear(Uplink::Setpoint(Setpoint { position_m: PLACE_M, yaw_rad: YAW_RAD, ..Setpoint::default() }));
         if ms == START_MS {
             bench.follow();
-            bench.hear(Uplink::Command(Command::Arm));
+            bench.hear(Uplink::Command(VehicleCommand::Arm));
         }
         let dead = (START_MS + 1_000..START_MS + 3_000).contains(&ms);
         let (report, _) = bench.sense(&if dead { Readings::NONE } else { sample(ms, 0.0) });

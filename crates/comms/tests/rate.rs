@@ -2,7 +2,7 @@
 
 use afbc_comms::{CLOCK_FAILED, Comms, TICK_OFF};
 use afbc_flight_core::{Mode, Refusal};
-use afbc_mavlink::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
+use afbc_mavlink::{Address, CommandResult, Decoder, Downlink, Encoder, FRAME_MAX, Uplink, VehicleCommand};
 use afbc_onboard::{Configuration, ControlInputs, Flight};
 use afbc_types::{PoseSigmas, Setpoint, State};
 
@@ -15,13 +15,13 @@ struct Bench {
     uplink: Decoder<Uplink>,
     inputs: ControlInputs,
     taken: ControlInputs,
-    sender: Sender,
+    sender: Encoder,
     decoder: Decoder<Downlink>,
     now_us: u64,
     mode: Mode,
     /// Texts sent so far.
     texts: Vec<String>,
-    answers: Vec<Answer>,
+    answers: Vec<CommandResult>,
 }
 
 impl Bench {
@@ -32,7 +32,7 @@ impl Bench {
             uplink: Comms::new().decoder(),
             inputs: ControlInputs::EMPTY,
             taken: ControlInputs::EMPTY,
-            sender: Sender::new(STATION),
+            sender: Encoder::new(STATION),
             decoder: Decoder::new(STATION),
             now_us: 0,
             mode: Mode::Disarmed,
@@ -61,7 +61,7 @@ impl Bench {
             let Bench { comms, decoder, texts, answers, .. } = self;
             let mut hear = |_: Address, message: Downlink| match message {
                 Downlink::Text { text, .. } => texts.push(text.to_str().expect("text").to_owned()),
-                Downlink::Answer { answer, .. } => answers.push(answer),
+                Downlink::CommandAck { answer, .. } => answers.push(answer),
                 _ => (),
             };
             comms.report(&report, 0.0, |bytes| decoder.feed(bytes, &mut hear));
@@ -69,9 +69,9 @@ impl Bench {
     }
 
     /// Returns the answer to an arm command.
-    fn arm(&mut self) -> Answer {
+    fn arm(&mut self) -> CommandResult {
         self.answers.clear();
-        self.hear(Uplink::Command(Command::Arm));
+        self.hear(Uplink::Command(VehicleCommand::Arm));
         self.run(1, 1000);
         *self.answers.first().expect("answered")
     }
@@ -81,7 +81,7 @@ impl Bench {
 fn wrong_tick_timing_is_reported_and_does_not_end_the_flight() {
     let mut bench = Bench::new();
     bench.run(1100, 1000);
-    assert_eq!(bench.arm(), Answer::Accepted);
+    assert_eq!(bench.arm(), CommandResult::Accepted);
     bench.run(500, 1000);
     assert_eq!(bench.texts, [""; 0]);
 
@@ -91,25 +91,25 @@ fn wrong_tick_timing_is_reported_and_does_not_end_the_flight() {
     bench.run(2000, 1050);
     assert_eq!((bench.mode, bench.texts.len()), (Mode::Flying, 1), "reported once, and continues flying");
 
-    bench.hear(Uplink::Command(Command::Kill));
+    bench.hear(Uplink::Command(VehicleCommand::Kill));
     bench.run(1, 1000);
-    assert_eq!(bench.arm(), Answer::Refused(Refusal::Unhealthy as i32));
+    assert_eq!(bench.arm(), CommandResult::Refused(Refusal::Unhealthy as i32));
     bench.texts.clear();
     bench.run(3000, 1000);
-    assert_eq!(bench.arm(), Answer::Accepted, "its timing is right again");
+    assert_eq!(bench.arm(), CommandResult::Accepted, "its timing is right again");
 }
 
 #[test]
 fn a_failed_clock_is_reported_and_prevents_arming() {
     let mut bench = Bench::new();
     bench.run(1100, 1000);
-    assert_eq!(bench.arm(), Answer::Accepted);
+    assert_eq!(bench.arm(), CommandResult::Accepted);
     bench.run(50, 1000);
     bench.flight.distrust_clock();
     bench.run(3000, 1000);
     assert_eq!(bench.texts, [CLOCK_FAILED]);
     assert_eq!(bench.mode, Mode::Flying);
-    bench.hear(Uplink::Command(Command::Kill));
+    bench.hear(Uplink::Command(VehicleCommand::Kill));
     bench.run(3000, 1000);
-    assert_eq!(bench.arm(), Answer::Refused(Refusal::Unhealthy as i32), "not until it is switched off and on");
+    assert_eq!(bench.arm(), CommandResult::Refused(Refusal::Unhealthy as i32), "not until it is switched off and on");
 }

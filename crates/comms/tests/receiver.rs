@@ -7,7 +7,7 @@ use afbc_comms::{AuxSensors, RadioControl};
 use afbc_flight_core::{Mode, Refusal, Request};
 use afbc_guidance::{FlightMode, Order, Sticks};
 use afbc_mavlink::{
-    ChannelsOverride, Command, Downlink, ExternalTarget, ManualControl, MavSeverity, Telemetry, Uplink,
+    ChannelsOverride, Downlink, ExternalTarget, ManualControl, MavSeverity, Telemetry, Uplink, VehicleCommand,
 };
 use afbc_onboard::{ControlInputs, Report};
 use afbc_rc::{
@@ -116,7 +116,7 @@ impl Vehicle {
 
     /// Requests RC_CHANNELS. Returns the channels and the RSSI, if the message is sent.
     fn channels(&mut self) -> Option<([u16; CHANNELS], u8)> {
-        self.bench.hear(Uplink::Command(Command::RequestMessage { message: id::RC_CHANNELS, index: 0 }));
+        self.bench.hear(Uplink::Command(VehicleCommand::RequestMessage { message: id::RC_CHANNELS, index: 0 }));
         (0..2).flat_map(|_| self.tick(&[]).0).find_map(|message| match message {
             Downlink::Telemetry(Telemetry::Channels(channels)) => Some((channels.us, channels.rssi)),
             _ => None,

@@ -6,7 +6,7 @@ use crate::dialect::{Expected, expected};
 use afbc_comms::services::origin::{EarthOrigin, Global};
 use afbc_comms::services::streams::{DEFAULTS, id};
 use afbc_comms::{AuxSensors, Comms, Setup};
-use afbc_mavlink::{Address, Command, Uplink};
+use afbc_mavlink::{Address, Uplink, VehicleCommand};
 use afbc_onboard::{Configuration, Link, Readings, parameters::ParameterTable};
 use afbc_types::State;
 use common::{Bench, STATION};
@@ -181,7 +181,7 @@ fn on(baud: u32) -> Bench {
     for (message, _) in DEFAULTS {
         let answers = [id::MISSION_CURRENT, id::GPS_GLOBAL_ORIGIN, id::HOME_POSITION].contains(&message);
         let interval_us = if answers { -1 } else { 1_000 };
-        bench.hear(Uplink::Command(Command::SetInterval { message, interval_us }));
+        bench.hear(Uplink::Command(VehicleCommand::SetInterval { message, interval_us }));
         step(&mut bench);
     }
     for _ in 0..100 {
@@ -365,7 +365,7 @@ fn what_there_is_not_is_named() {
 fn any_message_can_be_requested() {
     for message in MavMessage::all_ids() {
         let mut bench = on(921_600);
-        bench.hear(Uplink::Command(Command::RequestMessage { message: *message, index: 0 }));
+        bench.hear(Uplink::Command(VehicleCommand::RequestMessage { message: *message, index: 0 }));
         let sent: Vec<_> = (0..WITHIN).flat_map(|_| step(&mut bench)).collect();
         let answer = sent.iter().find(|sent| sent.id == 77).expect("answered");
         assert_eq!(receiver(answer), Some(STATION));

@@ -5,7 +5,7 @@ use afbc_comms::parameters::{LINK_SHARE, VALUE_BYTES};
 use afbc_comms::services::streams::DEFAULTS;
 use afbc_comms::{Comms, Setup};
 use afbc_mavlink::{
-    Address, Answer, Command, Downlink, ParameterName, ParameterRequest, ParameterValue, Storage, Uplink,
+    Address, CommandResult, Downlink, ParameterName, ParameterRequest, ParameterValue, Storage, Uplink, VehicleCommand,
 };
 use afbc_onboard::parameters::RecordChange;
 use afbc_types::State;
@@ -29,7 +29,7 @@ fn set(name: &str, value: f32) -> Uplink {
 struct Heard {
     values: Vec<ParameterValue>,
     texts: Vec<String>,
-    answers: Vec<Answer>,
+    answers: Vec<CommandResult>,
 }
 
 fn listen(bench: &mut Bench, ticks: usize) -> Heard {
@@ -40,7 +40,7 @@ fn listen(bench: &mut Bench, ticks: usize) -> Heard {
             match message {
                 Downlink::Parameter(value) => heard.values.push(value),
                 Downlink::Text { text, .. } => heard.texts.push(text.to_str().expect("words").to_owned()),
-                Downlink::Answer { answer, .. } => heard.answers.push(answer),
+                Downlink::CommandAck { answer, .. } => heard.answers.push(answer),
                 _ => (),
             }
         }
@@ -103,11 +103,11 @@ fn nothing_is_set_or_restored_while_armed() {
     let mut bench = Bench::flying();
     let before = height(&bench);
     bench.hear(set(HEIGHT, 4.0));
-    bench.hear(Uplink::Command(Command::Storage(Storage::Reset)));
+    bench.hear(Uplink::Command(VehicleCommand::Storage(Storage::Reset)));
     let heard = listen(&mut bench, 20);
     assert_eq!(reported(&heard, HEIGHT), Some(before));
     assert_eq!(heard.texts, ["MIS_TAKEOFF_ALT: not while armed"]);
-    assert!(matches!(heard.answers[..], [Answer::Refused(_)]), "{:?}", heard.answers);
+    assert!(matches!(heard.answers[..], [CommandResult::Refused(_)]), "{:?}", heard.answers);
     assert!(bench.changes.is_empty());
 }
 
@@ -119,12 +119,12 @@ fn defaults_are_restored_by_command() {
     bench.hear(set("RTL_RETURN_ALT", 20.0));
     listen(&mut bench, 20);
     assert_eq!(bench.changes.len(), 2);
-    bench.hear_from(SECOND, Uplink::Command(Command::Storage(Storage::Reset)));
+    bench.hear_from(SECOND, Uplink::Command(VehicleCommand::Storage(Storage::Reset)));
     listen(&mut bench, 20);
     assert_eq!(bench.changes.len(), 2);
-    bench.hear(Uplink::Command(Command::Storage(Storage::Reset)));
+    bench.hear(Uplink::Command(VehicleCommand::Storage(Storage::Reset)));
     let heard = listen(&mut bench, 2000);
-    assert_eq!((bench.changes.last(), heard.answers), (Some(&RecordChange::Restored), vec![Answer::Accepted]));
+    assert_eq!((bench.changes.last(), heard.answers), (Some(&RecordChange::Restored), vec![CommandResult::Accepted]));
     assert_eq!(bench.table, before);
     // A list of all parameters follows, for every station.
     assert_eq!(heard.values.len(), usize::from(before.count()));
@@ -144,7 +144,7 @@ fn a_list_leaves_the_link_to_others() {
             for message in bench.step().1 {
                 if let Downlink::Parameter(value) = message {
                     assert_eq!(value.count, count);
-                    assert!(places.insert(value.place));
+                    assert!(places.insert(value.index));
                     bytes += VALUE_BYTES;
                 }
             }
@@ -175,11 +175,11 @@ fn values_are_sent_beside_full_streams() {
     let mut bench = Bench::new();
     bench.comms = Comms::with(Setup { bytes_per_s: 1_000_000, ..Setup::default() });
     for (message, _) in DEFAULTS {
-        bench.hear(Uplink::Command(Command::SetInterval { message, interval_us: 1_000 }));
+        bench.hear(Uplink::Command(VehicleCommand::SetInterval { message, interval_us: 1_000 }));
         listen(&mut bench, 1);
     }
     listen(&mut bench, 100);
     bench.hear(Uplink::Parameter(ParameterRequest::List));
-    let places: BTreeSet<_> = listen(&mut bench, 1000).values.iter().map(|value| value.place).collect();
+    let places: BTreeSet<_> = listen(&mut bench, 1000).values.iter().map(|value| value.index).collect();
     assert_eq!(places.len(), usize::from(bench.table.count()));
 }

@@ -3,15 +3,15 @@
 use crate::common::{Bench, STATION};
 use afbc_comms::services::signing::{STREAMS_MAX, Signing, SigningRecord};
 use afbc_mavlink::{
-    Address, Command, Decoder, Downlink, FRAME_MAX, Key, ReceivedFrame, SIGNED_FRAME_MAX, Sender, SetupSigning, Stamp,
-    Uplink,
+    Address, Decoder, Downlink, Encoder, FRAME_MAX, ReceivedFrame, SIGNED_FRAME_MAX, SetupSigning, SigningKey, Stamp,
+    Uplink, VehicleCommand,
 };
 use afbc_types::State;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
-const KEY: Key = Key([42; 32]);
-const OTHER: Key = Key([43; 32]);
+const KEY: SigningKey = SigningKey([42; 32]);
+const OTHER: SigningKey = SigningKey([43; 32]);
 /// 26 November 2026 [10 us].
 const TODAY_10US: u64 = 37_570_000_000_000;
 const MINUTE_10US: u64 = 6_000_000;
@@ -23,7 +23,7 @@ type Records = BTreeMap<String, u32>;
 struct Locked {
     bench: Bench,
     records: Records,
-    sender: Sender,
+    sender: Encoder,
     time_10us: u64,
 }
 
@@ -33,7 +33,7 @@ impl Locked {
         let mut locked = Locked {
             bench: Bench::new(),
             records: Records::new(),
-            sender: Sender::new(STATION),
+            sender: Encoder::new(STATION),
             time_10us: TODAY_10US,
         };
         locked.bench.step();
@@ -44,7 +44,7 @@ impl Locked {
     }
 
     /// Sends SETUP_SIGNING, unsigned.
-    fn set(&mut self, key: Option<Key>, wired: bool) {
+    fn set(&mut self, key: Option<SigningKey>, wired: bool) {
         let setup = SetupSigning { key, time_10us: self.time_10us };
         let frame = self.sender.send(&Uplink::Signing(setup), &mut [0; FRAME_MAX]).to_vec();
         let mut decoder = self.bench.comms.decoder();
@@ -73,7 +73,7 @@ impl Locked {
         self.bench.step();
     }
 
-    fn signed(&mut self, message: &Uplink, key: &Key) -> Vec<u8> {
+    fn signed(&mut self, message: &Uplink, key: &SigningKey) -> Vec<u8> {
         self.time_10us += 1;
         let stamp = Stamp { link: 3, time_10us: self.time_10us };
         self.sender.send_signed(message, Some((key, stamp)), &mut [0; SIGNED_FRAME_MAX]).to_vec()
@@ -88,7 +88,7 @@ impl Locked {
 
 /// Returns the number of answers to commands in the next ticks, signed or not.
 fn answers(bench: &mut Bench) -> usize {
-    (0..5).map(|_| frames(bench).1.iter().filter(|it| matches!(it, Downlink::Answer { .. })).count()).sum()
+    (0..5).map(|_| frames(bench).1.iter().filter(|it| matches!(it, Downlink::CommandAck { .. })).count()).sum()
 }
 
 /// Runs a tick. Returns the frames sent and the messages in them.
@@ -105,13 +105,13 @@ fn frames(bench: &mut Bench) -> (Vec<Vec<u8>>, Vec<Downlink>) {
 
 /// Returns a command that is answered at once in any state.
 fn command() -> Uplink {
-    Uplink::Command(Command::Other(31_999))
+    Uplink::Command(VehicleCommand::Other(31_999))
 }
 
 #[test]
 fn only_what_is_signed_and_new_is_heard() {
     let mut locked = Locked::new();
-    let unsigned = Sender::new(STATION).send(&command(), &mut [0; FRAME_MAX]).to_vec();
+    let unsigned = Encoder::new(STATION).send(&command(), &mut [0; FRAME_MAX]).to_vec();
     assert!(!locked.hears(&unsigned));
     let forged = locked.signed(&command(), &OTHER);
     assert!(!locked.hears(&forged));
@@ -124,7 +124,7 @@ fn only_what_is_signed_and_new_is_heard() {
     assert!(!locked.hears(&later), "in the wrong order");
     // This frame was captured long ago, from a sender that has not been heard since the restart.
     let stamp = Stamp { link: 9, time_10us: TODAY_10US - 2 * MINUTE_10US };
-    let old = Sender::new(Address { system: 7, component: 7 })
+    let old = Encoder::new(Address { system: 7, component: 7 })
         .send_signed(&command(), Some((&KEY, stamp)), &mut [0; SIGNED_FRAME_MAX])
         .to_vec();
     assert!(!locked.hears(&old));
@@ -166,7 +166,7 @@ fn without_a_key_everything_is_heard_and_nothing_signed() {
         }
         let genuine = locked.signed(&command(), &KEY);
         assert!(locked.hears(&genuine) && locked.hears(&genuine));
-        let unsigned = Sender::new(STATION).send(&command(), &mut [0; FRAME_MAX]).to_vec();
+        let unsigned = Encoder::new(STATION).send(&command(), &mut [0; FRAME_MAX]).to_vec();
         assert!(locked.hears(&unsigned));
         let (sent, _) = (0..1000).map(|_| frames(&mut locked.bench)).find(|(sent, _)| !sent.is_empty()).expect("some");
         assert!(sent.iter().all(|frame| frame[2] == 0));
@@ -196,9 +196,9 @@ fn all_that_is_sent_is_signed_with_growing_times() {
 #[test]
 fn a_key_is_set_over_a_wire_or_signed_and_never_while_armed() {
     let mut open =
-        Locked { bench: Bench::new(), records: Records::new(), sender: Sender::new(STATION), time_10us: TODAY_10US };
+        Locked { bench: Bench::new(), records: Records::new(), sender: Encoder::new(STATION), time_10us: TODAY_10US };
     open.set(Some(OTHER), false);
-    let unsigned = Sender::new(STATION).send(&command(), &mut [0; FRAME_MAX]).to_vec();
+    let unsigned = Encoder::new(STATION).send(&command(), &mut [0; FRAME_MAX]).to_vec();
     assert!(open.hears(&unsigned), "set without a wire");
 
     let mut locked = Locked::new();
@@ -212,13 +212,13 @@ fn a_key_is_set_over_a_wire_or_signed_and_never_while_armed() {
 
     let mut armed = Bench::flying();
     let setup = SetupSigning { key: Some(KEY), time_10us: TODAY_10US };
-    let frame = Sender::new(STATION).send(&Uplink::Signing(setup), &mut [0; FRAME_MAX]).to_vec();
+    let frame = Encoder::new(STATION).send(&Uplink::Signing(setup), &mut [0; FRAME_MAX]).to_vec();
     let mut decoder = armed.comms.decoder().wired();
     let update = armed.comms.receive(&mut decoder, &frame);
     armed.inputs.merge(&update);
     armed.hear(command());
     let (_, said) = armed.tick(&State::default());
-    assert!(said.iter().any(|it| matches!(it, Downlink::Answer { .. })), "still unsigned: {said:?}");
+    assert!(said.iter().any(|it| matches!(it, Downlink::CommandAck { .. })), "still unsigned: {said:?}");
 }
 
 #[test]
@@ -265,9 +265,9 @@ fn a_start_lets_no_frame_be_replayed() {
 #[test]
 fn a_clock_that_is_a_year_ahead_is_set_right_by_a_key() {
     const YEAR_10US: u64 = 365 * 24 * 60 * MINUTE_10US;
-    let newcomer = |locked: &mut Locked, system, time_10us, key: &Key| {
+    let newcomer = |locked: &mut Locked, system, time_10us, key: &SigningKey| {
         let stamp = Stamp { link: 9, time_10us };
-        let mut sender = Sender::new(Address { system, component: 7 });
+        let mut sender = Encoder::new(Address { system, component: 7 });
         let frame = sender.send_signed(&command(), Some((key, stamp)), &mut [0; SIGNED_FRAME_MAX]).to_vec();
         locked.hears(&frame)
     };
@@ -332,7 +332,7 @@ fn half_a_key_opens_nothing() {
         locked.set(Some(OTHER), true);
         locked.keep(cut);
         locked.restart();
-        let unsigned = Sender::new(STATION).send(&command(), &mut [0; FRAME_MAX]).to_vec();
+        let unsigned = Encoder::new(STATION).send(&command(), &mut [0; FRAME_MAX]).to_vec();
         assert!(!locked.hears(&unsigned), "cut after {cut}");
         locked.time_10us += MINUTE_10US;
         let [former, new] = [KEY, OTHER].map(|key| {
@@ -353,7 +353,7 @@ fn half_a_key_opens_nothing() {
 fn more_senders_than_there_is_room_for_are_not_heard() {
     let mut locked = Locked::new();
     for system in 1..20 {
-        let mut sender = Sender::new(Address { system: 100 + system, component: 1 });
+        let mut sender = Encoder::new(Address { system: 100 + system, component: 1 });
         locked.time_10us += 10;
         let stamp = Stamp { link: 0, time_10us: locked.time_10us };
         let frame = sender.send_signed(&command(), Some((&KEY, stamp)), &mut [0; SIGNED_FRAME_MAX]).to_vec();
@@ -387,9 +387,9 @@ proptest! {
             let frame = match &key {
                 Some(key) => {
                     let stamp = Stamp { link, time_10us };
-                    Sender::new(from).send_signed(&command(), Some((key, stamp)), &mut buffer).to_vec()
+                    Encoder::new(from).send_signed(&command(), Some((key, stamp)), &mut buffer).to_vec()
                 }
-                None => Sender::new(from).send(&command(), &mut [0; FRAME_MAX]).to_vec(),
+                None => Encoder::new(from).send(&command(), &mut [0; FRAME_MAX]).to_vec(),
             };
             // The vehicle's clock advances between two frames.
             let now_10us = newest + locked.bench.now_us / 10;

@@ -2,7 +2,7 @@
 
 use crate::common::Bench;
 use afbc_comms::services::streams::id;
-use afbc_mavlink::{Command, Downlink, PositionTarget, Uplink};
+use afbc_mavlink::{Downlink, PositionTarget, Uplink, VehicleCommand};
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 
@@ -14,8 +14,8 @@ fn the_setpoint_that_is_followed_is_reported() {
     for tick in 0..4000_u32 {
         match tick {
             1100 => bench.follow(),
-            1200 => bench.hear(Uplink::Command(Command::Arm)),
-            3200 => bench.hear(Uplink::Command(Command::Kill)),
+            1200 => bench.hear(Uplink::Command(VehicleCommand::Arm)),
+            3200 => bench.hear(Uplink::Command(VehicleCommand::Kill)),
             _ => (),
         }
         bench.measure(&State::default());
@@ -23,7 +23,7 @@ fn the_setpoint_that_is_followed_is_reported() {
         bench.hear(Uplink::Setpoint(Setpoint { position_m, ..Setpoint::default() }));
         let (report, said) = bench.step();
         for message in said {
-            if let Downlink::Followed(time_ms, motion) = message {
+            if let Downlink::PositionTarget(time_ms, motion) = message {
                 assert!(report.mode.armed());
                 assert_eq!(u64::from(time_ms), report.time_us / 1000);
                 let followed = report.guided.setpoint.expect("it has a state");
@@ -36,10 +36,10 @@ fn the_setpoint_that_is_followed_is_reported() {
     let (_, last) = reported.last().expect("some");
     assert!((last - Vector3::new(0.5, -0.25, 0.5)).norm() < 0.2, "{last}");
     // There is no setpoint after disarming, so the request is refused.
-    bench.hear(Uplink::Command(Command::RequestMessage { message: id::POSITION_TARGET_LOCAL_NED, index: 0 }));
+    bench.hear(Uplink::Command(VehicleCommand::RequestMessage { message: id::POSITION_TARGET_LOCAL_NED, index: 0 }));
     let refused = bench.step().1.iter().any(|it| {
-        matches!(it, Downlink::Answer { command: 512, answer, .. }
-        if *answer == afbc_mavlink::Answer::Refused(afbc_comms::NOT_KNOWN))
+        matches!(it, Downlink::CommandAck { command: 512, answer, .. }
+        if *answer == afbc_mavlink::CommandResult::Refused(afbc_comms::NOT_KNOWN))
     });
     assert!(refused);
 }

@@ -5,8 +5,9 @@ use crate::memory::{Memory, bytes};
 use afbc_comms::services::streams::{DEFAULTS, id};
 use afbc_comms::{Comms, REPORT_MAX, Setup, Transfers};
 use afbc_mavlink::{
-    Address, Answer, Command, ComponentMetadata, Decoder, Downlink, FRAME_MAX, Fault, FileOpcode, FilePacket,
-    LogMessage, LogRequest, Message, MessageFormat, Question, Sender, Telemetry, Transfer, Uplink,
+    Address, CommandResult, ComponentMetadata, Decoder, Downlink, Encoder, FRAME_MAX, FileOpcode, FilePacket,
+    FrameFault, LogMessage, LogRequest, MessageFormat, MessageSet, ServiceRequest, Telemetry, Transfer, Uplink,
+    VehicleCommand,
 };
 use afbc_onboard::{Configuration, Link, Readings, parameters::ParameterTable};
 use afbc_types::State;
@@ -22,12 +23,12 @@ enum Sent {
     Transfer(Transfer),
 }
 
-impl Message for Sent {
+impl MessageSet for Sent {
     fn format(id: u32) -> Option<MessageFormat> {
         Transfer::format(id).or_else(|| Downlink::format(id))
     }
 
-    fn read(id: u32, payload: &[u8], receiver: Address) -> Result<Self, Fault> {
+    fn read(id: u32, payload: &[u8], receiver: Address) -> Result<Self, FrameFault> {
         match Transfer::format(id) {
             Some(_) => Transfer::read(id, payload, receiver).map(Sent::Transfer),
             None => Downlink::read(id, payload, receiver).map(Sent::Usual),
@@ -63,16 +64,16 @@ impl Vehicle {
 
     fn fills_the_line(mut self) -> Self {
         for (message, _) in DEFAULTS {
-            self.hear(STATION, &Uplink::Command(Command::SetInterval { message, interval_us: 1_000 }));
+            self.hear(STATION, &Uplink::Command(VehicleCommand::SetInterval { message, interval_us: 1_000 }));
             self.step();
         }
         (0..100).for_each(|_| drop(self.step()));
         self
     }
 
-    fn hear(&mut self, from: Address, message: &impl Message) {
+    fn hear(&mut self, from: Address, message: &impl MessageSet) {
         let mut buffer = [0; FRAME_MAX];
-        let frame = Sender::new(from).send(message, &mut buffer);
+        let frame = Encoder::new(from).send(message, &mut buffer);
         let Bench { comms, uplink, .. } = &mut self.bench;
         let update = comms.receive_beside(uplink, frame, &mut self.transfers);
         self.bench.inputs.merge(&update);
@@ -83,7 +84,7 @@ impl Vehicle {
     }
 
     fn log(&mut self, from: Address, request: LogRequest) {
-        self.hear(from, &Uplink::Question(Question::Log(request)));
+        self.hear(from, &Uplink::ServiceRequest(ServiceRequest::Log(request)));
     }
 
     fn step(&mut self) -> Vec<Sent> {
@@ -176,9 +177,11 @@ fn a_download_shares_the_line() {
                 let mut waited = 0;
                 for second in 0..5 {
                     let command = 30_000 + second;
-                    vehicle.hear(STATION, &Uplink::Command(Command::Other(command)));
+                    vehicle.hear(STATION, &Uplink::Command(VehicleCommand::Other(command)));
                     let is_answer = |sent: &Sent| match sent {
-                        Sent::Usual(Downlink::Answer { command: answered, .. }) => (*answered == command).then_some(()),
+                        Sent::Usual(Downlink::CommandAck { command: answered, .. }) => {
+                            (*answered == command).then_some(())
+                        }
                         _ => None,
                     };
                     let ((), ticks) = vehicle.until(1000, is_answer);
@@ -247,7 +250,7 @@ fn a_transfer_keeps_nothing_back() {
         let mut vehicle = Vehicle::on(57_600);
         for (message, _) in DEFAULTS {
             let interval_us = if message == streamed { 100_000 } else { -1 };
-            vehicle.hear(STATION, &Uplink::Command(Command::SetInterval { message, interval_us }));
+            vehicle.hear(STATION, &Uplink::Command(VehicleCommand::SetInterval { message, interval_us }));
             vehicle.step();
         }
         begin(&mut vehicle);
@@ -282,25 +285,26 @@ fn many_requests_at_once_are_kept() {
 fn metadata_is_told_on_request() {
     let mut vehicle = Vehicle::on(57_600).fills_the_line();
     for message in [397, 395] {
-        vehicle.hear(STATION, &Uplink::Command(Command::RequestMessage { message, index: 0 }));
+        vehicle.hear(STATION, &Uplink::Command(VehicleCommand::RequestMessage { message, index: 0 }));
         let (mut answered, mut told) = (None, None);
         for _ in 0..250 {
             for sent in vehicle.step() {
                 match sent {
-                    Sent::Usual(Downlink::Answer { command: 512, answer, to }) => answered = Some((answer, to)),
+                    Sent::Usual(Downlink::CommandAck { command: 512, answer, to }) => answered = Some((answer, to)),
                     Sent::Transfer(Transfer::Metadata(metadata)) => told = Some((397, metadata)),
                     Sent::Transfer(Transfer::Information(metadata)) => told = Some((395, metadata)),
                     _ => (),
                 }
             }
         }
-        assert_eq!(answered, Some((Answer::Accepted, STATION)));
+        assert_eq!(answered, Some((CommandResult::Accepted, STATION)));
         let (kind, metadata) = told.expect("told");
         assert_eq!((kind, metadata.crc, metadata.time_ms > 0), (message, 77, true));
         assert!(metadata.uri.starts_with(URI.as_bytes()) && metadata.uri[URI.len()] == 0);
     }
     // Other messages can still be requested. The capabilities show that there is file transfer.
-    vehicle.hear(STATION, &Uplink::Command(Command::RequestMessage { message: id::AUTOPILOT_VERSION, index: 0 }));
+    vehicle
+        .hear(STATION, &Uplink::Command(VehicleCommand::RequestMessage { message: id::AUTOPILOT_VERSION, index: 0 }));
     let (capabilities, _) = vehicle.until(250, |sent| match sent {
         Sent::Usual(Downlink::Telemetry(Telemetry::Version(version))) => Some(version.capabilities),
         _ => None,
@@ -323,7 +327,7 @@ fn logs_are_erased_while_disarmed_and_by_the_station_in_control() {
     let mut vehicle = Vehicle::on(921_600);
     vehicle.step();
     // A station that gives an order takes control. Other stations may read but not erase.
-    vehicle.hear(STATION, &Uplink::Command(Command::Speed(1.0)));
+    vehicle.hear(STATION, &Uplink::Command(VehicleCommand::Speed(1.0)));
     vehicle.log(OTHER, LogRequest::Erase);
     vehicle.file(OTHER, remove);
     let ((packet, to), _) = vehicle.until(50, file);
@@ -345,7 +349,7 @@ fn the_log_is_streamed() {
         _ => None,
     };
     let mut vehicle = Vehicle::on(921_600).fills_the_line();
-    vehicle.hear(OTHER, &Uplink::Command(Command::StartLogStream));
+    vehicle.hear(OTHER, &Uplink::Command(VehicleCommand::StartLogStream));
     let (said, _) = vehicle.until(100, text);
     assert_eq!(said, "there is no log to stream");
 
@@ -359,9 +363,9 @@ fn the_log_is_streamed() {
         }
     }
     vehicle.store.made = Some(log.clone());
-    vehicle.hear(OTHER, &Uplink::Command(Command::StartLogStream));
+    vehicle.hear(OTHER, &Uplink::Command(VehicleCommand::StartLogStream));
     let answer = |sent: &Sent| match sent {
-        Sent::Usual(Downlink::Answer { command: 2510, answer, .. }) => Some(*answer),
+        Sent::Usual(Downlink::CommandAck { command: 2510, answer, .. }) => Some(*answer),
         _ => None,
     };
     let mut read: Vec<u8> = Vec::new();
@@ -378,7 +382,7 @@ fn the_log_is_streamed() {
             }
         }
     }
-    assert_eq!(answers, [Answer::Accepted]);
+    assert_eq!(answers, [CommandResult::Accepted]);
     assert_eq!(read, log[..read.len()]);
     // Telemetry leaves the log stream a fifth of the line, for 3 s at 92 kB/s.
     assert!((40_000..80_000).contains(&read.len()), "{}", read.len());
@@ -386,7 +390,7 @@ fn the_log_is_streamed() {
     vehicle.file(STATION, FilePacket::request(1, FileOpcode::LIST_DIRECTORY, 0, 0, 0).with(b"log"));
     vehicle.until(100, file);
 
-    vehicle.hear(OTHER, &Uplink::Command(Command::StopLogStream));
+    vehicle.hear(OTHER, &Uplink::Command(VehicleCommand::StopLogStream));
     vehicle.step();
     assert!((0..200).all(|_| vehicle.step().iter().all(|sent| part(sent).is_none())));
     assert!(!vehicle.store.makes);

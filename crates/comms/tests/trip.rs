@@ -3,15 +3,15 @@
 use crate::common::{Bench, STATION};
 use afbc::Trip;
 use afbc_flight_core::{Mode, Request};
-use afbc_mavlink::{Answer, Command, Downlink, MavCmd, MavSeverity, Text, Uplink};
+use afbc_mavlink::{CommandResult, Downlink, MavCmd, MavSeverity, StatusText, Uplink, VehicleCommand};
 use afbc_types::{Axis, State};
 
 fn text(reason: &str) -> Downlink {
-    Downlink::Text { severity: MavSeverity::MAV_SEVERITY_WARNING, text: Text::from(reason) }
+    Downlink::Text { severity: MavSeverity::MAV_SEVERITY_WARNING, text: StatusText::from(reason) }
 }
 
 fn accepted(command: MavCmd) -> Downlink {
-    Downlink::Answer { command: command as u16, answer: Answer::Accepted, to: STATION }
+    Downlink::CommandAck { command: command as u16, answer: CommandResult::Accepted, to: STATION }
 }
 
 /// A vehicle that is held at a wrong attitude trips and reports it once. MAV_CMD_USER_1 engages AFBC again.
@@ -23,7 +23,7 @@ fn a_trip_is_reported_once_and_ended_by_command() {
     }
     bench.follow();
     bench.tick(&State::default());
-    bench.hear(Uplink::Command(Command::Arm));
+    bench.hear(Uplink::Command(VehicleCommand::Arm));
     let (report, said) = bench.tick(&State::default());
     assert_eq!((report.mode, said), (Mode::Flying, vec![accepted(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM)]));
 
@@ -39,7 +39,7 @@ fn a_trip_is_reported_once_and_ended_by_command() {
     let reason = reason.expect("nine seconds on its side");
     assert_eq!(received, [text(reason)]);
 
-    bench.hear(Uplink::Command(Command::Engage));
+    bench.hear(Uplink::Command(VehicleCommand::Engage));
     let (report, said) = bench.tick(&State::default());
     assert_eq!(report.answer.map(|answer| (answer.request, answer.result)), Some((Request::Engage, Ok(()))));
     assert_eq!(report.health.control.fallback, None);

@@ -10,7 +10,7 @@
 
 use crate::bus::SpiFormat;
 use crate::mpu::{ACCEL_XOUT_H, I2C_IF_DIS, LENGTH, Mpu9250, USER_CTRL};
-use crate::part::{PartFault, SensorPart, Step};
+use crate::part::{PartFault, ScriptStep, SensorPart};
 use crate::reading::{InertialReading, MagneticReading, little};
 use nalgebra::Vector3;
 
@@ -82,8 +82,8 @@ const UT_PER_LSB: f32 = 0.15;
 const AGE_MAX: u32 = 100;
 
 /// Joins two scripts; `N` must be the sum of their lengths.
-const fn join<const N: usize>(first: &[Step], second: &[Step]) -> [Step; N] {
-    let mut all = [Step::Wait(0); N];
+const fn join<const N: usize>(first: &[ScriptStep], second: &[ScriptStep]) -> [ScriptStep; N] {
+    let mut all = [ScriptStep::Wait(0); N];
     let (mut places, mut steps, mut others) = (all.as_mut_slice(), first, second);
     while let Some((place, more_places)) = places.split_first_mut() {
         if steps.is_empty() {
@@ -98,46 +98,46 @@ const fn join<const N: usize>(first: &[Step], second: &[Step]) -> [Step; N] {
 }
 
 /// Set-up of the magnetometer, one register per write: the registers of the auxiliary I2C do not accept blocks.
-const MAGNETOMETER: &[Step] = &[
-    Step::Write(USER_CTRL, I2C_MST_EN | I2C_IF_DIS),
-    Step::Set(I2C_MST_CTRL, 0x1D), // 400 kHz, stop between reads
+const MAGNETOMETER: &[ScriptStep] = &[
+    ScriptStep::Write(USER_CTRL, I2C_MST_EN | I2C_IF_DIS),
+    ScriptStep::Set(I2C_MST_CTRL, 0x1D), // 400 kHz, stop between reads
     // Single writes to the magnetometer: reset, then access to its fuse ROM.
-    Step::Set(I2C_SLV4_ADDR, ADDRESS),
-    Step::Write(I2C_SLV4_REG, CNTL2),
-    Step::Write(I2C_SLV4_DO, 1),
-    Step::Write(I2C_SLV4_CTRL, EN),
-    Step::Wait(5_000),
-    Step::Set(I2C_SLV4_REG, CNTL1),
-    Step::Write(I2C_SLV4_DO, FUSE_ROM),
-    Step::Write(I2C_SLV4_CTRL, EN),
-    Step::Wait(5_000),
+    ScriptStep::Set(I2C_SLV4_ADDR, ADDRESS),
+    ScriptStep::Write(I2C_SLV4_REG, CNTL2),
+    ScriptStep::Write(I2C_SLV4_DO, 1),
+    ScriptStep::Write(I2C_SLV4_CTRL, EN),
+    ScriptStep::Wait(5_000),
+    ScriptStep::Set(I2C_SLV4_REG, CNTL1),
+    ScriptStep::Write(I2C_SLV4_DO, FUSE_ROM),
+    ScriptStep::Write(I2C_SLV4_CTRL, EN),
+    ScriptStep::Wait(5_000),
     // Reads sensitivity and identity.
-    Step::Write(I2C_SLV0_ADDR, READ | ADDRESS),
-    Step::Write(I2C_SLV0_REG, ASAX),
-    Step::Write(I2C_SLV1_ADDR, READ | ADDRESS),
-    Step::Write(I2C_SLV1_REG, WIA),
-    Step::Write(I2C_SLV0_CTRL, EN | 3),
-    Step::Write(I2C_SLV1_CTRL, EN | 1),
-    Step::Wait(5_000),
-    Step::Read(ACCEL_XOUT_H, LENGTH + 4),
+    ScriptStep::Write(I2C_SLV0_ADDR, READ | ADDRESS),
+    ScriptStep::Write(I2C_SLV0_REG, ASAX),
+    ScriptStep::Write(I2C_SLV1_ADDR, READ | ADDRESS),
+    ScriptStep::Write(I2C_SLV1_REG, WIA),
+    ScriptStep::Write(I2C_SLV0_CTRL, EN | 3),
+    ScriptStep::Write(I2C_SLV1_CTRL, EN | 1),
+    ScriptStep::Wait(5_000),
+    ScriptStep::Read(ACCEL_XOUT_H, LENGTH + 4),
     // Disables both slaves before they are set up anew, since their places among the data registers depend on the order
     // of enabling.
-    Step::Write(I2C_SLV0_CTRL, 0),
-    Step::Write(I2C_SLV1_CTRL, 0),
-    Step::Set(I2C_SLV4_DO, POWER_DOWN),
-    Step::Write(I2C_SLV4_CTRL, EN),
-    Step::Wait(5_000),
+    ScriptStep::Write(I2C_SLV0_CTRL, 0),
+    ScriptStep::Write(I2C_SLV1_CTRL, 0),
+    ScriptStep::Set(I2C_SLV4_DO, POWER_DOWN),
+    ScriptStep::Write(I2C_SLV4_CTRL, EN),
+    ScriptStep::Wait(5_000),
     // Every tenth sample reads a measurement and commands the next.
-    Step::Set(I2C_SLV4_CTRL, 9),
-    Step::Set(I2C_MST_DELAY_CTRL, 0b11),
-    Step::Set(I2C_SLV0_ADDR, READ | ADDRESS),
-    Step::Set(I2C_SLV0_REG, ST1),
-    Step::Set(I2C_SLV1_ADDR, ADDRESS),
-    Step::Set(I2C_SLV1_REG, CNTL1),
-    Step::Set(I2C_SLV1_DO, SINGLE),
+    ScriptStep::Set(I2C_SLV4_CTRL, 9),
+    ScriptStep::Set(I2C_MST_DELAY_CTRL, 0b11),
+    ScriptStep::Set(I2C_SLV0_ADDR, READ | ADDRESS),
+    ScriptStep::Set(I2C_SLV0_REG, ST1),
+    ScriptStep::Set(I2C_SLV1_ADDR, ADDRESS),
+    ScriptStep::Set(I2C_SLV1_REG, CNTL1),
+    ScriptStep::Set(I2C_SLV1_DO, SINGLE),
     // Not read back: the MPU may disable a slave that does not acknowledge.
-    Step::Write(I2C_SLV0_CTRL, EN | 8),
-    Step::Write(I2C_SLV1_CTRL, EN | 1),
+    ScriptStep::Write(I2C_SLV0_CTRL, EN | 8),
+    ScriptStep::Write(I2C_SLV1_CTRL, EN | 1),
 ];
 
 impl Default for Mpu9250Ak8963 {
@@ -152,8 +152,10 @@ impl SensorPart for Mpu9250Ak8963 {
     const SPI: Option<SpiFormat> = Mpu9250::SPI;
     const I2C: &'static [u8] = &[];
     const STUCK_AFTER: u32 = Mpu9250::STUCK_AFTER;
-    const SETUP: &'static [Step] = &join::<{ Mpu9250::SETUP.len() + MAGNETOMETER.len() }>(Mpu9250::SETUP, MAGNETOMETER);
-    const CYCLE: &'static [Step] = &[Step::Ready(2_000), Step::Read(ACCEL_XOUT_H, LENGTH + MAGNETIC_LENGTH)];
+    const SETUP: &'static [ScriptStep] =
+        &join::<{ Mpu9250::SETUP.len() + MAGNETOMETER.len() }>(Mpu9250::SETUP, MAGNETOMETER);
+    const CYCLE: &'static [ScriptStep] =
+        &[ScriptStep::Ready(2_000), ScriptStep::Read(ACCEL_XOUT_H, LENGTH + MAGNETIC_LENGTH)];
 
     fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<Mpu9250Reading>, PartFault> {
         let (inertial, external) = answer.split_at_checked(LENGTH).ok_or(PartFault::Bus)?;

@@ -12,7 +12,7 @@
 //! is corrected.
 
 use crate::bus::SpiFormat;
-use crate::part::{PartFault, SelfTest, SensorPart, Step};
+use crate::part::{PartFault, ScriptStep, SelfTest, SensorPart};
 use crate::reading::{InertialReading, little};
 use crate::self_test::numbers;
 use bmi2::config::BMI270_CONFIG_FILE;
@@ -63,10 +63,10 @@ impl SensorPart for Bmi270 {
     /// gyroscope's self-test needs another feature of the configuration and is not run.
     const SELF_TEST: Option<SelfTest<InertialReading>> = Some(SelfTest {
         // Enabled, large amplitude, negative direction.
-        quiet: &[Step::Write(ACC_SELF_TEST, 0b1001), Step::Wait(50_000)],
+        quiet: &[ScriptStep::Write(ACC_SELF_TEST, 0b1001), ScriptStep::Wait(50_000)],
         trims: &[],
         between: &[],
-        stimulated: &[Step::Write(ACC_SELF_TEST, 0b1101), Step::Wait(50_000)],
+        stimulated: &[ScriptStep::Write(ACC_SELF_TEST, 0b1101), ScriptStep::Wait(50_000)],
         skipped: 1,
         averaged: 16,
         axes: numbers,
@@ -75,33 +75,34 @@ impl SensorPart for Bmi270 {
             x > 16.0 && y < -15.0 && z > 10.0
         },
     });
-    const SETUP: &'static [Step] = &[
-        Step::Await(CHIP_ID, 0, 0, 0), // dummy read: the edge of chip select switches from I2C to SPI
-        Step::Wait(450),
-        Step::Write(CMD, 0xB6), // soft reset, back to I2C
-        Step::Wait(2_000),
-        Step::Await(CHIP_ID, 0, 0, 0),
-        Step::Wait(450),
-        Step::Identify(CHIP_ID, &[0x24]),
-        Step::Set(PWR_CONF, 0), // power saving off, since it would lose writes
-        Step::Wait(450),
-        Step::Write(INIT_CTRL, 0),
-        Step::WriteAll(INIT_DATA, &BMI270_CONFIG_FILE),
-        Step::Write(INIT_CTRL, 1),
-        Step::Wait(20_000),
-        Step::Await(INTERNAL_STATUS, MESSAGE, INIT_OK, 150),
-        Step::Set(ACC_CONF, 0x9C),       // performance mode, OSR2, 1.6 kHz
-        Step::Set(ACC_RANGE, 3),         // 16 g
-        Step::Set(GYR_CONF, 0xDC),       // performance mode for noise and filter, OSR2, 1.6 kHz
-        Step::Set(GYR_RANGE, 0),         // 2000 deg/s
-        Step::Set(INT1_IO_CTRL, 0b1010), // output, push-pull, active high
-        Step::Set(INT_LATCH, 0),
-        Step::Set(INT_MAP_DATA, 0b100), // data ready on INT1
-        Step::Set(PWR_CTRL, 0b1110),    // accelerometer, gyroscope, temperature
-        Step::Wait(50_000),             // gyroscope start-up; it reads 0 before
-        Step::Read(GYR_CAS, 1),
+    const SETUP: &'static [ScriptStep] = &[
+        ScriptStep::Await(CHIP_ID, 0, 0, 0), // dummy read: the edge of chip select switches from I2C to SPI
+        ScriptStep::Wait(450),
+        ScriptStep::Write(CMD, 0xB6), // soft reset, back to I2C
+        ScriptStep::Wait(2_000),
+        ScriptStep::Await(CHIP_ID, 0, 0, 0),
+        ScriptStep::Wait(450),
+        ScriptStep::Identify(CHIP_ID, &[0x24]),
+        ScriptStep::Set(PWR_CONF, 0), // power saving off, since it would lose writes
+        ScriptStep::Wait(450),
+        ScriptStep::Write(INIT_CTRL, 0),
+        ScriptStep::WriteAll(INIT_DATA, &BMI270_CONFIG_FILE),
+        ScriptStep::Write(INIT_CTRL, 1),
+        ScriptStep::Wait(20_000),
+        ScriptStep::Await(INTERNAL_STATUS, MESSAGE, INIT_OK, 150),
+        ScriptStep::Set(ACC_CONF, 0x9C),       // performance mode, OSR2, 1.6 kHz
+        ScriptStep::Set(ACC_RANGE, 3),         // 16 g
+        ScriptStep::Set(GYR_CONF, 0xDC),       // performance mode for noise and filter, OSR2, 1.6 kHz
+        ScriptStep::Set(GYR_RANGE, 0),         // 2000 deg/s
+        ScriptStep::Set(INT1_IO_CTRL, 0b1010), // output, push-pull, active high
+        ScriptStep::Set(INT_LATCH, 0),
+        ScriptStep::Set(INT_MAP_DATA, 0b100), // data ready on INT1
+        ScriptStep::Set(PWR_CTRL, 0b1110),    // accelerometer, gyroscope, temperature
+        ScriptStep::Wait(50_000),             // gyroscope start-up; it reads 0 before
+        ScriptStep::Read(GYR_CAS, 1),
     ];
-    const CYCLE: &'static [Step] = &[Step::Ready(1_250), Step::Read(DATA_8, 12), Step::Read(INTERNAL_STATUS, 3)];
+    const CYCLE: &'static [ScriptStep] =
+        &[ScriptStep::Ready(1_250), ScriptStep::Read(DATA_8, 12), ScriptStep::Read(INTERNAL_STATUS, 3)];
 
     fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<InertialReading>, PartFault> {
         match (register, answer) {

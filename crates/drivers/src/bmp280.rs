@@ -8,7 +8,7 @@
 //! Not over SPI: there, writes use register addresses with the highest bit cleared, which [`SpiFormat`] cannot express.
 
 use crate::bus::SpiFormat;
-use crate::part::{PartFault, SensorPart, Step};
+use crate::part::{PartFault, ScriptStep, SensorPart};
 use crate::reading::{PressureReading, in_range};
 
 /// BMP280.
@@ -17,12 +17,12 @@ pub struct Bmp280 {
     /// Raw coefficients as last read.
     raw: [u8; CALIBRATION_LENGTH],
     /// Decoded coefficients, if two reads agreed.
-    coefficients: Option<Coefficients>,
+    coefficients: Option<Bmp280Coefficients>,
 }
 
 /// Coefficients, named as in table 17 of the data sheet.
 #[derive(Clone, Copy, Debug)]
-struct Coefficients {
+struct Bmp280Coefficients {
     t1: f32,
     t2: f32,
     t3: f32,
@@ -69,27 +69,27 @@ impl SensorPart for Bmp280 {
     const SPI: Option<SpiFormat> = None;
     const I2C: &'static [u8] = &[0x76, 0x77];
     const STUCK_AFTER: u32 = 20;
-    const SETUP: &'static [Step] = &[
-        Step::Write(RESET, SOFT_RESET),
-        Step::Wait(3_000), // 2 ms and a margin
-        Step::Identify(ID, &[IDENTITY]),
-        Step::Await(STATUS, IM_UPDATE, 0, 10),
-        Step::Read(CALIBRATION, CALIBRATION_LENGTH),
-        Step::Read(CALIBRATION, CALIBRATION_LENGTH),
-        Step::Set(CONFIG, CONFIG_VALUE),
+    const SETUP: &'static [ScriptStep] = &[
+        ScriptStep::Write(RESET, SOFT_RESET),
+        ScriptStep::Wait(3_000), // 2 ms and a margin
+        ScriptStep::Identify(ID, &[IDENTITY]),
+        ScriptStep::Await(STATUS, IM_UPDATE, 0, 10),
+        ScriptStep::Read(CALIBRATION, CALIBRATION_LENGTH),
+        ScriptStep::Read(CALIBRATION, CALIBRATION_LENGTH),
+        ScriptStep::Set(CONFIG, CONFIG_VALUE),
     ];
-    const CYCLE: &'static [Step] = &[
-        Step::Write(CTRL_MEAS, FORCED),
-        Step::Wait(MEASUREMENT_US),
-        Step::Await(STATUS, MEASURING, 0, 5),
-        Step::Await(CONFIG, 0xFF, CONFIG_VALUE, 0), // checks that no reset has occurred
-        Step::Read(PRESS_MSB, 6),
+    const CYCLE: &'static [ScriptStep] = &[
+        ScriptStep::Write(CTRL_MEAS, FORCED),
+        ScriptStep::Wait(MEASUREMENT_US),
+        ScriptStep::Await(STATUS, MEASURING, 0, 5),
+        ScriptStep::Await(CONFIG, 0xFF, CONFIG_VALUE, 0), // checks that no reset has occurred
+        ScriptStep::Read(PRESS_MSB, 6),
     ];
 
     fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<PressureReading>, PartFault> {
         if register == CALIBRATION {
             let answer = answer.try_into().map_err(|_| PartFault::Bus)?;
-            self.coefficients = (self.raw == answer).then(|| Coefficients::new(answer));
+            self.coefficients = (self.raw == answer).then(|| Bmp280Coefficients::new(answer));
             self.raw = answer;
             return Ok(None);
         }
@@ -104,12 +104,12 @@ impl SensorPart for Bmp280 {
     }
 }
 
-impl Coefficients {
+impl Bmp280Coefficients {
     fn new(raw: [u8; CALIBRATION_LENGTH]) -> Self {
         let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v, w, x] = raw;
         let word = |low, high| f32::from(u16::from_le_bytes([low, high]));
         let signed = |low, high| f32::from(i16::from_le_bytes([low, high]));
-        Coefficients {
+        Bmp280Coefficients {
             t1: word(a, b),
             t2: signed(c, d),
             t3: signed(e, f),
@@ -127,7 +127,7 @@ impl Coefficients {
 
     /// Computes section 8.1 with the powers of 2 combined. A `p1` of 0 gives NaN or infinity, which is out of range.
     fn compensate(&self, pressure: f32, temperature: f32) -> PressureReading {
-        let Coefficients { t1, t2, t3, p1, p2, p3, p4, p5, p6, p7, p8, p9 } = *self;
+        let Bmp280Coefficients { t1, t2, t3, p1, p2, p3, p4, p5, p6, p7, p8, p9 } = *self;
         let above = temperature / 16_384.0 - t1 / 1_024.0;
         let fine = above * t2 + above * above * t3 / 64.0;
         let warm = fine / 2.0 - 64_000.0;

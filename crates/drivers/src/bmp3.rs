@@ -5,7 +5,7 @@
 //! interrupt is not used. The coefficients have a CRC-8 in the register before them, as in Bosch's self-test.
 
 use crate::bus::SpiFormat;
-use crate::part::{PartFault, SensorPart, Step};
+use crate::part::{PartFault, ScriptStep, SensorPart};
 use crate::reading::{PressureReading, in_range};
 
 /// BMP388.
@@ -17,12 +17,12 @@ pub type Bmp390 = Bmp3<0x60>;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Bmp3<const IDENTITY: u8> {
     /// Coefficients, if their CRC is correct.
-    coefficients: Option<Coefficients>,
+    coefficients: Option<Bmp3Coefficients>,
 }
 
 /// Coefficients, named and scaled as in section 9.1 of the data sheet.
 #[derive(Clone, Copy, Debug)]
-struct Coefficients {
+struct Bmp3Coefficients {
     t1: f32,
     t2: f32,
     t3: f32,
@@ -63,17 +63,18 @@ impl<const IDENTITY: u8> SensorPart for Bmp3<IDENTITY> {
     const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0x80, write: 0, dummies: 1, clock_hz: 10_000_000 });
     const I2C: &'static [u8] = &[0x76, 0x77];
     const STUCK_AFTER: u32 = 20;
-    const SETUP: &'static [Step] = &[
-        Step::Write(CMD, SOFTRESET),
-        Step::Wait(5_000), // 2 ms and a margin
-        Step::Identify(CHIP_ID, &[IDENTITY]),
-        Step::Read(CALIBRATION, CALIBRATION_LENGTH),
-        Step::Set(OSR, 0b000_011), // temperature once, pressure 8 times
-        Step::Set(ODR, 0x02),      // 50 Hz
-        Step::Set(CONFIG, 0),
-        Step::Set(PWR_CTRL, 0x33), // pressure and temperature, normal mode
+    const SETUP: &'static [ScriptStep] = &[
+        ScriptStep::Write(CMD, SOFTRESET),
+        ScriptStep::Wait(5_000), // 2 ms and a margin
+        ScriptStep::Identify(CHIP_ID, &[IDENTITY]),
+        ScriptStep::Read(CALIBRATION, CALIBRATION_LENGTH),
+        ScriptStep::Set(OSR, 0b000_011), // temperature once, pressure 8 times
+        ScriptStep::Set(ODR, 0x02),      // 50 Hz
+        ScriptStep::Set(CONFIG, 0),
+        ScriptStep::Set(PWR_CTRL, 0x33), // pressure and temperature, normal mode
     ];
-    const CYCLE: &'static [Step] = &[Step::Wait(17_000), Step::Await(STATUS, DRDY, DRDY, 23), Step::Read(DATA_0, 6)];
+    const CYCLE: &'static [ScriptStep] =
+        &[ScriptStep::Wait(17_000), ScriptStep::Await(STATUS, DRDY, DRDY, 23), ScriptStep::Read(DATA_0, 6)];
 
     fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<PressureReading>, PartFault> {
         if register == CALIBRATION {
@@ -83,7 +84,7 @@ impl<const IDENTITY: u8> SensorPart for Bmp3<IDENTITY> {
             if crc(trim) != check {
                 return Err(PartFault::Calibration);
             }
-            self.coefficients = Some(Coefficients::new(trim.try_into().map_err(|_| PartFault::Bus)?));
+            self.coefficients = Some(Bmp3Coefficients::new(trim.try_into().map_err(|_| PartFault::Bus)?));
             return Ok(None);
         }
         let &[p0, p1, p2, t0, t1, t2] = answer else { return Err(PartFault::Bus) };
@@ -93,13 +94,13 @@ impl<const IDENTITY: u8> SensorPart for Bmp3<IDENTITY> {
     }
 }
 
-impl Coefficients {
+impl Bmp3Coefficients {
     fn new(trim: [u8; 21]) -> Self {
         let [a, b, c, d, t3, e, f, g, h, p3, p4, i, j, k, l, p7, p8, m, n, p10, p11] = trim;
         let byte = |value: u8| f32::from(value.cast_signed());
         let word = |low, high| f32::from(u16::from_le_bytes([low, high]));
         let signed = |low, high| f32::from(i16::from_le_bytes([low, high]));
-        Coefficients {
+        Bmp3Coefficients {
             t1: word(a, b) * exp2(8),
             t2: word(c, d) * exp2(-30),
             t3: byte(t3) * exp2(-48),
@@ -118,7 +119,7 @@ impl Coefficients {
     }
 
     fn compensate(&self, p: f32, temperature: f32) -> PressureReading {
-        let Coefficients { t1, t2, t3, p1, p2, p3, p4, p5, p6, p7, p8, p9, p10, p11 } = *self;
+        let Bmp3Coefficients { t1, t2, t3, p1, p2, p3, p4, p5, p6, p7, p8, p9, p10, p11 } = *self;
         let above = temperature - t1;
         let t = above * (t2 + above * t3);
         let constant = p5 + t * (p6 + t * (p7 + t * p8));

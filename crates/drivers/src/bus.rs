@@ -3,7 +3,7 @@
 use embedded_hal_async::i2c::I2c;
 use embedded_hal_async::spi::{Operation, SpiDevice};
 
-/// Longest answer to a [`Step::Read`](crate::Step::Read) \[bytes\].
+/// Longest answer to a [`ScriptStep::Read`](crate::ScriptStep::Read) \[bytes\].
 pub const READ_MAX: usize = 32;
 /// Longest block for a write over I2C \[bytes\].
 const BLOCK_MAX: usize = 31;

@@ -6,13 +6,13 @@ use embassy_futures::select::{Either, select};
 
 /// Pin of a data-ready interrupt.
 #[allow(async_fn_in_trait, reason = "used generically, never boxed")]
-pub trait Edge {
+pub trait DataReadyPin {
     /// Waits for the next edge and returns its time since power-up \[us\]. Only edges after the call count. The future
     /// may be dropped.
     async fn next(&mut self) -> u64;
 }
 
-impl<E: Edge> Edge for &mut E {
+impl<E: DataReadyPin> DataReadyPin for &mut E {
     async fn next(&mut self) -> u64 {
         (**self).next().await
     }
@@ -40,7 +40,7 @@ pub struct DataReady<E, C> {
     last_us: Option<u64>,
 }
 
-impl<E: Edge, C: PartTiming> DataReady<E, C> {
+impl<E: DataReadyPin, C: PartTiming> DataReady<E, C> {
     /// Creates the timing of a part with this pin. The board's `clock` is ready at the beginning of every period of
     /// `period_us`.
     pub fn new(edge: E, clock: C, period_us: u32) -> Self {
@@ -67,7 +67,7 @@ impl<E: Edge, C: PartTiming> DataReady<E, C> {
     }
 }
 
-impl<E: Edge, C: PartTiming> PartTiming for DataReady<E, C> {
+impl<E: DataReadyPin, C: PartTiming> PartTiming for DataReady<E, C> {
     fn now_us(&self) -> u64 {
         self.clock.now_us()
     }

@@ -12,7 +12,7 @@
 //! | temperature fuses | enabled by five writes, as in Infineon's library | no writes needed |
 
 use crate::bus::SpiFormat;
-use crate::part::{PartFault, SensorPart, Step};
+use crate::part::{PartFault, ScriptStep, SensorPart};
 use crate::reading::{PressureReading, in_range};
 
 /// DPS310.
@@ -26,12 +26,12 @@ pub struct Dps3xx<const IS_SPL06: bool> {
     /// Raw coefficients as last read.
     raw: [u8; COEF_LENGTH],
     /// Decoded coefficients, if two reads agreed.
-    coefficients: Option<Coefficients>,
+    coefficients: Option<Dps3xxCoefficients>,
 }
 
 /// Coefficients, named as in sections 4.9.1 and 4.9.2.
 #[derive(Clone, Copy, Debug)]
-struct Coefficients {
+struct Dps3xxCoefficients {
     c0: f32,
     c1: f32,
     c00: f32,
@@ -76,37 +76,37 @@ const KT: f32 = 3_670_016.0;
 const RANGE_PA: [f32; 2] = [30_000.0, 120_000.0];
 const RANGE_C: [f32; 2] = [-40.0, 85.0];
 
-const DPS310: &[Step] = &[
-    Step::Write(RESET, SOFT_RST),
-    Step::Wait(3_000), // no answers before
-    Step::Identify(ID, &[PROD_ID]),
-    Step::Await(MEAS_CFG, COEF_RDY | SENSOR_RDY, COEF_RDY | SENSOR_RDY, 100),
-    Step::Read(COEF, COEF_LENGTH),
-    Step::Read(COEF, COEF_LENGTH),
+const DPS310: &[ScriptStep] = &[
+    ScriptStep::Write(RESET, SOFT_RST),
+    ScriptStep::Wait(3_000), // no answers before
+    ScriptStep::Identify(ID, &[PROD_ID]),
+    ScriptStep::Await(MEAS_CFG, COEF_RDY | SENSOR_RDY, COEF_RDY | SENSOR_RDY, 100),
+    ScriptStep::Read(COEF, COEF_LENGTH),
+    ScriptStep::Read(COEF, COEF_LENGTH),
     // Undocumented; without these writes, some parts read a wrong temperature.
-    Step::Write(0x0E, 0xA5),
-    Step::Write(0x0F, 0x96),
-    Step::Write(0x62, 0x02),
-    Step::Write(0x0E, 0x00),
-    Step::Write(0x0F, 0x00),
-    Step::Set(PRS_CFG, PRS_CFG_VALUE),
-    Step::SetLike(TMP_CFG, TMP_CFG_VALUE, TMP_EXT, COEF_SRCE),
-    Step::Set(CFG_REG, P_SHIFT),
-    Step::Write(MEAS_CFG, CONTINUOUS), // not `Set`: reads back with flags
-    Step::Await(MEAS_CFG, TMP_RDY, TMP_RDY, 100),
+    ScriptStep::Write(0x0E, 0xA5),
+    ScriptStep::Write(0x0F, 0x96),
+    ScriptStep::Write(0x62, 0x02),
+    ScriptStep::Write(0x0E, 0x00),
+    ScriptStep::Write(0x0F, 0x00),
+    ScriptStep::Set(PRS_CFG, PRS_CFG_VALUE),
+    ScriptStep::SetLike(TMP_CFG, TMP_CFG_VALUE, TMP_EXT, COEF_SRCE),
+    ScriptStep::Set(CFG_REG, P_SHIFT),
+    ScriptStep::Write(MEAS_CFG, CONTINUOUS), // not `Set`: reads back with flags
+    ScriptStep::Await(MEAS_CFG, TMP_RDY, TMP_RDY, 100),
 ];
-const SPL06: &[Step] = &[
-    Step::Write(RESET, SOFT_RST),
-    Step::Wait(3_000),
-    Step::Identify(ID, &[PROD_ID]),
-    Step::Await(MEAS_CFG, COEF_RDY | SENSOR_RDY, COEF_RDY | SENSOR_RDY, 100),
-    Step::Read(COEF, COEF_LENGTH),
-    Step::Read(COEF, COEF_LENGTH),
-    Step::Set(PRS_CFG, PRS_CFG_VALUE),
-    Step::Set(TMP_CFG, TMP_CFG_VALUE | TMP_EXT),
-    Step::Set(CFG_REG, P_SHIFT),
-    Step::Write(MEAS_CFG, CONTINUOUS),
-    Step::Await(MEAS_CFG, TMP_RDY, TMP_RDY, 100),
+const SPL06: &[ScriptStep] = &[
+    ScriptStep::Write(RESET, SOFT_RST),
+    ScriptStep::Wait(3_000),
+    ScriptStep::Identify(ID, &[PROD_ID]),
+    ScriptStep::Await(MEAS_CFG, COEF_RDY | SENSOR_RDY, COEF_RDY | SENSOR_RDY, 100),
+    ScriptStep::Read(COEF, COEF_LENGTH),
+    ScriptStep::Read(COEF, COEF_LENGTH),
+    ScriptStep::Set(PRS_CFG, PRS_CFG_VALUE),
+    ScriptStep::Set(TMP_CFG, TMP_CFG_VALUE | TMP_EXT),
+    ScriptStep::Set(CFG_REG, P_SHIFT),
+    ScriptStep::Write(MEAS_CFG, CONTINUOUS),
+    ScriptStep::Await(MEAS_CFG, TMP_RDY, TMP_RDY, 100),
 ];
 
 impl<const IS_SPL06: bool> SensorPart for Dps3xx<IS_SPL06> {
@@ -115,14 +115,14 @@ impl<const IS_SPL06: bool> SensorPart for Dps3xx<IS_SPL06> {
     const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0x80, write: 0, dummies: 0, clock_hz: 10_000_000 });
     const I2C: &'static [u8] = &[0x76, 0x77];
     const STUCK_AFTER: u32 = 20;
-    const SETUP: &'static [Step] = if IS_SPL06 { SPL06 } else { DPS310 };
-    const CYCLE: &'static [Step] =
-        &[Step::Wait(28_000), Step::Await(MEAS_CFG, PRS_RDY, PRS_RDY, 35), Step::Read(PSR_B2, 6)];
+    const SETUP: &'static [ScriptStep] = if IS_SPL06 { SPL06 } else { DPS310 };
+    const CYCLE: &'static [ScriptStep] =
+        &[ScriptStep::Wait(28_000), ScriptStep::Await(MEAS_CFG, PRS_RDY, PRS_RDY, 35), ScriptStep::Read(PSR_B2, 6)];
 
     fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<PressureReading>, PartFault> {
         if register == COEF {
             let answer = answer.try_into().map_err(|_| PartFault::Bus)?;
-            self.coefficients = (self.raw == answer).then(|| Coefficients::new(answer));
+            self.coefficients = (self.raw == answer).then(|| Dps3xxCoefficients::new(answer));
             self.raw = answer;
             return Ok(None);
         }
@@ -132,11 +132,11 @@ impl<const IS_SPL06: bool> SensorPart for Dps3xx<IS_SPL06> {
     }
 }
 
-impl Coefficients {
+impl Dps3xxCoefficients {
     /// Decodes the coefficients, packed as in table 18.
     fn new(raw: [u8; COEF_LENGTH]) -> Self {
         let [b0, b1, b2, b3, b4, b5, b6, b7, b8, b9, b10, b11, b12, b13, b14, b15, b16, b17] = raw;
-        Coefficients {
+        Dps3xxCoefficients {
             c0: signed([b0, b1, 0, 0], 12),
             c1: signed([b1 << 4 | b2 >> 4, b2 << 4, 0, 0], 12),
             c00: signed([b3, b4, b5, 0], 20),
@@ -150,7 +150,7 @@ impl Coefficients {
     }
 
     fn compensate(&self, pressure: f32, temperature: f32) -> PressureReading {
-        let Coefficients { c0, c1, c00, c10, c01, c11, c20, c21, c30 } = *self;
+        let Dps3xxCoefficients { c0, c1, c00, c10, c01, c11, c20, c21, c30 } = *self;
         let (p, t) = (pressure / KP, temperature / KT);
         PressureReading {
             pressure_pa: c00 + p * (c10 + p * (c20 + p * c30)) + t * (c01 + p * (c11 + p * c21)),

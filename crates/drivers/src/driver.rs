@@ -1,7 +1,7 @@
 //! Runs a part's scripts, monitors the part and sets it up again after faults.
 
 use crate::bus::{BusError, READ_MAX, Registers};
-use crate::part::{PartFault, SensorPart, Step};
+use crate::part::{PartFault, ScriptStep, SensorPart};
 use afbc_types::Stamped;
 use embassy_futures::select::{Either, select};
 
@@ -171,7 +171,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     async fn is_as_set(&mut self) -> Result<bool, PartFault> {
         let mut is_seen = false;
         for (at, step) in P::SETUP.iter().enumerate() {
-            if let Step::Identify(..) = step {
+            if let ScriptStep::Identify(..) = step {
                 self.step(step).await?;
                 is_seen = true;
             }
@@ -228,17 +228,17 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     }
 
     /// Returns the value that a set-up step writes to its register.
-    async fn value(&mut self, step: &Step) -> Result<u8, PartFault> {
+    async fn value(&mut self, step: &ScriptStep) -> Result<u8, PartFault> {
         Ok(match *step {
-            Step::Set(_, value) => value,
-            Step::SetLike(_, value, mask, other) => value | self.byte(other).await? & mask,
+            ScriptStep::Set(_, value) => value,
+            ScriptStep::SetLike(_, value, mask, other) => value | self.byte(other).await? & mask,
             _ => 0,
         })
     }
 
-    pub(crate) async fn step(&mut self, step: &Step) -> Result<Option<Stamped<P::Reading>>, PartFault> {
+    pub(crate) async fn step(&mut self, step: &ScriptStep) -> Result<Option<Stamped<P::Reading>>, PartFault> {
         match *step {
-            Step::Identify(register, identities) => {
+            ScriptStep::Identify(register, identities) => {
                 let identity = self.byte(register).await?;
                 // Compares with the list first, since the identity of a QMC5883L is 0xFF.
                 match identity {
@@ -247,22 +247,24 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
                     _ => return Err(PartFault::Identity(identity)),
                 }
             }
-            Step::Set(register, value) | Step::Write(register, value) => self.write(register, &[value]).await?,
-            Step::SetLike(register, ..) => {
+            ScriptStep::Set(register, value) | ScriptStep::Write(register, value) => {
+                self.write(register, &[value]).await?
+            }
+            ScriptStep::SetLike(register, ..) => {
                 let value = self.value(step).await?;
                 self.write(register, &[value]).await?;
             }
-            Step::WriteAll(register, bytes) => self.write(register, bytes).await?,
-            Step::Read(register, length) => return self.read(register, length).await,
-            Step::Await(register, mask, value, ms) => {
+            ScriptStep::WriteAll(register, bytes) => self.write(register, bytes).await?,
+            ScriptStep::Read(register, length) => return self.read(register, length).await,
+            ScriptStep::Await(register, mask, value, ms) => {
                 let mut looks = ms;
                 while self.byte(register).await? & mask != value {
                     looks = looks.checked_sub(1).ok_or(PartFault::Late)?;
                     self.timing.wait(AWAIT_US).await;
                 }
             }
-            Step::Wait(us) => self.timing.wait(us).await,
-            Step::Ready(us) => {
+            ScriptStep::Wait(us) => self.timing.wait(us).await,
+            ScriptStep::Ready(us) => {
                 if !self.timing.ready(us).await {
                     return Err(PartFault::Late);
                 }
@@ -305,9 +307,9 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
 }
 
 /// Returns the register that a step sets and that is read back; none for other steps.
-fn register_set_by(step: &Step) -> Option<u8> {
+fn register_set_by(step: &ScriptStep) -> Option<u8> {
     match *step {
-        Step::Set(register, _) | Step::SetLike(register, ..) => Some(register),
+        ScriptStep::Set(register, _) | ScriptStep::SetLike(register, ..) => Some(register),
         _ => None,
     }
 }

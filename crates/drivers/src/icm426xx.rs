@@ -9,7 +9,7 @@
 //! Betaflight, ArduPilot (issue 25025) and PX4 (issue 22254).
 
 use crate::bus::SpiFormat;
-use crate::part::{PartFault, SelfTest, SensorPart, Step};
+use crate::part::{PartFault, ScriptStep, SelfTest, SensorPart};
 use crate::reading::{InertialReading, big};
 use crate::self_test::{as_at_the_factory, numbers};
 
@@ -64,36 +64,37 @@ impl<const IDENTITY: u8, const POLLED: bool> SensorPart for Icm426xx<IDENTITY, P
     /// banks 1 and 2.
     const SELF_TEST: Option<SelfTest<InertialReading>> = Some(SelfTest {
         quiet: &[
-            Step::Write(GYRO_CONFIG0, if POLLED { 0x64 } else { 0x66 }),
-            Step::Write(ACCEL_CONFIG0, if POLLED { 0x64 } else { 0x66 }),
-            Step::Wait(60_000),
+            ScriptStep::Write(GYRO_CONFIG0, if POLLED { 0x64 } else { 0x66 }),
+            ScriptStep::Write(ACCEL_CONFIG0, if POLLED { 0x64 } else { 0x66 }),
+            ScriptStep::Wait(60_000),
         ],
-        trims: &[(Step::Write(REG_BANK_SEL, 1), XG_ST_DATA), (Step::Write(REG_BANK_SEL, 2), XA_ST_DATA)],
-        between: &[Step::Write(REG_BANK_SEL, 0)],
-        stimulated: &[Step::Write(SELF_TEST_CONFIG, 0x7F), Step::Wait(200_000)],
+        trims: &[(ScriptStep::Write(REG_BANK_SEL, 1), XG_ST_DATA), (ScriptStep::Write(REG_BANK_SEL, 2), XA_ST_DATA)],
+        between: &[ScriptStep::Write(REG_BANK_SEL, 0)],
+        stimulated: &[ScriptStep::Write(SELF_TEST_CONFIG, 0x7F), ScriptStep::Wait(200_000)],
         skipped: 2,
         averaged: 100,
         axes: numbers,
         passes: |response| as_at_the_factory(response, [0.05, 1.2]),
     });
-    const SETUP: &'static [Step] = &[
-        Step::Write(REG_BANK_SEL, 0),
-        Step::Write(DEVICE_CONFIG, 1), // soft reset; the SPI mode stays
-        Step::Wait(2_000),
-        Step::Identify(WHO_AM_I, &[IDENTITY]),
-        Step::Set(INTF_CONFIG0, 0x30), // big endian, no held values: as after a reset
-        Step::Set(INTF_CONFIG1, AFSR_OFF),
-        Step::Set(INT_CONFIG, 0b011), // INT1 pulsed, push-pull, active high
-        Step::Set(INT_CONFIG1, SHORT_PULSE),
-        Step::Set(INT_SOURCE0, 0b1000),
+    const SETUP: &'static [ScriptStep] = &[
+        ScriptStep::Write(REG_BANK_SEL, 0),
+        ScriptStep::Write(DEVICE_CONFIG, 1), // soft reset; the SPI mode stays
+        ScriptStep::Wait(2_000),
+        ScriptStep::Identify(WHO_AM_I, &[IDENTITY]),
+        ScriptStep::Set(INTF_CONFIG0, 0x30), // big endian, no held values: as after a reset
+        ScriptStep::Set(INTF_CONFIG1, AFSR_OFF),
+        ScriptStep::Set(INT_CONFIG, 0b011), // INT1 pulsed, push-pull, active high
+        ScriptStep::Set(INT_CONFIG1, SHORT_PULSE),
+        ScriptStep::Set(INT_SOURCE0, 0b1000),
         // 2000 deg/s and 16 g, at 4 kHz or 1 kHz; filter bandwidth a sixteenth or a quarter of the rate.
-        Step::Set(GYRO_CONFIG0, if POLLED { 0x04 } else { 0x06 }),
-        Step::Set(ACCEL_CONFIG0, if POLLED { 0x04 } else { 0x06 }),
-        Step::Set(GYRO_ACCEL_CONFIG0, if POLLED { 0x55 } else { 0x11 }),
-        Step::Set(PWR_MGMT0, 0x0F), // both in low-noise mode
-        Step::Wait(45_000),         // gyroscope start-up
+        ScriptStep::Set(GYRO_CONFIG0, if POLLED { 0x04 } else { 0x06 }),
+        ScriptStep::Set(ACCEL_CONFIG0, if POLLED { 0x04 } else { 0x06 }),
+        ScriptStep::Set(GYRO_ACCEL_CONFIG0, if POLLED { 0x55 } else { 0x11 }),
+        ScriptStep::Set(PWR_MGMT0, 0x0F), // both in low-noise mode
+        ScriptStep::Wait(45_000),         // gyroscope start-up
     ];
-    const CYCLE: &'static [Step] = &[Step::Ready(if POLLED { 500 } else { 2_000 }), Step::Read(TEMP_DATA1, LENGTH)];
+    const CYCLE: &'static [ScriptStep] =
+        &[ScriptStep::Ready(if POLLED { 500 } else { 2_000 }), ScriptStep::Read(TEMP_DATA1, LENGTH)];
 
     fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<InertialReading>, PartFault> {
         let &[t1, t0, ref force @ .., r5, r4, r3, r2, r1, r0] = answer else { return Err(PartFault::Bus) };

@@ -6,7 +6,7 @@
 //! part's cross-axis table is not used, since a compass calibration covers it.
 
 use crate::bus::SpiFormat;
-use crate::part::{PartFault, SensorPart, Step};
+use crate::part::{PartFault, ScriptStep, SensorPart};
 use crate::reading::{MagneticReading, little};
 use nalgebra::Vector3;
 
@@ -44,21 +44,21 @@ impl SensorPart for Ist8310 {
     const SPI: Option<SpiFormat> = None;
     const I2C: &'static [u8] = &[0x0E, 0x0C, 0x0D, 0x0F];
     const STUCK_AFTER: u32 = 50; // a quiet part
-    const SETUP: &'static [Step] = &[
-        Step::Write(CNTL2, SRST),
-        Step::Wait(10_000),
-        Step::Await(CNTL2, SRST, 0, 50),
-        Step::Identify(WAI, &[0x10]),
-        Step::SetLike(CNTL3, BITS_16, OTHERS_OF_CNTL3, CNTL3),
-        Step::SetLike(AVGCNTL, AVERAGE_16, OTHERS_OF_AVGCNTL, AVGCNTL),
-        Step::SetLike(PDCNTL, PULSE_NORMAL, OTHERS_OF_PDCNTL, PDCNTL),
+    const SETUP: &'static [ScriptStep] = &[
+        ScriptStep::Write(CNTL2, SRST),
+        ScriptStep::Wait(10_000),
+        ScriptStep::Await(CNTL2, SRST, 0, 50),
+        ScriptStep::Identify(WAI, &[0x10]),
+        ScriptStep::SetLike(CNTL3, BITS_16, OTHERS_OF_CNTL3, CNTL3),
+        ScriptStep::SetLike(AVGCNTL, AVERAGE_16, OTHERS_OF_AVGCNTL, AVGCNTL),
+        ScriptStep::SetLike(PDCNTL, PULSE_NORMAL, OTHERS_OF_PDCNTL, PDCNTL),
     ];
     // A measurement takes 6 ms.
-    const CYCLE: &'static [Step] = &[
-        Step::Write(CNTL1, SINGLE_MEASUREMENT),
-        Step::Wait(10_000),
-        Step::Await(STAT1, DRDY, DRDY, 10),
-        Step::Read(DATAXL, 6),
+    const CYCLE: &'static [ScriptStep] = &[
+        ScriptStep::Write(CNTL1, SINGLE_MEASUREMENT),
+        ScriptStep::Wait(10_000),
+        ScriptStep::Await(STAT1, DRDY, DRDY, 10),
+        ScriptStep::Read(DATAXL, 6),
     ];
 
     fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<MagneticReading>, PartFault> {

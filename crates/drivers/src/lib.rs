@@ -1,6 +1,6 @@
 //! Drivers for the sensors of flight controllers.
 //!
-//! A [`SensorPart`] is data and arithmetic: the scripts that set the part up and read it, as [`Step`]s on its
+//! A [`SensorPart`] is data and arithmetic: the scripts that set the part up and read it, as [`ScriptStep`]s on its
 //! registers, and the decoding of its answers. A [`Driver`] runs the scripts over any `embedded-hal-async` bus
 //! ([`SpiRegisters`], [`I2cRegisters`]), stamps each reading with the time of the part's interrupt, and monitors the
 //! part:
@@ -57,5 +57,5 @@ pub mod ublox;
 pub use bus::{BusError, I2cRegisters, READ_MAX, Registers, SpiFormat, SpiRegisters};
 pub use driver::{Driver, FAULTS_MAX, PAUSE_US, PartTiming};
 pub use i2c_recovery::{I2cLine, I2cLines, RecoveringI2c};
-pub use part::{PartFault, SensorPart, Step};
-pub use reading::{FixReading, InertialReading, MagneticReading, PressureReading};
+pub use part::{PartFault, ScriptStep, SensorPart};
+pub use reading::{GnssReading, InertialReading, MagneticReading, PressureReading};

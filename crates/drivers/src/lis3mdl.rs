@@ -4,7 +4,7 @@
 //! polled; the pin DRDY and the temperature are not used. A field beyond the range is a fault ([`PartFault::Range`]).
 
 use crate::bus::SpiFormat;
-use crate::part::{PartFault, SelfTest, SensorPart, Step};
+use crate::part::{PartFault, ScriptStep, SelfTest, SensorPart};
 use crate::reading::{MagneticReading, little};
 
 /// LIS3MDL.
@@ -37,10 +37,10 @@ impl SensorPart for Lis3mdl {
     const STUCK_AFTER: u32 = 20;
     /// As in the data sheet: at 12 gauss and 80 Hz, the part applies a field of its own to each axis.
     const SELF_TEST: Option<SelfTest<MagneticReading>> = Some(SelfTest {
-        quiet: &[Step::Write(CTRL_REG1, 0x1C), Step::Write(CTRL_REG2, 0x40), Step::Wait(20_000)],
+        quiet: &[ScriptStep::Write(CTRL_REG1, 0x1C), ScriptStep::Write(CTRL_REG2, 0x40), ScriptStep::Wait(20_000)],
         trims: &[],
         between: &[],
-        stimulated: &[Step::Write(CTRL_REG1, 0x1D), Step::Wait(60_000)],
+        stimulated: &[ScriptStep::Write(CTRL_REG1, 0x1D), ScriptStep::Wait(60_000)],
         skipped: 1,
         averaged: 5,
         axes: |reading| {
@@ -53,18 +53,21 @@ impl SensorPart for Lis3mdl {
             [x, y].iter().all(|ut| (100.0..=300.0).contains(ut)) && (10.0..=100.0).contains(&z)
         },
     });
-    const SETUP: &'static [Step] = &[
-        Step::Write(CTRL_REG2, SOFT_RST),
-        Step::Wait(10_000),
-        Step::Identify(WHO_AM_I, &[0x3D]),
-        Step::Set(CTRL_REG1, 0b0111_1100), // x and y ultra-high-performance, 80 Hz
-        Step::Set(CTRL_REG2, 0b0000_0000), // 4 gauss
-        Step::Set(CTRL_REG4, 0b0000_1100), // z ultra-high-performance, low byte first
-        Step::Set(CTRL_REG5, 0b0100_0000), // data blocked until both bytes are read
-        Step::Set(CTRL_REG3, 0b0000_0000), // continuous
+    const SETUP: &'static [ScriptStep] = &[
+        ScriptStep::Write(CTRL_REG2, SOFT_RST),
+        ScriptStep::Wait(10_000),
+        ScriptStep::Identify(WHO_AM_I, &[0x3D]),
+        ScriptStep::Set(CTRL_REG1, 0b0111_1100), // x and y ultra-high-performance, 80 Hz
+        ScriptStep::Set(CTRL_REG2, 0b0000_0000), // 4 gauss
+        ScriptStep::Set(CTRL_REG4, 0b0000_1100), // z ultra-high-performance, low byte first
+        ScriptStep::Set(CTRL_REG5, 0b0100_0000), // data blocked until both bytes are read
+        ScriptStep::Set(CTRL_REG3, 0b0000_0000), // continuous
     ];
-    const CYCLE: &'static [Step] =
-        &[Step::Wait(10_000), Step::Await(STATUS_REG, ZYXDA, ZYXDA, 15), Step::Read(OUT_X_L | INCREMENT, 6)];
+    const CYCLE: &'static [ScriptStep] = &[
+        ScriptStep::Wait(10_000),
+        ScriptStep::Await(STATUS_REG, ZYXDA, ZYXDA, 15),
+        ScriptStep::Read(OUT_X_L | INCREMENT, 6),
+    ];
 
     fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<MagneticReading>, PartFault> {
         let field_ut = little(answer.try_into().map_err(|_| PartFault::Bus)?) * UT_PER_LSB;

@@ -21,7 +21,7 @@
 //! from later ones.
 
 use crate::bus::SpiFormat;
-use crate::part::{PartFault, SelfTest, SelfTestResponse, SensorPart, Step};
+use crate::part::{PartFault, ScriptStep, SelfTest, SelfTestResponse, SensorPart};
 use crate::reading::{InertialReading, big};
 use crate::self_test::{as_at_the_factory, numbers};
 
@@ -73,8 +73,8 @@ const RAD_S_PER_LSB: f32 = 2000.0 / 32768.0 * core::f32::consts::PI / 180.0;
 const M_S2_PER_LSB: f32 = 16.0 / 32768.0 * 9.806_65;
 
 /// Returns the step if it applies, or else a step that does nothing.
-const fn only(applies: bool, step: Step) -> Step {
-    if applies { step } else { Step::Wait(0) }
+const fn only(applies: bool, step: ScriptStep) -> ScriptStep {
+    if applies { step } else { ScriptStep::Wait(0) }
 }
 
 impl<const IDENTITY: u8> Mpu<IDENTITY> {
@@ -82,7 +82,8 @@ impl<const IDENTITY: u8> Mpu<IDENTITY> {
     const IS_20602: bool = IDENTITY == 0x12;
     const IS_20608: bool = IDENTITY == 0xAF;
     const IS_ICM: bool = Self::IS_20602 || Self::IS_20608 || IDENTITY == 0x98;
-    const I2C_OFF: Step = if Self::IS_20602 { Step::Write(I2C_IF, 0x40) } else { Step::Write(USER_CTRL, I2C_IF_DIS) };
+    const I2C_OFF: ScriptStep =
+        if Self::IS_20602 { ScriptStep::Write(I2C_IF, 0x40) } else { ScriptStep::Write(USER_CTRL, I2C_IF_DIS) };
     /// Scale of the thermometer \[1/K\], and the temperature at which it reads 0 \[degrees C\].
     const THERMOMETER: (f32, f32) = match IDENTITY {
         0x68 => (340.0, 36.53),
@@ -95,15 +96,19 @@ impl<const IDENTITY: u8> Mpu<IDENTITY> {
 /// once.
 const SELF_TEST: SelfTest<InertialReading> = SelfTest {
     quiet: &[
-        Step::Write(CONFIG, 2),
-        Step::Write(ACCEL_CONFIG_2, 2),
-        Step::Write(GYRO_CONFIG, 0),
-        Step::Write(ACCEL_CONFIG, 0),
-        Step::Wait(20_000),
+        ScriptStep::Write(CONFIG, 2),
+        ScriptStep::Write(ACCEL_CONFIG_2, 2),
+        ScriptStep::Write(GYRO_CONFIG, 0),
+        ScriptStep::Write(ACCEL_CONFIG, 0),
+        ScriptStep::Wait(20_000),
     ],
-    trims: &[(Step::Wait(0), SELF_TEST_X_GYRO), (Step::Wait(0), SELF_TEST_X_ACCEL)],
+    trims: &[(ScriptStep::Wait(0), SELF_TEST_X_GYRO), (ScriptStep::Wait(0), SELF_TEST_X_ACCEL)],
     between: &[],
-    stimulated: &[Step::Write(GYRO_CONFIG, 0xE0), Step::Write(ACCEL_CONFIG, 0xE0), Step::Wait(20_000)],
+    stimulated: &[
+        ScriptStep::Write(GYRO_CONFIG, 0xE0),
+        ScriptStep::Write(ACCEL_CONFIG, 0xE0),
+        ScriptStep::Wait(20_000),
+    ],
     skipped: 2,
     averaged: 100,
     axes: numbers,
@@ -113,9 +118,13 @@ const SELF_TEST: SelfTest<InertialReading> = SelfTest {
 /// Self-test of the MPU-6000 as in its register map: 250 deg/s and 8 g. The response must be within 14 % of the
 /// factory's, which is stored in five-bit codes.
 const SELF_TEST_6000: SelfTest<InertialReading> = SelfTest {
-    quiet: &[Step::Write(GYRO_CONFIG, 0), Step::Write(ACCEL_CONFIG, 0x10), Step::Wait(20_000)],
-    trims: &[(Step::Wait(0), SELF_TEST_X), (Step::Wait(0), SELF_TEST_A)],
-    stimulated: &[Step::Write(GYRO_CONFIG, 0xE0), Step::Write(ACCEL_CONFIG, 0xF0), Step::Wait(20_000)],
+    quiet: &[ScriptStep::Write(GYRO_CONFIG, 0), ScriptStep::Write(ACCEL_CONFIG, 0x10), ScriptStep::Wait(20_000)],
+    trims: &[(ScriptStep::Wait(0), SELF_TEST_X), (ScriptStep::Wait(0), SELF_TEST_A)],
+    stimulated: &[
+        ScriptStep::Write(GYRO_CONFIG, 0xE0),
+        ScriptStep::Write(ACCEL_CONFIG, 0xF0),
+        ScriptStep::Wait(20_000),
+    ],
     passes: within_14_percent,
     ..SELF_TEST
 };
@@ -162,30 +171,30 @@ impl<const IDENTITY: u8> SensorPart for Mpu<IDENTITY> {
         0x70 | 0x71 => Some(SELF_TEST),
         _ => None,
     };
-    const SETUP: &'static [Step] = &[
+    const SETUP: &'static [ScriptStep] = &[
         Self::I2C_OFF, // also ends anything that the part may be doing as an I2C master
-        Step::Wait(10_000),
-        Step::Write(PWR_MGMT_1, 0x80), // reset
-        Step::Wait(100_000),
-        Step::Identify(WHO_AM_I, &[IDENTITY]),
-        only(!Self::IS_ICM, Step::Write(SIGNAL_PATH_RESET, 0b111)),
-        only(!Self::IS_ICM, Step::Wait(100_000)),
+        ScriptStep::Wait(10_000),
+        ScriptStep::Write(PWR_MGMT_1, 0x80), // reset
+        ScriptStep::Wait(100_000),
+        ScriptStep::Identify(WHO_AM_I, &[IDENTITY]),
+        only(!Self::IS_ICM, ScriptStep::Write(SIGNAL_PATH_RESET, 0b111)),
+        only(!Self::IS_ICM, ScriptStep::Wait(100_000)),
         Self::I2C_OFF,
-        Step::Set(PWR_MGMT_1, 1), // awake, clocked by the gyroscope
-        Step::Wait(10_000),
+        ScriptStep::Set(PWR_MGMT_1, 1), // awake, clocked by the gyroscope
+        ScriptStep::Wait(10_000),
         Self::I2C_OFF, // an ICM loses it while asleep
-        Step::Set(PWR_MGMT_2, 0),
-        Step::Set(CONFIG, if Self::IS_6000 { 0 } else { 1 }), // gyroscope filter
-        Step::Set(SMPLRT_DIV, if Self::IS_6000 { 7 } else { 0 }),
-        Step::Set(GYRO_CONFIG, 0x18),                       // 2000 deg/s, filtered
-        Step::Set(ACCEL_CONFIG, 0x18),                      // 16 g
-        only(!Self::IS_6000, Step::Set(ACCEL_CONFIG_2, 1)), // accelerometer filter
-        only(Self::IS_20602 || Self::IS_20608, Step::Set(REGISTER_17, 0xC9)),
-        Step::Set(INT_PIN_CFG, 0), // pulsed, push-pull, active high
-        Step::Set(INT_ENABLE, 1),  // data ready
-        Step::Wait(50_000),        // gyroscope start-up
+        ScriptStep::Set(PWR_MGMT_2, 0),
+        ScriptStep::Set(CONFIG, if Self::IS_6000 { 0 } else { 1 }), // gyroscope filter
+        ScriptStep::Set(SMPLRT_DIV, if Self::IS_6000 { 7 } else { 0 }),
+        ScriptStep::Set(GYRO_CONFIG, 0x18),  // 2000 deg/s, filtered
+        ScriptStep::Set(ACCEL_CONFIG, 0x18), // 16 g
+        only(!Self::IS_6000, ScriptStep::Set(ACCEL_CONFIG_2, 1)), // accelerometer filter
+        only(Self::IS_20602 || Self::IS_20608, ScriptStep::Set(REGISTER_17, 0xC9)),
+        ScriptStep::Set(INT_PIN_CFG, 0), // pulsed, push-pull, active high
+        ScriptStep::Set(INT_ENABLE, 1),  // data ready
+        ScriptStep::Wait(50_000),        // gyroscope start-up
     ];
-    const CYCLE: &'static [Step] = &[Step::Ready(2_000), Step::Read(ACCEL_XOUT_H, LENGTH)];
+    const CYCLE: &'static [ScriptStep] = &[ScriptStep::Ready(2_000), ScriptStep::Read(ACCEL_XOUT_H, LENGTH)];
 
     fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<InertialReading>, PartFault> {
         let &[ref force @ .., t1, t0, r5, r4, r3, r2, r1, r0] = answer else { return Err(PartFault::Bus) };

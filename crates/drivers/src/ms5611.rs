@@ -6,7 +6,7 @@
 //! differently after an unexpected reset. An MS5607 has the same commands, but would read a quite different pressure.
 
 use crate::bus::SpiFormat;
-use crate::part::{PartFault, SensorPart, Step};
+use crate::part::{PartFault, ScriptStep, SensorPart};
 use crate::reading::{PressureReading, in_range};
 
 /// MS5611.
@@ -38,27 +38,27 @@ impl SensorPart for Ms5611 {
     const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0, write: 0, dummies: 0, clock_hz: 20_000_000 });
     const I2C: &'static [u8] = &[0x77, 0x76];
     const STUCK_AFTER: u32 = 20;
-    const SETUP: &'static [Step] = &[
-        Step::Wait(CONVERSION_US), // a conversion may be running
-        Step::WriteAll(RESET, &[]),
-        Step::Wait(5_000), // reloads its PROM in 2.8 ms
-        Step::Read(PROM_READ, 2),
-        Step::Read(PROM_READ + 2, 2),
-        Step::Read(PROM_READ + 4, 2),
-        Step::Read(PROM_READ + 6, 2),
-        Step::Read(PROM_READ + 8, 2),
-        Step::Read(PROM_READ + 10, 2),
-        Step::Read(PROM_READ + 12, 2),
-        Step::Read(PROM_READ_LAST, 2),
+    const SETUP: &'static [ScriptStep] = &[
+        ScriptStep::Wait(CONVERSION_US), // a conversion may be running
+        ScriptStep::WriteAll(RESET, &[]),
+        ScriptStep::Wait(5_000), // reloads its PROM in 2.8 ms
+        ScriptStep::Read(PROM_READ, 2),
+        ScriptStep::Read(PROM_READ + 2, 2),
+        ScriptStep::Read(PROM_READ + 4, 2),
+        ScriptStep::Read(PROM_READ + 6, 2),
+        ScriptStep::Read(PROM_READ + 8, 2),
+        ScriptStep::Read(PROM_READ + 10, 2),
+        ScriptStep::Read(PROM_READ + 12, 2),
+        ScriptStep::Read(PROM_READ_LAST, 2),
     ];
-    const CYCLE: &'static [Step] = &[
-        Step::Read(PROM_READ_LAST, 2),
-        Step::WriteAll(CONVERT_D2_4096, &[]),
-        Step::Wait(CONVERSION_US),
-        Step::Read(ADC_READ, 3),
-        Step::WriteAll(CONVERT_D1_4096, &[]),
-        Step::Wait(CONVERSION_US),
-        Step::Read(ADC_READ, 3),
+    const CYCLE: &'static [ScriptStep] = &[
+        ScriptStep::Read(PROM_READ_LAST, 2),
+        ScriptStep::WriteAll(CONVERT_D2_4096, &[]),
+        ScriptStep::Wait(CONVERSION_US),
+        ScriptStep::Read(ADC_READ, 3),
+        ScriptStep::WriteAll(CONVERT_D1_4096, &[]),
+        ScriptStep::Wait(CONVERSION_US),
+        ScriptStep::Read(ADC_READ, 3),
     ];
 
     fn take(&mut self, command: u8, answer: &[u8]) -> Result<Option<PressureReading>, PartFault> {

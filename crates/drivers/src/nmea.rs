@@ -9,10 +9,10 @@
 
 mod sentence;
 
-use crate::reading::FixReading;
+use crate::reading::GnssReading;
 use afbc_types::sin_cos;
 use nalgebra::Vector3;
-use sentence::{Fix, Framed, Framing, Motion, Sentence};
+use sentence::{FramedSentence, GgaFields, RmcFields, Sentence, SentenceFramer};
 
 /// Standard deviation of a satellite's range, for a single-frequency receiver under an open sky \[m\]. Multiplied by
 /// the dilution of precision, it gives the standard deviation of a position.
@@ -36,10 +36,10 @@ const DAY_MS: u32 = 86_400_000;
 /// Decodes a receiver's bytes into fixes.
 #[derive(Default)]
 pub struct NmeaDecoder {
-    framing: Framing,
+    framing: SentenceFramer,
     /// Sentences of an incomplete epoch.
-    fix: Option<Fix>,
-    motion: Option<Motion>,
+    fix: Option<GgaFields>,
+    motion: Option<RmcFields>,
     /// Time of day \[ms\], altitude \[m\] and vertical speed \[m/s\] of the last fix.
     last: Option<(u32, f32, f32)>,
     good_sentences: u32,
@@ -55,7 +55,7 @@ impl NmeaDecoder {
 
     /// Discards the current sentence, after bytes of another protocol.
     pub fn begin(&mut self) {
-        self.framing = Framing::default();
+        self.framing = SentenceFramer::default();
     }
 
     /// Returns the number of valid sentences.
@@ -71,10 +71,10 @@ impl NmeaDecoder {
     }
 
     /// Takes a byte and returns the fix that it completes; `Some(None)` is an epoch without a fix.
-    pub fn take(&mut self, byte: u8) -> Option<Option<FixReading>> {
+    pub fn take(&mut self, byte: u8) -> Option<Option<GnssReading>> {
         let sentence = match self.framing.take(byte)? {
-            Framed::Whole(body) => Sentence::read(body),
-            Framed::Damaged => Err(()),
+            FramedSentence::Whole(body) => Sentence::read(body),
+            FramedSentence::Damaged => Err(()),
         };
         let count = if sentence.is_ok() { &mut self.good_sentences } else { &mut self.bad_sentences };
         *count = count.saturating_add(1);
@@ -101,7 +101,7 @@ impl NmeaDecoder {
     }
 
     /// Combines the sentences of an epoch; returns none if the numbers are impossible.
-    fn reading(&mut self, fix: &Fix, motion: &Motion) -> Option<FixReading> {
+    fn reading(&mut self, fix: &GgaFields, motion: &RmcFields) -> Option<GnssReading> {
         let thousandths = |number: i32| number as f32 / 1000.0;
         let (altitude_m, sigma_m) = (thousandths(fix.altitude_mm), thousandths(fix.dilution) * RANGE_SIGMA_M);
         let (speed_m_s, course_deg) = (thousandths(motion.speed) * KNOT_M_S, thousandths(motion.course));
@@ -118,7 +118,7 @@ impl NmeaDecoder {
             None => 0.0,
         };
         let (east, north) = sin_cos(course_deg.clamp(-360.0, 360.0) * (core::f32::consts::PI / 180.0));
-        let reading = FixReading {
+        let reading = GnssReading {
             latitude_deg: fix.latitude.degrees(),
             longitude_deg: fix.longitude.degrees(),
             altitude_m: f64::from(altitude_m),

@@ -5,14 +5,14 @@ use core::fmt;
 
 /// One step of a script.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
+pub enum ScriptStep {
     /// Checks that a register, the part's identity, holds one of these values.
     Identify(u8, &'static [u8]),
     /// Writes a byte to a register. The value is read back after the script and repeatedly in flight, since a part that
     /// was reset has lost it.
     Set(u8, u8),
-    /// Sets a register like [`Step::Set`], keeping some bits of another register or of the register itself. Fields:
-    /// register, value, mask of the kept bits, the register they are read from.
+    /// Sets a register like [`ScriptStep::Set`], keeping some bits of another register or of the register itself.
+    /// Fields: register, value, mask of the kept bits, the register they are read from.
     SetLike(u8, u8, u8, u8),
     /// Writes a byte to a register, without reading it back.
     Write(u8, u8),
@@ -35,13 +35,13 @@ pub enum Step {
 #[derive(Clone, Copy, Debug)]
 pub struct SelfTest<R> {
     /// Steps after [`SensorPart::SETUP`] for readings without stimulus, or with the opposite one.
-    pub quiet: &'static [Step],
+    pub quiet: &'static [ScriptStep],
     /// Factory's responses, read before the stimulus: a step, then the first of three one-byte registers.
-    pub trims: &'static [(Step, u8)],
+    pub trims: &'static [(ScriptStep, u8)],
     /// Steps after reading the factory's responses.
-    pub between: &'static [Step],
+    pub between: &'static [ScriptStep],
     /// Steps that apply the stimulus.
-    pub stimulated: &'static [Step],
+    pub stimulated: &'static [ScriptStep],
     /// Number of readings skipped, without and with stimulus each.
     pub skipped: u32,
     /// Number of readings averaged, without and with stimulus each.
@@ -74,15 +74,15 @@ pub trait SensorPart {
     /// Seven-bit addresses on I2C, the usual one first; empty if the part is used only on SPI.
     const I2C: &'static [u8];
     /// Script that sets the part up from any state.
-    const SETUP: &'static [Step];
+    const SETUP: &'static [ScriptStep];
     /// Script that takes one reading, or a part of one.
-    const CYCLE: &'static [Step];
+    const CYCLE: &'static [ScriptStep];
     /// Number of consecutive equal readings that means a stuck part.
     const STUCK_AFTER: u32;
     /// Self-test, if the part has one that is supported.
     const SELF_TEST: Option<SelfTest<Self::Reading>> = None;
 
-    /// Takes the answer to a [`Step::Read`] of `register`; returns the reading that it completes, if any.
+    /// Takes the answer to a [`ScriptStep::Read`] of `register`; returns the reading that it completes, if any.
     ///
     /// # Errors
     /// If no working part gives this answer.

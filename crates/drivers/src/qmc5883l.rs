@@ -5,7 +5,7 @@
 //! beyond the range is a fault ([`PartFault::Range`]); beyond 10.9 gauss the part itself flags an overflow.
 
 use crate::bus::SpiFormat;
-use crate::part::{PartFault, SensorPart, Step};
+use crate::part::{PartFault, ScriptStep, SensorPart};
 use crate::reading::{MagneticReading, little};
 
 /// QMC5883L.
@@ -32,16 +32,17 @@ impl SensorPart for Qmc5883l {
     const SPI: Option<SpiFormat> = None;
     const I2C: &'static [u8] = &[0x0D];
     const STUCK_AFTER: u32 = 20;
-    const SETUP: &'static [Step] = &[
-        Step::Write(CONTROL_2, SOFT_RST),
-        Step::Wait(1_000),
-        Step::Identify(CHIP_ID, &[0xFF]), // a missing part reads 0xFF, too; the rest of the set-up tells them apart
-        Step::Set(SET_RESET_PERIOD, 0x01),
-        Step::Set(CONTROL_1, 0b00_01_10_01), // 512 samples, 8 gauss, 100 Hz, continuous
+    const SETUP: &'static [ScriptStep] = &[
+        ScriptStep::Write(CONTROL_2, SOFT_RST),
+        ScriptStep::Wait(1_000),
+        // A missing part reads 0xFF, too; the rest of the set-up tells them apart.
+        ScriptStep::Identify(CHIP_ID, &[0xFF]),
+        ScriptStep::Set(SET_RESET_PERIOD, 0x01),
+        ScriptStep::Set(CONTROL_1, 0b00_01_10_01), // 512 samples, 8 gauss, 100 Hz, continuous
     ];
     // Reads the data together with their flags.
-    const CYCLE: &'static [Step] =
-        &[Step::Wait(8_000), Step::Await(STATUS, DRDY, DRDY, 12), Step::Read(DATA_OUTPUT_X_LSB, 7)];
+    const CYCLE: &'static [ScriptStep] =
+        &[ScriptStep::Wait(8_000), ScriptStep::Await(STATUS, DRDY, DRDY, 12), ScriptStep::Read(DATA_OUTPUT_X_LSB, 7)];
 
     fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<MagneticReading>, PartFault> {
         let &[ref data @ .., status] = answer else { return Err(PartFault::Bus) };

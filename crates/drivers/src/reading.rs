@@ -33,7 +33,7 @@ pub struct MagneticReading {
 
 /// Reading of a GNSS receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FixReading {
+pub struct GnssReading {
     /// Latitude, north positive \[degrees\].
     pub latitude_deg: f64,
     /// Longitude, east positive \[degrees\].
@@ -61,7 +61,7 @@ const SPEED_MAX_M_S: f32 = 500.0;
 const SIGMA_MAX_M: f32 = 200.0;
 const SIGMA_MAX_M_S: f32 = 20.0;
 
-impl FixReading {
+impl GnssReading {
     /// Returns the fix if its numbers are possible for a receiver and it is accurate enough.
     pub(crate) fn possible(self) -> Option<Self> {
         let is_sigma = |sigma: f32, most: f32| sigma > 0.0 && sigma <= most;

@@ -6,7 +6,7 @@
 
 use crate::bus::Registers;
 use crate::driver::{Driver, PartTiming};
-use crate::part::{PartFault, SelfTest, SelfTestResponse, SensorPart, Step};
+use crate::part::{PartFault, ScriptStep, SelfTest, SelfTestResponse, SensorPart};
 use crate::reading::InertialReading;
 
 impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
@@ -43,7 +43,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         Ok(response)
     }
 
-    async fn run(&mut self, steps: &[Step]) -> Result<(), PartFault> {
+    async fn run(&mut self, steps: &[ScriptStep]) -> Result<(), PartFault> {
         for step in steps {
             self.step(step).await?;
         }

@@ -31,9 +31,9 @@ mod frame;
 mod solution;
 
 use crate::nmea::NmeaDecoder;
-use crate::reading::FixReading;
+use crate::reading::GnssReading;
 use afbc_types::Stamped;
-use configuration::{ACK_ACK, ACK_NAK, FAST_BAUD, Interface, MON_VER, NAV_PVT, Worth, step};
+use configuration::{ACK_ACK, ACK_NAK, FAST_BAUD, Importance, Interface, MON_VER, NAV_PVT, step};
 pub use frame::UbxCommand;
 use frame::{FrameDecoder, MessageId};
 
@@ -72,7 +72,7 @@ pub enum ReceiverAction {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Phase {
+enum UbxPhase {
     /// Tries a baud rate.
     Searches,
     /// Sends this step of the configuration.
@@ -86,10 +86,10 @@ enum Phase {
 }
 
 /// Decoded message of the receiver.
-enum Message {
+enum UbxMessage {
     Version(Interface),
     Answer(MessageId, bool),
-    Solution(Option<FixReading>),
+    Solution(Option<GnssReading>),
     Other,
 }
 
@@ -98,7 +98,7 @@ enum Message {
 pub struct UbxReceiver {
     frames: FrameDecoder,
     nmea: NmeaDecoder,
-    phase: Phase,
+    phase: UbxPhase,
     /// The UART's baud rate, and whether the caller has yet to set it.
     baud: u32,
     sets_baud: bool,
@@ -139,7 +139,7 @@ impl UbxReceiver {
         UbxReceiver {
             frames: FrameDecoder::NEW,
             nmea: NmeaDecoder::new(),
-            phase: Phase::Searches,
+            phase: UbxPhase::Searches,
             baud: FAST_BAUD,
             sets_baud: true,
             used_baud: FAST_BAUD,
@@ -162,7 +162,7 @@ impl UbxReceiver {
     /// True while the receiver is configured and sends navigation solutions.
     #[must_use]
     pub fn is_configured(&self) -> bool {
-        self.phase == Phase::Solves
+        self.phase == UbxPhase::Solves
     }
 
     /// Returns the number of damaged frames and sentences, caused by a bad line or a wrong baud rate.
@@ -179,7 +179,7 @@ impl UbxReceiver {
 
     /// Takes a byte that arrived at `at_us`. Returns the fix that it completes, with the time of the fix; the value is
     /// none for an epoch without a fix.
-    pub fn take(&mut self, at_us: u64, byte: u8) -> Option<Stamped<Option<FixReading>>> {
+    pub fn take(&mut self, at_us: u64, byte: u8) -> Option<Stamped<Option<GnssReading>>> {
         let byte_us = BYTE_BITS * 1_000_000 / u64::from(self.baud.max(1));
         let mut fix = None;
         self.frames.push(at_us, byte);
@@ -189,21 +189,21 @@ impl UbxReceiver {
             // Sentences after a frame begin a new epoch, however short the pause.
             self.byte_us = 0;
             match message {
-                Message::Version(interface) => self.identified(interface, at_us),
-                Message::Answer(to, accepted) => self.answered(to, accepted, at_us),
-                Message::Solution(value) => {
+                UbxMessage::Version(interface) => self.identified(interface, at_us),
+                UbxMessage::Answer(to, accepted) => self.answered(to, accepted, at_us),
+                UbxMessage::Solution(value) => {
                     (self.heard_us, self.solved_us, self.used_baud) = (at_us, Some(at_us), self.baud);
                     fix = Some(Stamped { value, at_us: first_us.saturating_sub(DELAY_US) });
                 }
-                Message::Other => (),
+                UbxMessage::Other => (),
             }
         }
         // Once solutions come, sentences of the same epoch are ignored.
         let solves = self.solved_us.is_some_and(|solved_us| at_us.saturating_sub(solved_us) < SOLUTION_SILENT_US);
-        if solves || self.phase == Phase::Solves { fix } else { self.take_nmea(at_us, byte) }
+        if solves || self.phase == UbxPhase::Solves { fix } else { self.take_nmea(at_us, byte) }
     }
 
-    fn take_nmea(&mut self, at_us: u64, byte: u8) -> Option<Stamped<Option<FixReading>>> {
+    fn take_nmea(&mut self, at_us: u64, byte: u8) -> Option<Stamped<Option<GnssReading>>> {
         if at_us.saturating_sub(self.byte_us) > EPOCH_PAUSE_US {
             self.epoch_us = at_us;
         }
@@ -218,8 +218,8 @@ impl UbxReceiver {
     pub fn poll(&mut self, now_us: u64) -> Option<ReceiverAction> {
         // The other phases time out by unanswered requests.
         let silent_us = match self.phase {
-            Phase::Solves => SOLUTION_SILENT_US,
-            Phase::Nmea => NMEA_SILENT_US,
+            UbxPhase::Solves => SOLUTION_SILENT_US,
+            UbxPhase::Nmea => NMEA_SILENT_US,
             _ => u64::MAX,
         };
         if now_us.saturating_sub(self.heard_us) > silent_us {
@@ -234,15 +234,15 @@ impl UbxReceiver {
             }
             let asks = self.asked < ASK_MAX;
             match self.phase {
-                Phase::Searches | Phase::Confirms(..) if asks => return Some(self.ask_version(now_us, ASK_US)),
-                Phase::Searches => self.conclude(now_us),
-                Phase::Confirms(..) => {
+                UbxPhase::Searches | UbxPhase::Confirms(..) if asks => return Some(self.ask_version(now_us, ASK_US)),
+                UbxPhase::Searches => self.conclude(now_us),
+                UbxPhase::Confirms(..) => {
                     self.keeps_baud = true;
                     self.search(now_us);
                 }
-                Phase::Configures(interface, number) => match self.step(interface, number) {
-                    Some((command, Worth::Line(baud))) => {
-                        self.phase = Phase::Confirms(interface, number);
+                UbxPhase::Configures(interface, number) => match self.step(interface, number) {
+                    Some((command, Importance::Line(baud))) => {
+                        self.phase = UbxPhase::Confirms(interface, number);
                         (self.sets_baud, self.baud) = (baud != self.baud, baud);
                         (self.asked, self.owed, self.ask_us) = (0, 1, now_us.saturating_add(CHANGE_US));
                         return Some(ReceiverAction::Send(command));
@@ -252,16 +252,16 @@ impl UbxReceiver {
                         return Some(ReceiverAction::Send(command));
                     }
                     // A refusal shows that the line works, so NMEA will, too. Silence may mean a wrong baud rate.
-                    Some((_, Worth::Needed)) if self.refused => self.take_as_it_is(now_us),
-                    Some((_, Worth::Needed)) => self.search(now_us),
+                    Some((_, Importance::Needed)) if self.refused => self.take_as_it_is(now_us),
+                    Some((_, Importance::Needed)) => self.search(now_us),
                     Some(_) => self.enter_next(interface, number, 0, now_us),
                     None => {
                         self.keeps_baud = false;
-                        self.enter(Phase::Solves, now_us);
+                        self.enter(UbxPhase::Solves, now_us);
                     }
                 },
-                Phase::Nmea => return Some(self.ask_version(now_us, POLL_US)),
-                Phase::Solves => return None,
+                UbxPhase::Nmea => return Some(self.ask_version(now_us, POLL_US)),
+                UbxPhase::Solves => return None,
             }
         }
     }
@@ -271,18 +271,18 @@ impl UbxReceiver {
         ReceiverAction::Send(UbxCommand::new(MON_VER, &[]))
     }
 
-    fn step(&self, interface: Interface, number: u8) -> Option<(UbxCommand, Worth)> {
+    fn step(&self, interface: Interface, number: u8) -> Option<(UbxCommand, Importance)> {
         let baud = if self.keeps_baud { self.baud } else { self.baud.max(FAST_BAUD) };
         step(interface, number, baud)
     }
 
     /// Uses the receiver with NMEA, and polls it again later.
     fn take_as_it_is(&mut self, now_us: u64) {
-        self.enter(Phase::Nmea, now_us);
+        self.enter(UbxPhase::Nmea, now_us);
         self.ask_us = now_us.saturating_add(POLL_US);
     }
 
-    fn enter(&mut self, phase: Phase, now_us: u64) {
+    fn enter(&mut self, phase: UbxPhase, now_us: u64) {
         (self.phase, self.heard_us) = (phase, now_us);
         (self.asked, self.owed, self.refused, self.ask_us) = (0, 0, false, now_us);
     }
@@ -299,14 +299,14 @@ impl UbxReceiver {
         // When the search wraps around, it skips the first two places, which repeat rates of the list.
         self.place = if place + 1 < places.count() { place + 1 } else { 2 };
         (self.sets_baud, self.solved_us, self.sentences) = (true, None, self.nmea.good_sentences());
-        self.enter(Phase::Searches, now_us);
+        self.enter(UbxPhase::Searches, now_us);
     }
 
     /// Decides how to go on after a baud rate at which the receiver did not answer.
     fn conclude(&mut self, now_us: u64) {
         if self.solved_us.is_some() {
             // The receiver sends solutions but does not hear the requests: it was configured before.
-            self.enter(Phase::Solves, now_us);
+            self.enter(UbxPhase::Solves, now_us);
         } else if self.nmea.good_sentences() != self.sentences {
             self.take_as_it_is(now_us);
         } else {
@@ -316,14 +316,14 @@ impl UbxReceiver {
 
     fn identified(&mut self, interface: Interface, now_us: u64) {
         match self.phase {
-            Phase::Searches | Phase::Nmea => {
+            UbxPhase::Searches | UbxPhase::Nmea => {
                 // A fast rate may have been set by this driver; after a reset, the receiver returns to its own.
                 if self.baud < FAST_BAUD {
                     self.found_baud = self.baud;
                 }
-                self.enter(Phase::Configures(interface, 0), now_us);
+                self.enter(UbxPhase::Configures(interface, 0), now_us);
             }
-            Phase::Confirms(interface, number) => {
+            UbxPhase::Confirms(interface, number) => {
                 self.enter_next(interface, number, self.owed, now_us);
             }
             _ => (),
@@ -331,14 +331,16 @@ impl UbxReceiver {
     }
 
     fn answered(&mut self, to: MessageId, accepted: bool, now_us: u64) {
-        let (Phase::Configures(interface, number) | Phase::Confirms(interface, number)) = self.phase else { return };
+        let (UbxPhase::Configures(interface, number) | UbxPhase::Confirms(interface, number)) = self.phase else {
+            return;
+        };
         if self.step(interface, number).is_none_or(|(command, _)| command.id() != to) {
             return;
         }
         // All keys use the same command. Answers to earlier steps, or to the one that set the baud rate, come first.
         if self.owed > 0 {
             self.owed -= 1;
-        } else if self.asked == 0 || matches!(self.phase, Phase::Confirms(..)) {
+        } else if self.asked == 0 || matches!(self.phase, UbxPhase::Confirms(..)) {
             // An answer to no known request.
         } else if accepted {
             // After a refusal the step was sent again, and the refusal answered the earlier request.
@@ -351,18 +353,18 @@ impl UbxReceiver {
 
     /// Begins the next step; `owed` answers to this one may still arrive.
     fn enter_next(&mut self, interface: Interface, number: u8, owed: u8, now_us: u64) {
-        self.enter(Phase::Configures(interface, number.saturating_add(1)), now_us);
+        self.enter(UbxPhase::Configures(interface, number.saturating_add(1)), now_us);
         // Each message type is acknowledged separately, so no answers are owed.
         self.owed = if interface == Interface::Keys { owed } else { 0 };
     }
 }
 
-fn read(id: MessageId, payload: &[u8]) -> Message {
+fn read(id: MessageId, payload: &[u8]) -> UbxMessage {
     match (id, payload) {
         // An echo of the poll itself has no payload.
-        (MON_VER, [_, ..]) => Message::Version(Interface::of(payload)),
-        (ACK_ACK | ACK_NAK, &[class, number]) => Message::Answer([class, number], id == ACK_ACK),
-        (NAV_PVT, _) => solution::read(payload).map_or(Message::Other, Message::Solution),
-        _ => Message::Other,
+        (MON_VER, [_, ..]) => UbxMessage::Version(Interface::of(payload)),
+        (ACK_ACK | ACK_NAK, &[class, number]) => UbxMessage::Answer([class, number], id == ACK_ACK),
+        (NAV_PVT, _) => solution::read(payload).map_or(UbxMessage::Other, UbxMessage::Solution),
+        _ => UbxMessage::Other,
     }
 }

@@ -8,7 +8,7 @@ use afbc_drivers::ist8310::Ist8310;
 use afbc_drivers::lis3mdl::Lis3mdl;
 use afbc_drivers::ms5611::Ms5611;
 use afbc_drivers::qmc5883l::Qmc5883l;
-use afbc_drivers::{MagneticReading, PartFault, PressureReading, SensorPart, Step};
+use afbc_drivers::{MagneticReading, PartFault, PressureReading, ScriptStep, SensorPart};
 use nalgebra::Vector3;
 use proptest::array::uniform8;
 use proptest::collection::vec;
@@ -17,7 +17,7 @@ use proptest::prelude::*;
 /// Returns registers with answers of any length; many are reads of the part's scripts.
 fn answers<P: SensorPart>() -> impl Strategy<Value = Vec<(u8, Vec<u8>)>> {
     let reads = P::SETUP.iter().chain(P::CYCLE).filter_map(|step| match step {
-        Step::Read(register, length) => Some((*register, *length)),
+        ScriptStep::Read(register, length) => Some((*register, *length)),
         _ => None,
     });
     let reads: Vec<(u8, usize)> = reads.collect();

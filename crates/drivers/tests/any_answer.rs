@@ -6,7 +6,7 @@ use afbc_drivers::ak8963::Mpu9250Ak8963;
 use afbc_drivers::bmi270::Bmi270;
 use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
 use afbc_drivers::mpu::{Icm20602, Icm20608, Icm20689, Mpu6000, Mpu6500, Mpu9250};
-use afbc_drivers::{InertialReading, PartFault, READ_MAX, SensorPart, Step};
+use afbc_drivers::{InertialReading, PartFault, READ_MAX, ScriptStep, SensorPart};
 use proptest::prelude::*;
 
 /// A part that passes its set-up; all its other registers hold random bytes.
@@ -22,9 +22,13 @@ impl Anything {
         let (mut registers, mut is_kept) = (vec![None; 256], vec![false; 256]);
         for step in P::SETUP {
             match *step {
-                Step::Identify(register, identities) => registers[usize::from(register)] = identities.first().copied(),
-                Step::Await(register, mask, value, _) if mask != 0 => registers[usize::from(register)] = Some(value),
-                Step::Set(register, _) => is_kept[usize::from(register)] = true,
+                ScriptStep::Identify(register, identities) => {
+                    registers[usize::from(register)] = identities.first().copied()
+                }
+                ScriptStep::Await(register, mask, value, _) if mask != 0 => {
+                    registers[usize::from(register)] = Some(value)
+                }
+                ScriptStep::Set(register, _) => is_kept[usize::from(register)] = true,
                 _ => (),
             }
         }
@@ -80,7 +84,7 @@ fn survives<P: SensorPart + Default>(
     }
     // Answers to the reads of the scripts.
     for step in P::SETUP.iter().chain(P::CYCLE).chain(P::CYCLE) {
-        if let Step::Read(register, length) = *step {
+        if let ScriptStep::Read(register, length) = *step {
             prop_assert!(length <= READ_MAX);
             let answer: Vec<u8> = bytes.iter().cycle().skip(usize::from(register)).take(length).copied().collect();
             if let Ok(Some(reading)) = part.take(register, &answer) {

@@ -4,7 +4,7 @@ use crate::bmi270_model::Bmi270Registers;
 use crate::rig::suite::{Pace, Suite, reads_the_whole_range};
 use crate::rig::{Model, Rig, noise, reads, run};
 use afbc_drivers::bmi270::Bmi270;
-use afbc_drivers::{InertialReading, PartFault, Registers as _, SensorPart, SpiRegisters, Step};
+use afbc_drivers::{InertialReading, PartFault, Registers as _, ScriptStep, SensorPart, SpiRegisters};
 use embassy_futures::block_on;
 use embedded_hal_async::spi::{ErrorType, Operation, SpiDevice};
 
@@ -117,6 +117,7 @@ fn a_byte_is_skipped_in_front_of_its_answers_and_the_configuration_is_one_block(
     let mut byte = [0];
     block_on(SpiRegisters::new(Sent(Vec::new()), spi).read(0x00, &mut byte)).expect("a read");
     assert_eq!(byte, [2], "command and dummy are sent before it is read");
-    let blocks = Bmi270::SETUP.iter().filter(|step| matches!(step, Step::WriteAll(0x5E, bytes) if bytes.len() == 8192));
+    let blocks =
+        Bmi270::SETUP.iter().filter(|step| matches!(step, ScriptStep::WriteAll(0x5E, bytes) if bytes.len() == 8192));
     assert_eq!(blocks.count(), 1);
 }

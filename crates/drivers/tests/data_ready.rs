@@ -1,7 +1,7 @@
 //! Reading at a part's interrupt in simulated time, over a wire that works, breaks, recovers or is noisy.
 
 use afbc_drivers::PartTiming;
-use afbc_drivers::data_ready::{DataReady, Edge};
+use afbc_drivers::data_ready::{DataReady, DataReadyPin};
 use core::future::poll_fn;
 use core::pin::pin;
 use core::task::{Context, Poll, Waker};
@@ -64,7 +64,7 @@ impl PartTiming for Time {
 /// An interrupt wire; the function returns the next edge after a time.
 struct Wire<F>(Time, F);
 
-impl<F: Fn(u64) -> Option<u64>> Edge for Wire<F> {
+impl<F: Fn(u64) -> Option<u64>> DataReadyPin for Wire<F> {
     async fn next(&mut self) -> u64 {
         let at_us = (self.1)(self.0.now_us()).unwrap_or(u64::MAX);
         self.0.until(at_us).await;

@@ -1,6 +1,6 @@
 //! Fixes decoded from hand-written NMEA sentences.
 
-use afbc_drivers::FixReading;
+use afbc_drivers::GnssReading;
 use afbc_drivers::nmea::{NmeaDecoder, RANGE_SIGMA_M};
 use proptest::prelude::*;
 
@@ -35,7 +35,7 @@ fn motion_first(epoch: &str) -> String {
     sentences.concat()
 }
 
-fn fixes(decoder: &mut NmeaDecoder, text: &str) -> Vec<Option<FixReading>> {
+fn fixes(decoder: &mut NmeaDecoder, text: &str) -> Vec<Option<GnssReading>> {
     text.bytes().filter_map(|byte| decoder.take(byte)).collect()
 }
 
@@ -172,7 +172,7 @@ fn numbers_that_are_none_spoil_no_fix() {
         for (at, bad) in (0_u32..).zip(bad) {
             let time_s = 1001.0 + f64::from(at);
             let text = good(time_s - 0.6) + &bad + &good(time_s - 0.4) + &good(time_s - 0.2);
-            let all: Vec<FixReading> = fixes(&mut decoder, &text).into_iter().flatten().collect();
+            let all: Vec<GnssReading> = fixes(&mut decoder, &text).into_iter().flatten().collect();
             assert!(all.len() >= 2, "{odd}: {all:?}");
             for fix in all {
                 assert!(fix.velocity_ned_m_s.norm() < 2.0 && fix.horizontal_sigma_m < 3.0, "{odd}: {fix:?}");

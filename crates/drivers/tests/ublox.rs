@@ -2,7 +2,7 @@
 //! implementation's.
 
 use crate::ublox_model::{Generation, Model, Truth, frame, solution};
-use afbc_drivers::FixReading;
+use afbc_drivers::GnssReading;
 use afbc_drivers::ublox::{BAUDS, ReceiverAction, UbxReceiver};
 use afbc_types::Stamped;
 use proptest::prelude::*;
@@ -35,7 +35,7 @@ struct Bench {
     now_us: u64,
     random: u64,
     /// Fixes with their times.
-    fixes: Vec<Stamped<Option<FixReading>>>,
+    fixes: Vec<Stamped<Option<GnssReading>>>,
 }
 
 impl Bench {
@@ -113,7 +113,7 @@ impl Bench {
     }
 
     /// Runs for a time and returns the fixes of that time.
-    fn fixes(&mut self, for_us: u64) -> Vec<Stamped<Option<FixReading>>> {
+    fn fixes(&mut self, for_us: u64) -> Vec<Stamped<Option<GnssReading>>> {
         self.fixes.clear();
         self.run(for_us);
         std::mem::take(&mut self.fixes)
@@ -121,7 +121,7 @@ impl Bench {
 }
 
 /// Asserts that a fix matches the truth to the last digit.
-fn assert_true(fix: &FixReading, truth: &Truth) {
+fn assert_true(fix: &GnssReading, truth: &Truth) {
     let Truth { place, altitude_mm, velocity_mm_s, accuracies: [h, v, s], .. } = *truth;
     let [latitude_deg, longitude_deg] = place.map(|angle| f64::from(angle) * 1e-7);
     assert!((fix.latitude_deg - latitude_deg).abs() < 1e-9 && (fix.longitude_deg - longitude_deg).abs() < 1e-9);
@@ -373,7 +373,7 @@ fn any_truth() -> impl Strategy<Value = Truth> {
     )
 }
 
-fn take_all(driver: &mut UbxReceiver, at_us: u64, bytes: &[u8]) -> Vec<Stamped<Option<FixReading>>> {
+fn take_all(driver: &mut UbxReceiver, at_us: u64, bytes: &[u8]) -> Vec<Stamped<Option<GnssReading>>> {
     bytes.iter().filter_map(|byte| driver.take(at_us, *byte)).collect()
 }
 

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 /// Kind of measurement from an aiding sensor. Each kind in a fix passes its own gate: a receiver whose position jumps
 /// may still measure a good velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Aid {
+pub enum AidSource {
     /// Position from a tracker.
     TrackerPosition,
     /// Attitude from a tracker.
@@ -23,16 +23,16 @@ pub enum Aid {
     Heading,
 }
 
-impl Aid {
+impl AidSource {
     /// All kinds.
-    pub const ALL: [Aid; 7] = [
-        Aid::TrackerPosition,
-        Aid::TrackerAttitude,
-        Aid::GnssPosition,
-        Aid::GnssHeight,
-        Aid::GnssVelocity,
-        Aid::Height,
-        Aid::Heading,
+    pub const ALL: [AidSource; 7] = [
+        AidSource::TrackerPosition,
+        AidSource::TrackerAttitude,
+        AidSource::GnssPosition,
+        AidSource::GnssHeight,
+        AidSource::GnssVelocity,
+        AidSource::Height,
+        AidSource::Heading,
     ];
 }
 
@@ -78,20 +78,20 @@ impl AidRecord {
 
 /// Detector of a tracker that repeats the same pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Repeated {
+pub(crate) struct FrozenPoseDetector {
     pose: Option<(Vector3<f32>, [f32; 4])>,
     since_us: u64,
     /// True once the velocity's variance was raised because of this repeated pose.
     pub(crate) doubted: bool,
 }
 
-impl Repeated {
+impl FrozenPoseDetector {
     /// Returns the time for which the tracker has sent exactly this pose \[us\]. Pass zeros as `attitude` for a
     /// position without attitude.
     pub(crate) fn lasts_us(&mut self, position: &Vector3<f32>, attitude: &[f32; 4], at_us: u64) -> u64 {
         let pose = Some((*position, *attitude));
         if self.pose != pose {
-            *self = Repeated { pose, since_us: at_us, doubted: false };
+            *self = FrozenPoseDetector { pose, since_us: at_us, doubted: false };
         }
         at_us.saturating_sub(self.since_us)
     }
@@ -99,7 +99,7 @@ impl Repeated {
 
 /// How long an aid must contradict the state before the state is reset to that aid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Trust {
+pub(crate) enum ResetDelay {
     /// A short time, because no other aid holds the state.
     Soon,
     /// The full reacquire time, because another aid holds the state meanwhile.
@@ -110,7 +110,7 @@ pub(crate) enum Trust {
 
 /// Fusion records of all kinds of aid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Aids {
+pub struct AidRecords {
     /// Position from a tracker.
     pub tracker_position: AidRecord,
     /// Attitude from a tracker.
@@ -127,56 +127,56 @@ pub struct Aids {
     pub heading: AidRecord,
 }
 
-impl Aids {
+impl AidRecords {
     /// Returns the record of this kind of aid.
     #[must_use]
-    pub fn of(&self, aid: Aid) -> &AidRecord {
+    pub fn of(&self, aid: AidSource) -> &AidRecord {
         match aid {
-            Aid::TrackerPosition => &self.tracker_position,
-            Aid::TrackerAttitude => &self.tracker_attitude,
-            Aid::GnssPosition => &self.gnss_position,
-            Aid::GnssHeight => &self.gnss_height,
-            Aid::GnssVelocity => &self.gnss_velocity,
-            Aid::Height => &self.height,
-            Aid::Heading => &self.heading,
+            AidSource::TrackerPosition => &self.tracker_position,
+            AidSource::TrackerAttitude => &self.tracker_attitude,
+            AidSource::GnssPosition => &self.gnss_position,
+            AidSource::GnssHeight => &self.gnss_height,
+            AidSource::GnssVelocity => &self.gnss_velocity,
+            AidSource::Height => &self.height,
+            AidSource::Heading => &self.heading,
         }
     }
 
-    pub(crate) fn of_mut(&mut self, aid: Aid) -> &mut AidRecord {
+    pub(crate) fn of_mut(&mut self, aid: AidSource) -> &mut AidRecord {
         match aid {
-            Aid::TrackerPosition => &mut self.tracker_position,
-            Aid::TrackerAttitude => &mut self.tracker_attitude,
-            Aid::GnssPosition => &mut self.gnss_position,
-            Aid::GnssHeight => &mut self.gnss_height,
-            Aid::GnssVelocity => &mut self.gnss_velocity,
-            Aid::Height => &mut self.height,
-            Aid::Heading => &mut self.heading,
+            AidSource::TrackerPosition => &mut self.tracker_position,
+            AidSource::TrackerAttitude => &mut self.tracker_attitude,
+            AidSource::GnssPosition => &mut self.gnss_position,
+            AidSource::GnssHeight => &mut self.gnss_height,
+            AidSource::GnssVelocity => &mut self.gnss_velocity,
+            AidSource::Height => &mut self.height,
+            AidSource::Heading => &mut self.heading,
         }
     }
 
     /// Returns when a rejected aid is to be followed, judged by the aids that were fused within the last `time_us`.
     /// `fast` is true if a receiver's velocity was fused within that time.
-    pub(crate) fn trust(&self, aid: Aid, fast: bool, now_us: u64, time_us: u64) -> Trust {
+    pub(crate) fn trust(&self, aid: AidSource, fast: bool, now_us: u64, time_us: u64) -> ResetDelay {
         let live = |other: &AidRecord| other.is_live(now_us, time_us);
         let tracker = live(&self.tracker_position);
         let never_if = |doubts: bool, else_late: bool| match (doubts, else_late) {
-            (true, _) => Trust::Never,
-            (_, true) => Trust::Late,
-            (false, false) => Trust::Soon,
+            (true, _) => ResetDelay::Never,
+            (_, true) => ResetDelay::Late,
+            (false, false) => ResetDelay::Soon,
         };
         match aid {
-            Aid::TrackerPosition => never_if(live(&self.gnss_position), fast),
-            Aid::GnssPosition => never_if(tracker, fast),
+            AidSource::TrackerPosition => never_if(live(&self.gnss_position), fast),
+            AidSource::GnssPosition => never_if(tracker, fast),
             // Barometer and receiver velocity measure the height in different ways. If both agree with the state, the
             // height is right.
-            Aid::GnssHeight => never_if(tracker || fast && live(&self.height), fast),
+            AidSource::GnssHeight => never_if(tracker || fast && live(&self.height), fast),
             // The receiver's position is off by metres, so it holds the velocity only for a short time.
-            Aid::GnssVelocity => never_if(tracker, live(&self.gnss_position)),
-            Aid::TrackerAttitude => never_if(live(&self.heading), false),
+            AidSource::GnssVelocity => never_if(tracker, live(&self.gnss_position)),
+            AidSource::TrackerAttitude => never_if(live(&self.heading), false),
             // Motion shows the heading: the bank of yaw filters resets a heading that contradicts the motion.
-            Aid::Heading => never_if(live(&self.tracker_attitude) || fast, true),
+            AidSource::Heading => never_if(live(&self.tracker_attitude) || fast, true),
             // A height reset changes only the barometer's offset, which no other aid measures.
-            Aid::Height => Trust::Soon,
+            AidSource::Height => ResetDelay::Soon,
         }
     }
 

@@ -2,7 +2,7 @@
 //! that measures it.
 
 use crate::measurement::{ImuSample, Measurement};
-use crate::rotation::{atan2, levelling, matrix, normalized, twist};
+use crate::rotation::{atan2, levelling, matrix, normalized, yaw_between};
 use crate::settings::Settings;
 use afbc_control::math::{abs_max, sqrt, tilt_cosine};
 use core::fmt;
@@ -44,12 +44,12 @@ impl fmt::Display for Unready {
 
 /// Running mean and sum of squared deviations (Welford).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Mean {
+struct RunningMean {
     mean: Vector3<f32>,
     squares: Vector3<f32>,
 }
 
-impl Mean {
+impl RunningMean {
     fn add(&mut self, value: &Vector3<f32>, share: f32) {
         let deviation = value - self.mean;
         self.mean += deviation * share;
@@ -64,11 +64,11 @@ impl Mean {
 
 /// Sums over the samples and measurements since the vehicle came to rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Align {
+pub(crate) struct Alignment {
     since_us: Option<u64>,
     count: f32,
-    rates: Mean,
-    force: Mean,
+    rates: RunningMean,
+    force: RunningMean,
     /// Mean rates and specific force over the first half of the time at rest.
     half: Option<(Vector3<f32>, Vector3<f32>)>,
     /// Sum of the magnetic fields, number of fields, and variance of one field.
@@ -82,7 +82,7 @@ pub(crate) struct Align {
 
 /// Result of the alignment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Aligned {
+pub(crate) struct AlignmentResult {
     pub(crate) attitude: Quaternion<f32>,
     pub(crate) gyro_bias: Vector3<f32>,
     /// Mean specific force, body frame \[m/s2\].
@@ -103,14 +103,14 @@ pub(crate) struct Aligned {
     pub(crate) time_s: f32,
 }
 
-impl Align {
+impl Alignment {
     /// Starts the alignment again and stores the reason.
     pub(crate) fn again(&mut self, why: Unready) {
-        *self = Align { why, ..Align::default() };
+        *self = Alignment { why, ..Alignment::default() };
     }
 
     /// Stores a measurement that shows the heading.
-    pub(crate) fn hear(&mut self, measurement: &Measurement) {
+    pub(crate) fn add_heading(&mut self, measurement: &Measurement) {
         match measurement {
             Measurement::MagneticField { field, sigma } => {
                 self.field.0 += field;
@@ -126,7 +126,7 @@ impl Align {
     }
 
     /// Takes a sample, and returns the alignment once the vehicle has been at rest for long enough.
-    pub(crate) fn advance(&mut self, sample: &ImuSample, settings: &Settings) -> Option<Aligned> {
+    pub(crate) fn advance(&mut self, sample: &ImuSample, settings: &Settings) -> Option<AlignmentResult> {
         let Some(since_us) = self.since_us else {
             let why = if self.why == Unready::NoImu { Unready::Settling } else { self.why };
             self.again(why);
@@ -141,7 +141,7 @@ impl Align {
         self.force.add(&sample.specific_force_m_s2, share);
 
         // One sample far from the mean, or too large a spread, starts the alignment again at once.
-        let far = |value: &Vector3<f32>, mean: &Mean, limit: f32| abs_max(&(value - mean.mean)) > 6.0 * limit;
+        let far = |value: &Vector3<f32>, mean: &RunningMean, limit: f32| abs_max(&(value - mean.mean)) > 6.0 * limit;
         let moves = far(&sample.rates_rad_s, &self.rates, rate)
             || far(&sample.specific_force_m_s2, &self.force, force)
             || (self.count >= 20.0
@@ -178,7 +178,7 @@ impl Align {
         (elapsed_s >= settings.align_s).then(|| self.result(norm, elapsed_s, settings)).flatten()
     }
 
-    fn result(&self, norm: f32, time_s: f32, settings: &Settings) -> Option<Aligned> {
+    fn result(&self, norm: f32, time_s: f32, settings: &Settings) -> Option<AlignmentResult> {
         let level = levelling(&(self.force.mean * (1.0 / norm)))?;
         let (sum, count, variance) = self.field;
         let field = (count > 0.0).then(|| matrix(&level) * (sum * (1.0 / count)));
@@ -192,7 +192,7 @@ impl Align {
             // east. If the field has no horizontal part, the variance is infinite and the heading is unknown.
             (-settings.declination_rad - atan2(field.y, field.x), variance / (count * horizontal), true)
         });
-        let pose = self.pose.map(|(attitude, sigma)| (twist(&attitude, &level), sigma * sigma, false));
+        let pose = self.pose.map(|(attitude, sigma)| (yaw_between(&attitude, &level), sigma * sigma, false));
         let by_field = by_field.filter(|_| settings.mag_slow_rad * settings.mag_slow_rad < VAGUE);
         let turn = pose.or(given).or(by_field).filter(|(turn, variance, _)| turn.is_finite() && *variance < VAGUE);
         let about_z = crate::rotation::about_z(turn.map_or(0.0, |(turn, ..)| turn));
@@ -203,8 +203,8 @@ impl Align {
         });
         // `squares / count` is the variance of a sample. The variance of the mean is smaller by another factor of
         // `count`.
-        let of_mean = |mean: &Mean| abs_max(&mean.squares) / (self.count * self.count);
-        Some(Aligned {
+        let of_mean = |mean: &RunningMean| abs_max(&mean.squares) / (self.count * self.count);
+        Some(AlignmentResult {
             attitude: normalized(&(about_z * level)),
             gyro_bias: self.rates.mean,
             force: self.force.mean,

@@ -18,10 +18,10 @@ const LEVER_GAP_US: u64 = 10_000;
 /// [calibrated](SensorCalibration) errors. The default is a sensor without errors at the centre of mass, aligned with
 /// the body axes: it returns every sample unchanged, bit by bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ImuCalibration(Option<Mounted>);
+pub struct ImuCalibration(Option<MountedImu>);
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Mounted {
+struct MountedImu {
     /// Rotation R from sensor to body axes.
     to_body: Matrix3<f32>,
     /// Position r of the sensor \[m\].
@@ -43,7 +43,7 @@ impl ImuCalibration {
     #[must_use]
     pub fn calibrated(mounting: &Mounting, errors: &SensorCalibration) -> Self {
         let SensorCalibration { gyro_offset_rad_s, accel_offset_m_s2, accel_scale, .. } = *errors;
-        ImuCalibration((!mounting.is_plain() || !errors.leaves_imu()).then(|| Mounted {
+        ImuCalibration((!mounting.is_plain() || !errors.leaves_imu()).then(|| MountedImu {
             to_body: mounting.r_body_sensor(),
             position_m: mounting.position_m,
             gyro_offset_rad_s,
@@ -67,10 +67,10 @@ impl ImuCalibration {
     }
 }
 
-impl Mounted {
+impl MountedImu {
     #[inline(never)]
     fn apply(&self, last: &mut Option<ImuSample>, sample: ImuSample) -> ImuSample {
-        let Mounted { to_body, position_m: r, gyro_offset_rad_s, accel_offset_m_s2, accel_scale } = self;
+        let MountedImu { to_body, position_m: r, gyro_offset_rad_s, accel_offset_m_s2, accel_scale } = self;
         // The errors are along the sensor's own axes, so they are subtracted before the rotation.
         let rates_rad_s = to_body * (sample.rates_rad_s - gyro_offset_rad_s);
         let felt_m_s2 = (sample.specific_force_m_s2 - accel_offset_m_s2).component_mul(accel_scale);

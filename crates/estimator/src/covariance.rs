@@ -23,14 +23,17 @@
 //! PX4's EKF2. The 16th state, the barometer's offset, is one more column. Without it, a filter that averages a
 //! barometer would claim to know a height that it cannot know.
 
-use crate::errors::{Block, Coordinate, Errors, Interval, Replaced, Row, Slows, minus_cross, subtract_outer};
-use crate::slow::{Columns, Slow};
+use crate::errors::{
+    CovarianceBlock, ErrorVector, JacobianRow, PredictionInterval, ReplacedError, SlowErrors, VectorComponent,
+    minus_cross, subtract_outer,
+};
+use crate::slow::{SlowCovariance, SlowErrorCovariances};
 use afbc_control::math::{max, min, sqrt};
 use nalgebra::Vector3;
 
 /// Process noise: variances that a prediction adds per second.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Growth {
+pub(crate) struct ProcessNoise {
     pub(crate) theta: f32,
     pub(crate) velocity: f32,
     pub(crate) gyro: f32,
@@ -42,34 +45,34 @@ pub(crate) struct Growth {
 /// are symmetric.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Covariance {
-    pub(crate) tt: Block,
-    pub(crate) tv: Block,
-    pub(crate) tp: Block,
-    pub(crate) tg: Block,
-    pub(crate) ta: Block,
-    pub(crate) vv: Block,
-    pub(crate) vp: Block,
-    pub(crate) vg: Block,
-    pub(crate) va: Block,
-    pub(crate) pp: Block,
-    pub(crate) pg: Block,
-    pub(crate) pa: Block,
-    pub(crate) gg: Block,
-    pub(crate) ga: Block,
-    pub(crate) aa: Block,
+    pub(crate) tt: CovarianceBlock,
+    pub(crate) tv: CovarianceBlock,
+    pub(crate) tp: CovarianceBlock,
+    pub(crate) tg: CovarianceBlock,
+    pub(crate) ta: CovarianceBlock,
+    pub(crate) vv: CovarianceBlock,
+    pub(crate) vp: CovarianceBlock,
+    pub(crate) vg: CovarianceBlock,
+    pub(crate) va: CovarianceBlock,
+    pub(crate) pp: CovarianceBlock,
+    pub(crate) pg: CovarianceBlock,
+    pub(crate) pa: CovarianceBlock,
+    pub(crate) gg: CovarianceBlock,
+    pub(crate) ga: CovarianceBlock,
+    pub(crate) aa: CovarianceBlock,
     pub(crate) tb: Vector3<f32>,
     pub(crate) vb: Vector3<f32>,
     pub(crate) pb: Vector3<f32>,
     pub(crate) gb: Vector3<f32>,
     pub(crate) ab: Vector3<f32>,
     pub(crate) bb: f32,
-    pub(crate) slow: Slow,
+    pub(crate) slow: SlowErrorCovariances,
 }
 
 /// Returns m (-[s]x)': the cross product of each row of `m`.
 #[inline]
-fn crossed_minus(m: &Block, s: &Vector3<f32>) -> Block {
-    Block::new(
+fn crossed_minus(m: &CovarianceBlock, s: &Vector3<f32>) -> CovarianceBlock {
+    CovarianceBlock::new(
         m.m12 * s.z - m.m13 * s.y,
         m.m13 * s.x - m.m11 * s.z,
         m.m11 * s.y - m.m12 * s.x,
@@ -84,13 +87,13 @@ fn crossed_minus(m: &Block, s: &Vector3<f32>) -> Block {
 
 /// Returns a b'.
 #[inline]
-fn by_transpose(a: &Block, b: &Block) -> Block {
+fn by_transpose(a: &CovarianceBlock, b: &CovarianceBlock) -> CovarianceBlock {
     a * b.transpose()
 }
 
 /// Copies the upper triangle of a block to the lower one.
 #[inline]
-fn mirror(m: &mut Block) {
+fn mirror(m: &mut CovarianceBlock) {
     m.m21 = m.m12;
     m.m31 = m.m13;
     m.m32 = m.m23;
@@ -98,14 +101,14 @@ fn mirror(m: &mut Block) {
 
 /// Adds a variance to the diagonal.
 #[inline]
-fn add_diagonal(m: &mut Block, variance: f32) {
+fn add_diagonal(m: &mut CovarianceBlock, variance: f32) {
     m.m11 += variance;
     m.m22 += variance;
     m.m33 += variance;
 }
 
 /// Sets one row of the covariances with the slow errors.
-fn set_row(columns: &mut Columns, at: Coordinate, to: &Slows) {
+fn set_row(columns: &mut SlowCovariance, at: VectorComponent, to: &SlowErrors) {
     for (mut column, to) in columns.column_iter_mut().zip(to) {
         if let Some(number) = column.iter_mut().nth(at as usize) {
             *number = *to;
@@ -125,29 +128,29 @@ const POSSIBLE: f32 = 1.001;
 
 /// Adds a variance and the share for rounding to the diagonal.
 #[inline]
-fn grown(m: &mut Block, variance: f32) {
+fn grown(m: &mut CovarianceBlock, variance: f32) {
     m.m11 += m.m11 * ROUNDED + variance;
     m.m22 += m.m22 * ROUNDED + variance;
     m.m33 += m.m33 * ROUNDED + variance;
 }
 
 /// Smallest and largest variance of one error.
-struct Bounds {
+struct VarianceBounds {
     least: f32,
     most: f32,
 }
 
 /// From (1e-5 rad)^2 to the variance of a completely unknown angle.
-const THETA: Bounds = Bounds { least: 1e-10, most: 3.3 };
-const VELOCITY: Bounds = Bounds { least: 1e-8, most: 1e4 };
-const POSITION: Bounds = Bounds { least: 1e-9, most: 1e8 };
-const GYRO: Bounds = Bounds { least: 1e-13, most: 0.25 };
-const ACCEL: Bounds = Bounds { least: 1e-9, most: 25.0 };
-const BARO: Bounds = Bounds { least: 1e-8, most: 1e8 };
+const THETA: VarianceBounds = VarianceBounds { least: 1e-10, most: 3.3 };
+const VELOCITY: VarianceBounds = VarianceBounds { least: 1e-8, most: 1e4 };
+const POSITION: VarianceBounds = VarianceBounds { least: 1e-9, most: 1e8 };
+const GYRO: VarianceBounds = VarianceBounds { least: 1e-13, most: 0.25 };
+const ACCEL: VarianceBounds = VarianceBounds { least: 1e-9, most: 25.0 };
+const BARO: VarianceBounds = VarianceBounds { least: 1e-8, most: 1e8 };
 
 /// Raises the variances of a block to at least `least`.
 #[inline]
-fn raised(block: &mut Block, least: f32) {
+fn raised(block: &mut CovarianceBlock, least: f32) {
     block.m11 = max(block.m11, least);
     block.m22 = max(block.m22, least);
     block.m33 = max(block.m33, least);
@@ -155,7 +158,7 @@ fn raised(block: &mut Block, least: f32) {
 
 /// Mirrors a diagonal block and raises its variances to the minimum. Returns true if one exceeds the maximum.
 #[inline]
-fn held(block: &mut Block, bounds: &Bounds) -> bool {
+fn held(block: &mut CovarianceBlock, bounds: &VarianceBounds) -> bool {
     mirror(block);
     raised(block, bounds.least);
     block.m11 > bounds.most || block.m22 > bounds.most || block.m33 > bounds.most
@@ -164,8 +167,8 @@ fn held(block: &mut Block, bounds: &Bounds) -> bool {
 impl Covariance {
     /// Predicts over `interval`: P = F P F' + Q, as three substitutions in blocks.
     #[inline]
-    pub(crate) fn predict(&mut self, interval: &Interval, growth: &Growth) {
-        let Interval { time_s, turn, thrust } = interval;
+    pub(crate) fn predict(&mut self, interval: &PredictionInterval, growth: &ProcessNoise) {
+        let PredictionInterval { time_s, turn, thrust } = interval;
         let (t, c, s) = (*time_s, turn, thrust);
         // Position first, rotation last: each substitution then reads values from the beginning of the interval.
         self.slow.predict(interval);
@@ -203,7 +206,7 @@ impl Covariance {
 
     /// Rotates the angular error along with a rotation r of the nominal attitude: theta = r theta.
     #[inline]
-    pub(crate) fn turn(&mut self, r: &Block) {
+    pub(crate) fn turn(&mut self, r: &CovarianceBlock) {
         self.tt = by_transpose(&(r * self.tt), r);
         self.tv = r * self.tv;
         self.tp = r * self.tp;
@@ -216,7 +219,7 @@ impl Covariance {
 
     /// Adds the process noise of `time_s` and the share for rounding.
     #[inline]
-    fn grow(&mut self, time_s: f32, growth: &Growth) {
+    fn grow(&mut self, time_s: f32, growth: &ProcessNoise) {
         add_diagonal(&mut self.tt, growth.theta * time_s);
         grown(&mut self.vv, growth.velocity * time_s);
         grown(&mut self.pp, 0.0);
@@ -226,7 +229,7 @@ impl Covariance {
     }
 
     /// Adds variances to attitude and velocity.
-    pub(crate) fn roughen(&mut self, (theta, velocity): (f32, f32)) {
+    pub(crate) fn inflate_variances(&mut self, (theta, velocity): (f32, f32)) {
         add_diagonal(&mut self.tt, theta);
         add_diagonal(&mut self.vv, velocity);
     }
@@ -262,7 +265,7 @@ impl Covariance {
     #[cold]
     #[inline(never)]
     pub(crate) fn decorrelate(&mut self) {
-        let of = |block: &Block| Block::from_diagonal(&(block.diagonal() * 2.0));
+        let of = |block: &CovarianceBlock| CovarianceBlock::from_diagonal(&(block.diagonal() * 2.0));
         *self = Covariance {
             tt: of(&self.tt),
             vv: of(&self.vv),
@@ -270,7 +273,7 @@ impl Covariance {
             gg: of(&self.gg),
             aa: of(&self.aa),
             bb: 2.0 * self.bb,
-            slow: Slow { variance: self.slow.variance, ..Slow::default() },
+            slow: SlowErrorCovariances { variance: self.slow.variance, ..SlowErrorCovariances::default() },
             ..Covariance::default()
         };
         self.hold();
@@ -312,23 +315,32 @@ impl Covariance {
     #[cold]
     #[inline(never)]
     fn limit(&mut self) {
-        let factor = |variance: f32, bounds: &Bounds| {
+        let factor = |variance: f32, bounds: &VarianceBounds| {
             // Slightly below the bound, so that rounding cannot end above it.
             if variance > bounds.most { sqrt(bounds.most / variance) * 0.9999 } else { 1.0 }
         };
-        let of = |m: &Block, bounds: Bounds| {
+        let of = |m: &CovarianceBlock, bounds: VarianceBounds| {
             Vector3::new(factor(m.m11, &bounds), factor(m.m22, &bounds), factor(m.m33, &bounds))
         };
         let (t, v, p) = (of(&self.tt, THETA), of(&self.vv, VELOCITY), of(&self.pp, POSITION));
         let (g, a, b) = (of(&self.gg, GYRO), of(&self.aa, ACCEL), factor(self.bb, &BARO));
         // `scale` ignores `slow` for variances: the variances of slow errors are given.
-        self.scale(&Errors { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b, slow: Slows::zeros() });
+        self.scale(&ErrorVector {
+            theta: t,
+            velocity: v,
+            position: p,
+            gyro: g,
+            accel: a,
+            baro: b,
+            slow: SlowErrors::zeros(),
+        });
     }
 
     /// Multiplies each error by its factor, which scales the error's row and column.
-    fn scale(&mut self, by: &Errors) {
-        let Errors { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b, .. } = by;
-        let scale = |m: &mut Block, x: &Vector3<f32>, y: &Vector3<f32>| m.component_mul_assign(&(x * y.transpose()));
+    fn scale(&mut self, by: &ErrorVector) {
+        let ErrorVector { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b, .. } = by;
+        let scale =
+            |m: &mut CovarianceBlock, x: &Vector3<f32>, y: &Vector3<f32>| m.component_mul_assign(&(x * y.transpose()));
         for (block, y) in
             [(&mut self.tt, t), (&mut self.tv, v), (&mut self.tp, p), (&mut self.tg, g), (&mut self.ta, a)]
         {
@@ -353,20 +365,20 @@ impl Covariance {
     }
 
     /// Forgets some errors: those with a zero in `keep` lose their variance and all their covariances.
-    pub(crate) fn forget(&mut self, keep: &Errors) {
+    pub(crate) fn forget(&mut self, keep: &ErrorVector) {
         self.scale(keep);
     }
 
     /// Replaces one error after the state was reset to a measurement, so that the innovation is zero. `row` is the
     /// measurement's Jacobian without its 1 for the replaced error. The new error is -(row x) minus the noise, which
     /// has the variance `variance`. It keeps exactly the covariances that follow from the other errors.
-    pub(crate) fn replace(&mut self, which: Replaced, row: &Row, variance: f32) {
+    pub(crate) fn replace(&mut self, which: ReplacedError, row: &JacobianRow, variance: f32) {
         let y = self.times(row);
         let variance = max(row.dot(&y), 0.0) + variance;
-        let Errors { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b, slow } = y.scaled(-1.0);
+        let ErrorVector { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b, slow } = y.scaled(-1.0);
         match which {
-            Replaced::Heading => {
-                let at = Coordinate::Z;
+            ReplacedError::Heading => {
+                let at = VectorComponent::Z;
                 let t = Vector3::new(t.x, t.y, variance);
                 at.set_row(&mut self.tt, &t);
                 at.set_column(&mut self.tt, &t);
@@ -377,7 +389,7 @@ impl Covariance {
                 self.tb.z = b;
                 set_row(&mut self.slow.theta, at, &slow);
             }
-            Replaced::Velocity(at) => {
+            ReplacedError::Velocity(at) => {
                 let mut v = v;
                 at.set(&mut v, variance);
                 at.set_column(&mut self.tv, &t);
@@ -389,7 +401,7 @@ impl Covariance {
                 at.set(&mut self.vb, b);
                 set_row(&mut self.slow.velocity, at, &slow);
             }
-            Replaced::Position(at) => {
+            ReplacedError::Position(at) => {
                 let mut p = p;
                 at.set(&mut p, variance);
                 at.set_column(&mut self.tp, &t);
@@ -401,7 +413,7 @@ impl Covariance {
                 at.set(&mut self.pb, b);
                 set_row(&mut self.slow.position, at, &slow);
             }
-            Replaced::Offset => {
+            ReplacedError::Offset => {
                 (self.tb, self.vb, self.pb, self.gb, self.ab, self.bb) = (t, v, p, g, a, variance);
                 self.slow.baro = slow;
             }
@@ -411,16 +423,16 @@ impl Covariance {
 
     /// Returns P h.
     #[inline]
-    pub(crate) fn times(&self, row: &Row) -> Errors {
+    pub(crate) fn times(&self, row: &JacobianRow) -> ErrorVector {
         let at = row.coordinate;
-        let mut y = Errors {
+        let mut y = ErrorVector {
             theta: self.tt * row.theta,
             velocity: self.tv.tr_mul(&row.theta),
             position: self.tp.tr_mul(&row.theta),
             gyro: self.tg.tr_mul(&row.theta),
             accel: self.ta.tr_mul(&row.theta),
             baro: self.tb.dot(&row.theta),
-            slow: Slows::zeros(),
+            slow: SlowErrors::zeros(),
         };
         // Most parts of a row are zero and a scalar must be fused within a control tick, so zero parts are skipped.
         if row.velocity != 0.0 {
@@ -472,14 +484,14 @@ impl Covariance {
 
     /// Returns the sum of the variances of the row's position and velocity, without their covariance.
     #[inline]
-    pub(crate) fn motion_variance(&self, row: &Row) -> f32 {
-        let of = |m: &Block| row.coordinate.of(&m.diagonal());
+    pub(crate) fn motion_variance(&self, row: &JacobianRow) -> f32 {
+        let of = |m: &CovarianceBlock| row.coordinate.of(&m.diagonal());
         row.position * row.position * of(&self.pp) + row.velocity * row.velocity * of(&self.vv)
     }
 
     /// Subtracts k w'.
     #[inline]
-    fn subtract(&mut self, k: &Errors, w: &Errors) {
+    fn subtract(&mut self, k: &ErrorVector, w: &ErrorVector) {
         subtract_outer(&mut self.tt, &k.theta, &w.theta);
         subtract_outer(&mut self.tv, &k.theta, &w.velocity);
         subtract_outer(&mut self.tp, &k.theta, &w.position);
@@ -506,7 +518,7 @@ impl Covariance {
     /// Fuses a scalar with the optimal gain K = y/s, where y = P h and s is the innovation variance. The result P - y
     /// y'/s is symmetric to the last bit.
     #[inline]
-    pub(crate) fn fuse(&mut self, y: &Errors, s: f32) {
+    pub(crate) fn fuse(&mut self, y: &ErrorVector, s: f32) {
         let w = y.scaled(1.0 / sqrt(s));
         self.subtract(&w, &w);
         self.slow.subtract(&w, &w);
@@ -516,9 +528,9 @@ impl Covariance {
 
     /// Fuses a scalar with any gain `k`: P - k y' - y k' + k s k' = P - k w' - w k' with w = y - k s/2. This is
     /// Joseph's form, which stays positive for any gain.
-    pub(crate) fn fuse_with(&mut self, k: &Errors, y: &Errors, s: f32) {
+    pub(crate) fn fuse_with(&mut self, k: &ErrorVector, y: &ErrorVector, s: f32) {
         let half = k.scaled(0.5 * s);
-        let w = Errors {
+        let w = ErrorVector {
             theta: y.theta - half.theta,
             velocity: y.velocity - half.velocity,
             position: y.position - half.position,
@@ -540,8 +552,8 @@ impl Covariance {
 
     /// Returns the variances.
     #[inline]
-    pub(crate) fn variances(&self) -> Errors {
-        Errors {
+    pub(crate) fn variances(&self) -> ErrorVector {
+        ErrorVector {
             theta: self.tt.diagonal(),
             velocity: self.vv.diagonal(),
             position: self.pp.diagonal(),
@@ -558,7 +570,7 @@ impl Covariance {
         let blocks = [[&self.tt, &self.tv, &self.tp], [&vt, &self.vv, &self.vp], [&pt, &pv, &self.pp]];
         let mut rows = [[0.0; 9]; 9];
         for (three, [a, b, c]) in rows.chunks_exact_mut(3).zip(blocks) {
-            for (to, at) in three.iter_mut().zip(Coordinate::ALL) {
+            for (to, at) in three.iter_mut().zip(VectorComponent::ALL) {
                 let [a, b, c] = [at.row(a), at.row(b), at.row(c)];
                 *to = [a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z];
             }
@@ -580,7 +592,7 @@ impl Covariance {
         let mut rows = [[0.0; 16]; 16];
         let (body, last) = rows.split_at_mut(15);
         for ((three, blocks), column) in body.chunks_exact_mut(3).zip(&blocks).zip(&border) {
-            for (row, at) in three.iter_mut().zip(Coordinate::ALL) {
+            for (row, at) in three.iter_mut().zip(VectorComponent::ALL) {
                 let numbers = blocks.iter().flat_map(|block| {
                     let row = at.row(block);
                     [row.x, row.y, row.z]

@@ -18,7 +18,7 @@ const LEANING_S: f64 = 100.0;
 /// Figures of a gyroscope in rad/s or of an accelerometer in m/s2. Each is a standard deviation unless stated
 /// otherwise.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Triad {
+pub struct InertialSensorFigures {
     /// One-sided density of the white noise \[unit/rtHz\].
     pub noise_rthz: f64,
     /// Random walk of the bias after one second \[unit\].
@@ -45,9 +45,9 @@ pub struct Triad {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DataSheet {
     /// Figures of the gyroscope.
-    pub gyro: Triad,
+    pub gyro: InertialSensorFigures,
     /// Figures of the accelerometer.
-    pub accel: Triad,
+    pub accel: InertialSensorFigures,
     /// Sample period of gyroscope and accelerometer \[s\].
     pub step_s: f64,
     /// Acceleration of free fall \[m/s2\].
@@ -74,7 +74,7 @@ fn markov(sigma: f64, time_s: f64) -> f64 {
     sigma * sqrt(2.0 / time_s)
 }
 
-impl Triad {
+impl InertialSensorFigures {
     /// Returns the two-sided density of everything that counts as white noise, at the rate or acceleration `moving`
     /// \[unit/rtHz\].
     fn density(&self, step_s: f64, moving: f64) -> f64 {
@@ -136,16 +136,16 @@ impl Settings {
 
 #[cfg(test)]
 mod tests {
-    use super::{DataSheet, Triad};
+    use super::{DataSheet, InertialSensorFigures};
     use crate::settings::Settings;
     use afbc_types::Declared;
     use proptest::prelude::*;
 
-    fn triad() -> impl Strategy<Value = Triad> {
+    fn triad() -> impl Strategy<Value = InertialSensorFigures> {
         (prop::array::uniform9(0.0..10.0_f64), 0.001..1e5_f64).prop_map(|(figures, instability_time_s)| {
             let [noise_rthz, walk, instability, bias, scale, misalignment_rad, range, lsb, vibration] = figures;
             let range = range * 1000.0;
-            Triad {
+            InertialSensorFigures {
                 noise_rthz,
                 walk,
                 instability,
@@ -179,7 +179,8 @@ mod tests {
 
             let mut poor = sheet;
             for triad in [&mut poor.gyro, &mut poor.accel] {
-                let Triad { noise_rthz, walk, instability, bias, scale, misalignment_rad, lsb, vibration, .. } = triad;
+                let InertialSensorFigures { noise_rthz, walk, instability, bias, .. } = triad;
+                let InertialSensorFigures { scale, misalignment_rad, lsb, vibration, .. } = triad;
                 let figures = [noise_rthz, walk, instability, bias, scale, misalignment_rad, lsb, vibration];
                 figures.into_iter().nth(worse).into_iter().for_each(|figure| *figure *= 2.0);
             }

@@ -59,7 +59,7 @@ pub struct Resets {
 
 /// Number of measurements dropped before the gate, each up to `u32::MAX`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Dropped {
+pub struct DroppedMeasurements {
     /// Not finite, outside the plausible range, or with an unusable standard deviation.
     pub implausible: u32,
     /// Older than 270 ms when its turn came, or older than the oldest stored state.

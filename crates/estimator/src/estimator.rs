@@ -1,12 +1,12 @@
 //! The estimator and its step: IMU sample, prediction or fusion, output.
 
 use crate::align::Unready;
-use crate::covariance::{BLOCKS, Growth, largest_sigma};
+use crate::covariance::{BLOCKS, ProcessNoise, largest_sigma};
 use crate::estimate::{Estimate, Sigmas, Validity, count};
-use crate::imu::LowPass;
+use crate::imu::LowPassFilter2p;
 use crate::measurement::ImuSample;
 use crate::memory::{Memory, NO_INTERVAL};
-use crate::nominal::Nominal;
+use crate::nominal::NominalState;
 use crate::rotation::{euler, identity, matrix, renormalized};
 use crate::settings::Settings;
 use afbc_control::math::{max, min, sqrt, wrap_angle};
@@ -36,8 +36,8 @@ const CLIPPED: (f32, f32) = (20.0, 200.0);
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimator {
     pub(crate) settings: Settings,
-    growth: Growth,
-    low_pass: LowPass,
+    growth: ProcessNoise,
+    low_pass: LowPassFilter2p,
     pub(crate) gate_squared: f32,
     pub(crate) reacquire_us: u64,
     pub(crate) coast_us: u64,
@@ -64,14 +64,14 @@ impl Estimator {
         // 0 means never: a time longer than any flight.
         let or_never = |time_s: f32| if time_s > 0.0 { microseconds(time_s) } else { u64::MAX };
         Ok(Estimator {
-            growth: Growth {
+            growth: ProcessNoise {
                 theta: square(settings.gyro_noise_rad_s_rthz),
                 velocity: square(settings.accel_noise_m_s2_rthz),
                 gyro: square(settings.gyro_walk_rad_s_rts),
                 accel: square(settings.accel_walk_m_s2_rts),
                 baro: square(settings.baro_walk_m_rts),
             },
-            low_pass: LowPass::new(settings.rates_cutoff_hz),
+            low_pass: LowPassFilter2p::new(settings.rates_cutoff_hz),
             gate_squared: square(settings.gate_sigmas),
             reacquire_us: microseconds(settings.reacquire_s),
             coast_us: microseconds(settings.coast_s),
@@ -127,7 +127,7 @@ impl Estimator {
     /// Takes a sample, then predicts or fuses.
     #[inline(never)]
     fn advance(&self, memory: &mut Memory, now_us: u64, imu: Option<&ImuSample>) {
-        let predicted = imu.is_some_and(|sample| self.take(memory, now_us, sample));
+        let predicted = imu.is_some_and(|sample| self.take_sample(memory, now_us, sample));
         memory.moved = (Vector3::zeros(), Vector3::zeros());
         if memory.runs {
             // Only between fixes, because a fix refers to a stored state.
@@ -136,17 +136,17 @@ impl Estimator {
             } else if memory.fix.is_none() && memory.history.is_unsettled() {
                 memory.history.settle(self.settings.gravity_m_s2);
             } else {
-                let Nominal { position, velocity, .. } = memory.nominal;
+                let NominalState { position, velocity, .. } = memory.nominal;
                 self.fuse(memory, now_us);
                 memory.moved = (memory.nominal.position - position, memory.nominal.velocity - velocity);
             }
         } else {
-            self.listen(memory, now_us);
+            self.feed_alignment(memory, now_us);
         }
     }
 
     /// Takes a sample. Returns true if the covariance was predicted.
-    fn take(&self, memory: &mut Memory, now_us: u64, sample: &ImuSample) -> bool {
+    fn take_sample(&self, memory: &mut Memory, now_us: u64, sample: &ImuSample) -> bool {
         let last_us = memory.monitor.at_us();
         let possible = sample.at_us <= now_us.saturating_add(EARLY_US) && sample.at_us.saturating_add(OLD_US) >= now_us;
         let newer = last_us.is_none_or(|last_us| sample.at_us > last_us);
@@ -174,7 +174,7 @@ impl Estimator {
             }
             memory.covariance_us = sample.at_us;
             memory.history.clear();
-            memory.remember(sample.at_us);
+            memory.store_history(sample.at_us);
             memory.nominal.begin(sample);
             return false;
         };
@@ -182,11 +182,11 @@ impl Estimator {
         let dt_s = gap_us as u32 as f32 * 1e-6;
         if gap_us > GAP_US {
             let (turn, speed) = (GAP_RAD_S * dt_s, GAP_M_S2 * dt_s);
-            memory.roughen(sample.at_us, turn * turn, speed * speed);
+            memory.inflate_variances(sample.at_us, turn * turn, speed * speed);
         }
         if clipped.gyro || clipped.accel {
             let of = |clipped, rate: f32| if clipped { rate * dt_s } else { 0.0 };
-            memory.roughen(sample.at_us, of(clipped.gyro, CLIPPED.0), of(clipped.accel, CLIPPED.1));
+            memory.inflate_variances(sample.at_us, of(clipped.gyro, CLIPPED.0), of(clipped.accel, CLIPPED.1));
         }
         memory.rest.advance(sample, dt_s, &self.settings);
         memory.interval.thrust += memory.nominal.advance(sample, dt_s, self.settings.gravity_m_s2);
@@ -203,12 +203,12 @@ impl Estimator {
         let mut interval = memory.interval;
         interval.turn = (memory.rotation + memory.nominal.rotation) * (0.5 * interval.time_s);
         let mut growth = self.growth;
-        growth.velocity += self.bent(memory);
+        growth.velocity += self.linearization_error(memory);
         // Rotated before the prediction, because the corrections were made at the beginning of the interval.
         memory.covariance.turn(&matrix(&renormalized(&memory.turned)));
         memory.turned = identity();
         memory.covariance.predict(&interval, &growth);
-        memory.covariance.roughen(memory.rough);
+        memory.covariance.inflate_variances(memory.rough);
         memory.history.advance(interval.time_s, &interval.thrust);
         memory.pushed += interval.thrust.xy();
         memory.rotation = memory.nominal.rotation;
@@ -220,7 +220,7 @@ impl Estimator {
                 memory.covariance.decorrelate();
                 count(&mut memory.resets.covariance);
             }
-            memory.remember(sample.at_us);
+            memory.store_history(sample.at_us);
         } else {
             memory.restart(sample.at_us);
             memory.nominal.begin(sample);
@@ -230,7 +230,7 @@ impl Estimator {
     /// Returns the velocity variance per second that the linear model misses: the second-order acceleration error g
     /// theta_tilt theta. It matters at the start, when levelling has left an angle error of 0.01 rad and the model's
     /// own noise is below 1e-3 m/s2.
-    fn bent(&self, memory: &Memory) -> f32 {
+    fn linearization_error(&self, memory: &Memory) -> f32 {
         let theta = memory.covariance.variances().theta;
         let tilt = max(theta.x, theta.y);
         let gravity = self.settings.gravity_m_s2;
@@ -246,7 +246,7 @@ impl Estimator {
     }
 
     /// Before the start: passes queued measurements to the alignment, which takes the heading from them.
-    fn listen(&self, memory: &mut Memory, now_us: u64) {
+    fn feed_alignment(&self, memory: &mut Memory, now_us: u64) {
         if memory.monitor.health(now_us, &self.settings, self.stuck_us).missing {
             memory.align.again(Unready::NoImu);
         }
@@ -254,7 +254,7 @@ impl Estimator {
         // Measurements of any time are taken: before the start there is no history to wait for.
         while let Some(measurement) = memory.queue.take(|_| true) {
             if measurement.at_us >= recent {
-                memory.align.hear(&measurement.value);
+                memory.align.add_heading(&measurement.value);
             }
         }
     }

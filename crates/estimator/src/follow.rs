@@ -4,15 +4,15 @@
 //! exactly the covariances that follow from these errors, so the matrix stays valid
 //! ([`crate::covariance::Covariance::replace`]).
 
-use crate::errors::{Coordinate, Errors, NO_ROW, Replaced, Row};
+use crate::errors::{ErrorVector, JacobianRow, NO_ROW, ReplacedError, VectorComponent};
 use crate::estimate::count;
 use crate::estimator::Estimator;
 use crate::fusion::{field_variance, slow_position};
-use crate::horizon::{Horizon, Target};
+use crate::horizon::{FusionHorizon, ObservedQuantity};
 use crate::memory::Memory;
-use crate::queue::{Axes, Part};
+use crate::queue::{AidObservation, FusedAxes};
 use crate::restart::{KEEP, NONE};
-use crate::rotation::{about_z, atan2, identity, matrix, normalized, twist};
+use crate::rotation::{about_z, atan2, identity, matrix, normalized, yaw_between};
 use afbc_control::math::{max, min, wrap_angle};
 use nalgebra::Vector3;
 
@@ -29,45 +29,51 @@ const HEADED_RAD: f32 = 0.1;
 
 impl Estimator {
     /// Resets the state to the measurement in `part`.
-    pub(crate) fn follow(&self, memory: &mut Memory, part: &Part, horizon: &Horizon) {
+    pub(crate) fn follow(&self, memory: &mut Memory, part: &AidObservation, horizon: &FusionHorizon) {
         let past = horizon.past();
         match &part.target {
-            Target::Position(position) => {
+            ObservedQuantity::Position(position) => {
                 memory.put(&part.axes.only(&(position - past.position)));
                 self.replace_motion(memory, part, horizon);
                 memory.knows.position = true;
-                if part.axes != Axes::Level {
+                if part.axes != FusedAxes::Level {
                     // The barometer's offset belonged to the old height.
-                    memory.covariance.forget(&Errors { baro: 0.0, ..KEEP });
+                    memory.covariance.forget(&ErrorVector { baro: 0.0, ..KEEP });
                     memory.covariance.hold();
                     memory.knows.height_offset = false;
                 }
             }
-            Target::Velocity(velocity) => {
+            ObservedQuantity::Velocity(velocity) => {
                 memory.push(&part.axes.only(&(velocity - past.velocity)));
                 self.replace_motion(memory, part, horizon);
             }
-            Target::Height(height) => {
+            ObservedQuantity::Height(height) => {
                 count(&mut memory.resets.height);
                 memory.height_offset = height - past.position.z;
                 memory.knows.height_offset = true;
-                if let Some((_, mut row)) = horizon.row(&part.target, Coordinate::Z, &self.expected(memory)) {
+                if let Some((_, mut row)) = horizon.row(&part.target, VectorComponent::Z, &self.expected(memory)) {
                     row.baro = 0.0;
-                    memory.covariance.replace(Replaced::Offset, &row, part.variance.x);
+                    memory.covariance.replace(ReplacedError::Offset, &row, part.variance.x);
                 }
             }
-            Target::Attitude(attitude) => {
+            ObservedQuantity::Attitude(attitude) => {
                 // The heading is no better than roll and pitch, because the errors mix.
                 let tilt = memory.covariance.variances().theta.xy().max();
-                self.head(memory, part, horizon, twist(attitude, &past.attitude), part.variance.z + tilt);
+                self.reset_heading(
+                    memory,
+                    part,
+                    horizon,
+                    yaw_between(attitude, &past.attitude),
+                    part.variance.z + tilt,
+                );
             }
-            Target::Heading(heading) => {
-                self.head(memory, part, horizon, wrap_angle(heading - horizon.heading()), part.variance.x);
+            ObservedQuantity::Heading(heading) => {
+                self.reset_heading(memory, part, horizon, wrap_angle(heading - horizon.heading()), part.variance.x);
             }
-            Target::Field(field) => {
+            ObservedQuantity::Field(field) => {
                 let field = horizon.field(field);
                 let turn = wrap_angle(self.magnetic_north_rad - atan2(field.y, field.x));
-                self.head(memory, part, horizon, turn, field_variance(&field, part.variance.x));
+                self.reset_heading(memory, part, horizon, turn, field_variance(&field, part.variance.x));
             }
         }
     }
@@ -91,24 +97,24 @@ impl Estimator {
         }
         memory.contradicted_us = None;
         memory.turn_heading(by);
-        memory.covariance.replace(Replaced::Heading, &NO_ROW, variance + HEADED_RAD * HEADED_RAD);
+        memory.covariance.replace(ReplacedError::Heading, &NO_ROW, variance + HEADED_RAD * HEADED_RAD);
         // The wrong heading has integrated accelerations in wrong directions, which has put errors into velocity and
         // tilt.
         if memory.knows.heading {
             memory.doubt_velocity(&Vector3::repeat(1.0));
-            memory.doubt_tilt();
+            memory.inflate_tilt();
         }
         memory.knows.heading = true;
     }
 
     /// Replaces the errors of a position or velocity by those of the measurement.
-    fn replace_motion(&self, memory: &mut Memory, part: &Part, horizon: &Horizon) {
+    fn replace_motion(&self, memory: &mut Memory, part: &AidObservation, horizon: &FusionHorizon) {
         let expected = self.expected(memory);
-        for at in Coordinate::ALL.into_iter().filter(|at| part.axes.contain(*at)) {
+        for at in VectorComponent::ALL.into_iter().filter(|at| part.axes.contain(*at)) {
             let Some((_, mut row)) = horizon.row(&part.target, at, &expected) else { continue };
-            let which = if row.position == 0.0 { Replaced::Velocity(at) } else { Replaced::Position(at) };
+            let which = if row.position == 0.0 { ReplacedError::Velocity(at) } else { ReplacedError::Position(at) };
             match which {
-                Replaced::Velocity(_) => row.velocity = 0.0,
+                ReplacedError::Velocity(_) => row.velocity = 0.0,
                 _ => row.position = 0.0,
             }
             row.slow = part.is_slow().then(|| slow_position(at));
@@ -117,18 +123,25 @@ impl Estimator {
     }
 
     /// Turns the heading by `by`, and replaces its error by that of `part` with the noise variance `variance`.
-    fn head(&self, memory: &mut Memory, part: &Part, horizon: &Horizon, by: f32, variance: f32) {
+    fn reset_heading(
+        &self,
+        memory: &mut Memory,
+        part: &AidObservation,
+        horizon: &FusionHorizon,
+        by: f32,
+        variance: f32,
+    ) {
         let turn = about_z(by);
         memory.turn_heading(by);
         // Without a row (nose or field almost vertical) the heading error is up to ten times the tilt error.
         let tilt = memory.covariance.variances().theta.xy().max();
-        let row = horizon.turned(&turn).row(&part.target, Coordinate::Z, &self.expected(memory));
+        let row = horizon.turned(&turn).row(&part.target, VectorComponent::Z, &self.expected(memory));
         let (row, variance) = match row {
             Some((_, row)) => (row, variance),
             None => (NO_ROW, variance + 100.0 * tilt),
         };
-        let row = Row { theta: Vector3::new(row.theta.x, row.theta.y, 0.0), ..row };
-        memory.covariance.replace(Replaced::Heading, &row, min(variance, 100.0));
+        let row = JacobianRow { theta: Vector3::new(row.theta.x, row.theta.y, 0.0), ..row };
+        memory.covariance.replace(ReplacedError::Heading, &row, min(variance, 100.0));
         memory.knows.heading = true;
     }
 }

@@ -4,17 +4,17 @@
 //! fix follow one another, and each innovation is relative to the state corrected so far. The sum of innovation^2/s is
 //! then the normalised innovation squared of the whole fix.
 
-use crate::aid::{Aid, Trust, passes};
+use crate::aid::{AidSource, ResetDelay, passes};
 use crate::align::VAGUE;
-use crate::errors::{Coordinate, Errors, Slows};
+use crate::errors::{ErrorVector, SlowErrors, VectorComponent};
 use crate::estimate::count;
 use crate::estimator::Estimator;
-use crate::horizon::{Expected, Horizon, Target};
+use crate::horizon::{ExpectedReadings, FusionHorizon, ObservedQuantity};
 use crate::measurement::Measurement;
 use crate::memory::Memory;
-use crate::queue::{Axes, Fix, Part, parts};
+use crate::queue::{AidObservation, FusedAxes, PendingFusion, parts};
 use crate::restart::reference;
-use crate::rotation::{renormalized, small, twist};
+use crate::rotation::{renormalized, small, yaw_between};
 use afbc_control::math::{abs_max, max, min, sqrt};
 use nalgebra::Vector3;
 
@@ -69,7 +69,7 @@ impl Estimator {
                 break;
             }
             // A receiver's velocity has also updated the bank of yaw filters, which is enough for a step.
-            if begins && memory.fix.as_ref().is_some_and(Fix::is_gnss) {
+            if begins && memory.fix.as_ref().is_some_and(PendingFusion::is_gnss) {
                 break;
             }
             if !self.fuse_scalar(memory) {
@@ -135,7 +135,7 @@ impl Estimator {
                 return false;
             }
             (Measurement::MagneticField { .. }, [Some(_), ..]) => {
-                memory.covariance.slow.magnetize(self.magnetic_variance);
+                memory.covariance.slow.set_field_variance(self.magnetic_variance);
             }
             (Measurement::Pose { position_m, attitude, .. }, [Some(_), ..])
                 if self.is_frozen(memory, position_m, attitude, at_us) =>
@@ -150,7 +150,7 @@ impl Estimator {
             _ => {}
         }
         if let Measurement::Gnss { velocity_m_s, speed_sigma_m_s, .. } = &measurement.value
-            && parts.iter().flatten().any(|part| part.aid == Some(Aid::GnssVelocity))
+            && parts.iter().flatten().any(|part| part.aid == Some(AidSource::GnssVelocity))
         {
             let variance = speed_sigma_m_s * speed_sigma_m_s;
             let pushed = memory.pushed - memory.history.thrust_since(&past, self.settings.gravity_m_s2).xy();
@@ -159,7 +159,7 @@ impl Estimator {
         }
         let any = parts.iter().any(Option::is_some);
         if any {
-            memory.fix = Some(Fix { at_us, past, parts, next: 0, nis: 0.0 });
+            memory.fix = Some(PendingFusion { at_us, past, parts, next: 0, nis: 0.0 });
         }
         any
     }
@@ -182,7 +182,7 @@ impl Estimator {
     }
 
     /// Splits the variance of a receiver's position into noise and slow error. The previous fix was `since_us` earlier.
-    fn divide(&self, memory: &mut Memory, part: &mut Part, since_us: u64) {
+    fn divide(&self, memory: &mut Memory, part: &mut AidObservation, since_us: u64) {
         let noise = self.settings.gnss_noise_m * self.settings.gnss_noise_m;
         let white = part.variance.map(|variance| min(variance, noise));
         let kept = max(1.0 - since_us as f32 * 1e-6 / self.settings.gnss_slow_s, 0.0);
@@ -216,24 +216,24 @@ impl Estimator {
         }
         let Some(past) = memory.history.newest_raw() else { return false };
         let variance = Vector3::repeat(sigma * sigma);
-        let target = Target::Velocity(Vector3::zeros());
-        let part = Part { aid: None, target, axes: Axes::All, variance, rough: 0.0 };
-        memory.fix = Some(Fix { at_us, past, parts: [Some(part), None, None], next: 0, nis: 0.0 });
+        let target = ObservedQuantity::Velocity(Vector3::zeros());
+        let part = AidObservation { aid: None, target, axes: FusedAxes::All, variance, rough: 0.0 };
+        memory.fix = Some(PendingFusion { at_us, past, parts: [Some(part), None, None], next: 0, nis: 0.0 });
         true
     }
 
     /// Fuses the next scalar. Returns false if the current part of the fix is finished.
     #[inline(always)]
     fn fuse_scalar(&self, memory: &mut Memory) -> bool {
-        let Some(Fix { at_us, past, parts: [Some(part), ..], next, .. }) = &memory.fix else { return false };
+        let Some(PendingFusion { at_us, past, parts: [Some(part), ..], next, .. }) = &memory.fix else { return false };
         let Some(present) = memory.history.newest() else { return false };
         let gravity = self.settings.gravity_m_s2;
         let Some(past) = memory.history.corrected(past, gravity) else { return false };
         let (at_us, mut part, next) = (*at_us, *part, *next);
-        let horizon = Horizon::new(&present, &past, gravity);
+        let horizon = FusionHorizon::new(&present, &past, gravity);
         // Changes the copy only: the part's next scalar starts again from the measurement's own variances.
-        part.roughen(memory.roughened_since(at_us), horizon.tau_s());
-        if next == 0 && !self.admits(memory, at_us, &part, &horizon) {
+        part.inflate_variances(memory.roughened_since(at_us), horizon.tau_s());
+        if next == 0 && !self.check_gate(memory, at_us, &part, &horizon) {
             return false;
         }
         let coordinate = part.axes.coordinate(next);
@@ -250,7 +250,7 @@ impl Estimator {
         // Negative only by rounding.
         let hph = max(row.dot(&y), 0.0);
         let r = match &part.target {
-            Target::Field(field) => field_variance(&horizon.field(field), part.variance.x) + part.rough,
+            ObservedQuantity::Field(field) => field_variance(&horizon.field(field), part.variance.x) + part.rough,
             _ => coordinate.of(&part.variance),
         };
         // Above zero, since each variance has a floor, so the division is safe.
@@ -265,16 +265,16 @@ impl Estimator {
         match part.target {
             // A field corrects only the heading and the gyroscope bias that turned it: a disturbed field must not tilt
             // the vehicle.
-            Target::Field(_) => {
+            ObservedQuantity::Field(_) => {
                 let zero = Vector3::zeros();
-                let k = Errors {
+                let k = ErrorVector {
                     theta: Vector3::new(0.0, 0.0, y.theta.z),
                     velocity: zero,
                     position: zero,
                     gyro: y.gyro,
                     accel: zero,
                     baro: 0.0,
-                    slow: Slows::zeros(),
+                    slow: SlowErrors::zeros(),
                 };
                 let k = k.scaled(1.0 / s);
                 memory.covariance.fuse_with(&k, &y, s);
@@ -286,7 +286,7 @@ impl Estimator {
             }
         }
         if part.aid.is_some() {
-            memory.suspect(&part.target, coordinate, innovation / sqrt(s), (slow, s));
+            memory.inflate_bias_variances(&part.target, coordinate, innovation / sqrt(s), (slow, s));
         }
         let Some(fix) = &mut memory.fix else { return false };
         fix.next += 1;
@@ -303,7 +303,7 @@ impl Estimator {
     }
 
     /// Adds a correction to the state.
-    fn correct(&self, memory: &mut Memory, by: &Errors) {
+    fn correct(&self, memory: &mut Memory, by: &ErrorVector) {
         let limited = |bias: Vector3<f32>, most: f32| bias.map(|x| max(-most, min(x, most)));
         let turn = small(&by.theta);
         let nominal = &mut memory.nominal;
@@ -322,19 +322,19 @@ impl Estimator {
 
     /// Returns true if the part of a fix is to be fused. Otherwise it was rejected, or the state was reset to it.
     #[inline]
-    fn admits(&self, memory: &mut Memory, at_us: u64, part: &Part, horizon: &Horizon) -> bool {
+    fn check_gate(&self, memory: &mut Memory, at_us: u64, part: &AidObservation, horizon: &FusionHorizon) -> bool {
         let variances = memory.covariance.variances();
         let past = horizon.past();
         let (innovation, variance) = match &part.target {
-            Target::Position(position) => {
+            ObservedQuantity::Position(position) => {
                 let innovation = position - past.position;
                 if !memory.knows.position {
-                    self.follow(memory, &Part { axes: Axes::All, ..*part }, horizon);
+                    self.follow(memory, &AidObservation { axes: FusedAxes::All, ..*part }, horizon);
                     self.accept(memory, at_us, part);
                     memory.end_height(at_us);
                     return false;
                 }
-                if part.axes == Axes::Vertical {
+                if part.axes == FusedAxes::Vertical {
                     return true;
                 }
                 let tau_s = horizon.tau_s();
@@ -344,8 +344,8 @@ impl Estimator {
                 let slow = if part.is_slow() { memory.covariance.slow.of_position(tau_s) } else { Vector3::zeros() };
                 (innovation, (variance + slow).map(|variance| max(variance, 0.0)))
             }
-            Target::Velocity(velocity) => (velocity - past.velocity, variances.velocity),
-            Target::Attitude(attitude) => {
+            ObservedQuantity::Velocity(velocity) => (velocity - past.velocity, variances.velocity),
+            ObservedQuantity::Attitude(attitude) => {
                 if !memory.knows.heading {
                     self.follow(memory, part, horizon);
                     self.accept(memory, at_us, part);
@@ -353,7 +353,7 @@ impl Estimator {
                 }
                 (crate::rotation::difference(attitude, &past.attitude), variances.theta)
             }
-            Target::Height(_) => {
+            ObservedQuantity::Height(_) => {
                 if !memory.knows.height_offset {
                     self.follow(memory, part, horizon);
                     self.accept(memory, at_us, part);
@@ -361,7 +361,7 @@ impl Estimator {
                 }
                 return true;
             }
-            Target::Field(field) => {
+            ObservedQuantity::Field(field) => {
                 let field = horizon.field(field);
                 let Some((strength, inclination)) = reference(&field) else { return false };
                 let (usual, steep) = *memory.field.get_or_insert((strength, inclination));
@@ -381,7 +381,7 @@ impl Estimator {
                 }
                 return true;
             }
-            Target::Heading(_) => {
+            ObservedQuantity::Heading(_) => {
                 if !memory.knows.heading {
                     self.follow(memory, part, horizon);
                     self.accept(memory, at_us, part);
@@ -402,14 +402,14 @@ impl Estimator {
 
     /// Returns the expected barometer offset and the expected direction of the magnetic field in the earth frame.
     #[inline]
-    pub(crate) fn expected(&self, memory: &Memory) -> Expected {
+    pub(crate) fn expected(&self, memory: &Memory) -> ExpectedReadings {
         let steep = memory.field.map_or(0.0, |(_, steep)| steep);
         let level = sqrt(max(1.0 - steep * steep, 0.0));
         let field = Vector3::new(level * self.magnetic_north.0, level * self.magnetic_north.1, steep);
-        Expected { height_offset: memory.height_offset, field }
+        ExpectedReadings { height_offset: memory.height_offset, field }
     }
 
-    fn accept(&self, memory: &mut Memory, at_us: u64, part: &Part) {
+    fn accept(&self, memory: &mut Memory, at_us: u64, part: &AidObservation) {
         if let Some(aid) = part.aid {
             memory.aids.of_mut(aid).accept(at_us);
         }
@@ -418,10 +418,10 @@ impl Estimator {
     /// Records a rejection. After too long a time, resets the state to the measurement unless another aid contradicts
     /// that.
     #[cold]
-    fn reject(&self, memory: &mut Memory, at_us: u64, part: &Part, nis: f32, horizon: &Horizon) {
+    fn reject(&self, memory: &mut Memory, at_us: u64, part: &AidObservation, nis: f32, horizon: &FusionHorizon) {
         let Some(aid) = part.aid else { return };
         let is_carried = memory.aids.gnss_velocity.is_live(at_us, PRESENT_US);
-        if is_carried && matches!(part.target, Target::Position(_)) {
+        if is_carried && matches!(part.target, ObservedQuantity::Position(_)) {
             memory.carried_us = Some(at_us);
         }
         let record = memory.aids.of_mut(aid);
@@ -430,21 +430,21 @@ impl Estimator {
         // If the aid was never accepted, the time since its first rejection.
         let alone_us = record.accepted_us.map_or(lasted_us, |accepted_us| at_us.saturating_sub(accepted_us));
         let wait_us = match memory.aids.trust(aid, is_carried, at_us, PRESENT_US) {
-            Trust::Never => return,
-            Trust::Late => self.reacquire_us,
-            Trust::Soon => self.reacquire_us.min(self.coast_us / 5 * 3),
+            ResetDelay::Never => return,
+            ResetDelay::Late => self.reacquire_us,
+            ResetDelay::Soon => self.reacquire_us.min(self.coast_us / 5 * 3),
         };
         if lasted_us < wait_us.min(REJECTED_US) || alone_us < wait_us {
             return;
         }
-        if let Target::Attitude(attitude) = &part.target {
+        if let ObservedQuantity::Attitude(attitude) = &part.target {
             // Roll and pitch come from the IMU. A tracker that contradicts only these stays rejected.
-            let turn = twist(attitude, &horizon.past().attitude);
+            let turn = yaw_between(attitude, &horizon.past().attitude);
             if turn * turn <= self.gate_squared * (memory.covariance.tt.m33 + part.variance.z) {
                 return;
             }
         }
-        if let Target::Position(position) = &part.target
+        if let ObservedQuantity::Position(position) = &part.target
             && !is_carried
         {
             // A velocity error that has grown steadily since the last accepted position is now twice the mean velocity
@@ -455,25 +455,27 @@ impl Estimator {
         }
         self.follow(memory, part, horizon);
         match part.target {
-            Target::Position(_) => {
-                self.doubt(memory, at_us);
+            ObservedQuantity::Position(_) => {
+                self.inflate_tilt_after_second_reset(memory, at_us);
                 // The same tracker also contradicts the attitude.
-                if memory.aids.tracker_attitude.rejected_since_us.is_some() && aid == Aid::TrackerPosition {
-                    memory.doubt_tilt();
+                if memory.aids.tracker_attitude.rejected_since_us.is_some() && aid == AidSource::TrackerPosition {
+                    memory.inflate_tilt();
                 }
             }
-            Target::Velocity(_) => self.doubt(memory, at_us),
+            ObservedQuantity::Velocity(_) => self.inflate_tilt_after_second_reset(memory, at_us),
             // The gyroscope bias has changed and turns the heading away from the measured one.
-            Target::Attitude(_) | Target::Heading(_) | Target::Field(_) => memory.doubt_turn(),
-            Target::Height(_) => {}
+            ObservedQuantity::Attitude(_) | ObservedQuantity::Heading(_) | ObservedQuantity::Field(_) => {
+                memory.inflate_vertical_gyro_bias()
+            }
+            ObservedQuantity::Height(_) => {}
         }
         self.accept(memory, at_us, part);
     }
 
     /// Raises the variance of roll and pitch if this reset is the second within ten seconds.
-    fn doubt(&self, memory: &mut Memory, at_us: u64) {
+    fn inflate_tilt_after_second_reset(&self, memory: &mut Memory, at_us: u64) {
         if memory.reset_us.is_some_and(|reset_us| at_us.saturating_sub(reset_us) < AGAIN_US) {
-            memory.doubt_tilt();
+            memory.inflate_tilt();
         }
         memory.reset_us = Some(at_us);
     }
@@ -485,14 +487,26 @@ impl Memory {
     /// variance `all`). A larger mean shows a bias that has changed by more than its random walk allows, and raises the
     /// bias variances.
     #[inline]
-    fn suspect(&mut self, target: &Target, at: Coordinate, sigmas: f32, (slow, all): (f32, f32)) {
+    fn inflate_bias_variances(
+        &mut self,
+        target: &ObservedQuantity,
+        at: VectorComponent,
+        sigmas: f32,
+        (slow, all): (f32, f32),
+    ) {
         let [motion, rotation] = &mut self.leaning;
         let (mean, turns) = match target {
-            Target::Position(_) | Target::Velocity(_) => (motion, false),
-            Target::Attitude(_) | Target::Field(_) | Target::Heading(_) => (rotation, true),
-            Target::Height(_) => return,
+            ObservedQuantity::Position(_) | ObservedQuantity::Velocity(_) => (motion, false),
+            ObservedQuantity::Attitude(_) | ObservedQuantity::Field(_) | ObservedQuantity::Heading(_) => {
+                (rotation, true)
+            }
+            ObservedQuantity::Height(_) => return,
         };
-        let at = if matches!(target, Target::Field(_) | Target::Heading(_)) { Coordinate::Z } else { at };
+        let at = if matches!(target, ObservedQuantity::Field(_) | ObservedQuantity::Heading(_)) {
+            VectorComponent::Z
+        } else {
+            at
+        };
         let before = at.of(mean);
         let now = before + LEANS * (sigmas - before);
         at.set(mean, now);
@@ -515,7 +529,11 @@ impl Memory {
 
     /// Skips the receiver's height, because the position reset has already used it.
     fn end_height(&mut self, at_us: u64) {
-        if let Some(Fix { parts: [_, height @ Some(Part { aid: Some(Aid::GnssHeight), .. }), _], .. }) = &mut self.fix {
+        if let Some(PendingFusion {
+            parts: [_, height @ Some(AidObservation { aid: Some(AidSource::GnssHeight), .. }), _],
+            ..
+        }) = &mut self.fix
+        {
             *height = None;
             self.aids.gnss_height.accept(at_us);
         }
@@ -523,9 +541,9 @@ impl Memory {
 }
 
 /// Returns the derivative of one position coordinate by the slow errors.
-pub(crate) fn slow_position(at: Coordinate) -> Slows {
+pub(crate) fn slow_position(at: VectorComponent) -> SlowErrors {
     let unit = at.unit();
-    Slows::new(unit.x, unit.y, unit.z, 0.0, 0.0)
+    SlowErrors::new(unit.x, unit.y, unit.z, 0.0, 0.0)
 }
 
 /// Returns the variance of the direction of a field's horizontal part; `variance` is that of one field coordinate.

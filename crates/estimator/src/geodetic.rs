@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 /// Origin of the local frame: x north, y west, z up, as in [`afbc_types`] and on the MAVLink side.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Origin {
+pub struct GeodeticOrigin {
     latitude_deg: f64,
     longitude_deg: f64,
     altitude_m: f64,
@@ -13,7 +13,7 @@ pub struct Origin {
     east_m_per_deg: f64,
 }
 
-impl Origin {
+impl GeodeticOrigin {
     /// Creates the origin for a latitude within +-89 degrees, a longitude within +-180 degrees (north and east
     /// positive) and an altitude within +-20 km; returns `None` otherwise.
     #[must_use]
@@ -29,7 +29,7 @@ impl Origin {
         let vertical_m = RADIUS_M / libm::sqrt(flattened);
         let meridian_m = vertical_m * (1.0 - ECCENTRICITY_SQUARED) / flattened;
         let per_degree = core::f64::consts::PI / 180.0;
-        valid.then_some(Origin {
+        valid.then_some(GeodeticOrigin {
             latitude_deg,
             longitude_deg,
             altitude_m,
@@ -42,7 +42,7 @@ impl Origin {
     /// earth is neglected: at 4 km (and 50 degrees of latitude) 1 m of height and less than 1 m horizontally.
     ///
     /// ```
-    /// let origin = afbc_estimator::Origin::new(47.0, 8.0, 500.0).unwrap();
+    /// let origin = afbc_estimator::GeodeticOrigin::new(47.0, 8.0, 500.0).unwrap();
     /// let place = origin.local(47.001, 8.001, 510.0);
     /// // 111.2 m north, 76.1 m east, 10 m up.
     /// assert!((place - nalgebra::Vector3::new(111.18, -76.06, 10.0)).norm() < 0.05);
@@ -68,7 +68,7 @@ impl Origin {
     /// inverse of [`local`](Self::local).
     ///
     /// ```
-    /// let origin = afbc_estimator::Origin::new(47.0, 8.0, 500.0).unwrap();
+    /// let origin = afbc_estimator::GeodeticOrigin::new(47.0, 8.0, 500.0).unwrap();
     /// let [latitude, longitude, altitude] = origin.global(&origin.local(47.001, 8.001, 510.0));
     /// assert!((latitude - 47.001).abs() < 1e-9 && (longitude - 8.001).abs() < 1e-9);
     /// assert!((altitude - 510.0).abs() < 1e-5);

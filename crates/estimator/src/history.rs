@@ -24,7 +24,7 @@ const TURN_MAX: f32 = 0.1;
 
 /// State at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Past {
+pub(crate) struct PastState {
     /// Lowest 32 bits of the time \[us\].
     pub(crate) at_us: u32,
     pub(crate) attitude: Quaternion<f32>,
@@ -34,7 +34,7 @@ pub(crate) struct Past {
 
 /// Sum of the corrections.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Shift {
+struct CorrectionSum {
     /// Exact rotation.
     attitude: Quaternion<f32>,
     /// Linear rotation since the entries were last rewritten.
@@ -43,7 +43,7 @@ struct Shift {
     position: Vector3<f32>,
 }
 
-const NOTHING: Past = Past {
+const NOTHING: PastState = PastState {
     at_us: 0,
     attitude: Quaternion::new(1.0, 0.0, 0.0, 0.0),
     velocity: Vector3::new(0.0, 0.0, 0.0),
@@ -52,33 +52,33 @@ const NOTHING: Past = Past {
 
 /// Ring of past states.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct History {
-    entries: [Past; ENTRIES],
+pub(crate) struct StateHistory {
+    entries: [PastState; ENTRIES],
     /// Index of the newest entry.
     newest: u32,
     filled: u32,
-    shift: Shift,
+    shift: CorrectionSum,
 }
 
-impl Default for History {
+impl Default for StateHistory {
     fn default() -> Self {
         let zero = Vector3::zeros();
-        let shift = Shift { attitude: identity(), theta: zero, velocity: zero, position: zero };
-        History { entries: [NOTHING; ENTRIES], newest: 0, filled: 0, shift }
+        let shift = CorrectionSum { attitude: identity(), theta: zero, velocity: zero, position: zero };
+        StateHistory { entries: [NOTHING; ENTRIES], newest: 0, filled: 0, shift }
     }
 }
 
-impl History {
+impl StateHistory {
     /// Deletes all entries and corrections.
     pub(crate) fn clear(&mut self) {
         self.filled = 0;
         let zero = Vector3::zeros();
-        self.shift = Shift { attitude: identity(), theta: zero, velocity: zero, position: zero };
+        self.shift = CorrectionSum { attitude: identity(), theta: zero, velocity: zero, position: zero };
     }
 
     /// Returns the entry stored `back` entries before the newest, without corrections.
     #[inline]
-    fn entry(&self, back: u32) -> Option<&Past> {
+    fn entry(&self, back: u32) -> Option<&PastState> {
         let place = if back <= self.newest { self.newest - back } else { self.newest + ENTRIES as u32 - back };
         self.entries.get(place as usize).filter(|_| back < self.filled)
     }
@@ -91,8 +91,8 @@ impl History {
     }
 
     /// Stores the present state.
-    pub(crate) fn store(&mut self, state: &Past) {
-        let raw = Past {
+    pub(crate) fn store(&mut self, state: &PastState) {
+        let raw = PastState {
             at_us: state.at_us,
             attitude: self.shift.attitude.conjugate() * state.attitude,
             velocity: state.velocity - self.shift.velocity,
@@ -144,14 +144,14 @@ impl History {
     }
 
     /// Returns the newest entry without corrections.
-    pub(crate) fn newest_raw(&self) -> Option<Past> {
+    pub(crate) fn newest_raw(&self) -> Option<PastState> {
         self.entry(0).copied()
     }
 
     /// Returns the newest entry with corrections.
     #[inline]
-    pub(crate) fn newest(&self) -> Option<Past> {
-        self.entry(0).map(|entry| Past {
+    pub(crate) fn newest(&self) -> Option<PastState> {
+        self.entry(0).map(|entry| PastState {
             at_us: entry.at_us,
             attitude: self.shift.attitude * entry.attitude,
             velocity: entry.velocity + self.shift.velocity,
@@ -161,9 +161,9 @@ impl History {
 
     /// Returns `raw` with corrections, `None` before the first entry.
     #[inline]
-    pub(crate) fn corrected(&self, raw: &Past, gravity: f32) -> Option<Past> {
+    pub(crate) fn corrected(&self, raw: &PastState, gravity: f32) -> Option<PastState> {
         let (velocity, position) = self.shift.of(raw, self.entry(0)?, gravity);
-        Some(Past {
+        Some(PastState {
             at_us: raw.at_us,
             attitude: self.shift.attitude * raw.attitude,
             velocity: raw.velocity + velocity,
@@ -172,19 +172,19 @@ impl History {
     }
 
     /// Returns the velocity change by specific force from `raw` to the newest entry.
-    pub(crate) fn thrust_since(&self, raw: &Past, gravity: f32) -> Vector3<f32> {
+    pub(crate) fn thrust_since(&self, raw: &PastState, gravity: f32) -> Vector3<f32> {
         match (self.newest(), self.corrected(raw, gravity)) {
-            (Some(newest), Some(past)) => way(&newest, &past, gravity).1,
+            (Some(newest), Some(past)) => motion_between(&newest, &past, gravity).1,
             _ => Vector3::zeros(),
         }
     }
 
     /// Returns the interpolated state at `at_us` without corrections, `None` if it is before the oldest or after the
     /// newest entry.
-    pub(crate) fn at(&self, at_us: u32) -> Option<Past> {
+    pub(crate) fn at(&self, at_us: u32) -> Option<PastState> {
         let newest = self.entry(0)?;
         // As a signed number the age is right even when the 32-bit time wraps.
-        let age = |entry: &Past| entry.at_us.wrapping_sub(at_us) as i32;
+        let age = |entry: &PastState| entry.at_us.wrapping_sub(at_us) as i32;
         if age(newest) < 0 {
             return None;
         }
@@ -208,18 +208,18 @@ impl History {
     }
 }
 
-impl Shift {
+impl CorrectionSum {
     /// Returns the corrections of velocity and position at the time of `raw`. Both entries are without corrections.
     #[inline]
-    fn of(&self, raw: &Past, newest: &Past, gravity: f32) -> (Vector3<f32>, Vector3<f32>) {
-        let (tau_s, thrust, distance) = way(newest, raw, gravity);
+    fn of(&self, raw: &PastState, newest: &PastState, gravity: f32) -> (Vector3<f32>, Vector3<f32>) {
+        let (tau_s, thrust, distance) = motion_between(newest, raw, gravity);
         (self.velocity + thrust.cross(&self.theta), self.position - self.velocity * tau_s - distance.cross(&self.theta))
     }
 }
 
 /// Returns tau \[s\], S and D from `past` to `present` ([`crate::horizon`]).
 #[inline]
-pub(crate) fn way(present: &Past, past: &Past, gravity: f32) -> (f32, Vector3<f32>, Vector3<f32>) {
+pub(crate) fn motion_between(present: &PastState, past: &PastState, gravity: f32) -> (f32, Vector3<f32>, Vector3<f32>) {
     let tau_s = present.at_us.wrapping_sub(past.at_us) as i32 as f32 * 1e-6;
     let mut thrust = present.velocity - past.velocity;
     thrust.z += gravity * tau_s;
@@ -229,7 +229,7 @@ pub(crate) fn way(present: &Past, past: &Past, gravity: f32) -> (f32, Vector3<f3
 }
 
 /// Interpolates between two entries: the position as Hermite's cubic with both velocities, the rest linearly.
-fn between(a: &Past, b: &Past, at_us: u32) -> Past {
+fn between(a: &PastState, b: &PastState, at_us: u32) -> PastState {
     // Above zero: `at_us` is at or after `a` and before `b`.
     let span_us = b.at_us.wrapping_sub(a.at_us) as f32;
     let x = at_us.wrapping_sub(a.at_us) as f32 / span_us;
@@ -240,7 +240,7 @@ fn between(a: &Past, b: &Past, at_us: u32) -> Past {
     let chord = b.position - a.position;
     let bend = |velocity: &Vector3<f32>| velocity * span_s - chord;
     let (from, to) = (bend(&a.velocity), bend(&b.velocity));
-    Past {
+    PastState {
         at_us,
         attitude: normalized(&(a.attitude * (1.0 - x) + nearer * x)),
         velocity: a.velocity + (b.velocity - a.velocity) * x,

@@ -14,15 +14,15 @@
 //! apart from the IMU's noise in between. The effects of the gyroscope bias on v and p are left out (5e-5 m/s for 1e-3
 //! rad/s and 100 ms), and that of the accelerometer bias on p (1e-4 m for 0.02 m/s2 and 100 ms).
 
-use crate::errors::{Coordinate, NO_ROW, Row, Slows};
-use crate::history::{Past, way};
+use crate::errors::{JacobianRow, NO_ROW, SlowErrors, VectorComponent};
+use crate::history::{PastState, motion_between};
 use crate::rotation::{atan2, difference, matrix};
 use afbc_control::math::{max, sqrt, wrap_angle};
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
 /// Measured quantity with its measured value.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Target {
+pub(crate) enum ObservedQuantity {
     Position(Vector3<f32>),
     Velocity(Vector3<f32>),
     Attitude(Quaternion<f32>),
@@ -35,7 +35,7 @@ pub(crate) enum Target {
 
 /// Expected values of barometer and magnetometer.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Expected {
+pub(crate) struct ExpectedReadings {
     /// Barometer offset \[m\].
     pub(crate) height_offset: f32,
     /// Magnetic field in the earth frame, of any strength.
@@ -44,8 +44,8 @@ pub(crate) struct Expected {
 
 /// A past state as seen from the present.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Horizon {
-    past: Past,
+pub(crate) struct FusionHorizon {
+    past: PastState,
     /// Rotation of the past state.
     rotation: Matrix3<f32>,
     tau_s: f32,
@@ -57,23 +57,23 @@ pub(crate) struct Horizon {
     distance: Vector3<f32>,
 }
 
-impl Horizon {
+impl FusionHorizon {
     /// Compares `present`, at the covariance's time, with `past`.
-    pub(crate) fn new(present: &Past, past: &Past, gravity: f32) -> Self {
-        let (tau_s, thrust, distance) = way(present, past, gravity);
+    pub(crate) fn new(present: &PastState, past: &PastState, gravity: f32) -> Self {
+        let (tau_s, thrust, distance) = motion_between(present, past, gravity);
         let rotation = matrix(&past.attitude);
         let turn = (rotation + matrix(&present.attitude)) * (0.5 * tau_s);
-        Horizon { past: *past, rotation, tau_s, turn, thrust, distance }
+        FusionHorizon { past: *past, rotation, tau_s, turn, thrust, distance }
     }
 
     /// Returns this horizon after a turn about the vertical.
     pub(crate) fn turned(&self, turn: &Quaternion<f32>) -> Self {
         let r = matrix(turn);
-        Horizon { rotation: r * self.rotation, turn: r * self.turn, ..*self }
+        FusionHorizon { rotation: r * self.rotation, turn: r * self.turn, ..*self }
     }
 
     /// Returns the past state.
-    pub(crate) fn past(&self) -> &Past {
+    pub(crate) fn past(&self) -> &PastState {
         &self.past
     }
 
@@ -94,18 +94,25 @@ impl Horizon {
 
     /// Returns the innovation of `target` at `coordinate` (ignored for single scalars) and its Jacobian, `None` if the
     /// heading is undefined because the nose or the field is almost vertical.
-    pub(crate) fn row(&self, target: &Target, coordinate: Coordinate, expected: &Expected) -> Option<(f32, Row)> {
+    pub(crate) fn row(
+        &self,
+        target: &ObservedQuantity,
+        coordinate: VectorComponent,
+        expected: &ExpectedReadings,
+    ) -> Option<(f32, JacobianRow)> {
         let at = coordinate;
         let unit = at.unit();
-        let none = Row { coordinate, ..NO_ROW };
+        let none = JacobianRow { coordinate, ..NO_ROW };
         // Row of an angle, whose innovation is the product of the rotation error with `theta`.
         let angle = |innovation: f32, theta: Vector3<f32>| {
-            (innovation, Row { theta, gyro: Some(self.turn.tr_mul(&theta)), ..none })
+            (innovation, JacobianRow { theta, gyro: Some(self.turn.tr_mul(&theta)), ..none })
         };
         match target {
-            Target::Position(position) => Some((at.of(&(position - self.past.position)), self.position_row(at, none))),
-            Target::Velocity(velocity) => {
-                let row = Row {
+            ObservedQuantity::Position(position) => {
+                Some((at.of(&(position - self.past.position)), self.position_row(at, none)))
+            }
+            ObservedQuantity::Velocity(velocity) => {
+                let row = JacobianRow {
                     theta: unit.cross(&self.thrust),
                     velocity: 1.0,
                     accel: Some(self.turn.tr_mul(&unit)),
@@ -113,21 +120,23 @@ impl Horizon {
                 };
                 Some((at.of(&(velocity - self.past.velocity)), row))
             }
-            Target::Attitude(attitude) => Some(angle(at.of(&difference(attitude, &self.past.attitude)), unit)),
-            Target::Height(height) => {
-                let at = Coordinate::Z;
-                let row = Row { baro: 1.0, ..self.position_row(at, Row { coordinate: at, ..none }) };
+            ObservedQuantity::Attitude(attitude) => {
+                Some(angle(at.of(&difference(attitude, &self.past.attitude)), unit))
+            }
+            ObservedQuantity::Height(height) => {
+                let at = VectorComponent::Z;
+                let row = JacobianRow { baro: 1.0, ..self.position_row(at, JacobianRow { coordinate: at, ..none }) };
                 Some((height - self.past.position.z - expected.height_offset, row))
             }
-            Target::Field(field) => {
+            ObservedQuantity::Field(field) => {
                 let field = self.field(field);
                 // The Jacobian uses the expected field: the noise of the measured field would look like a tilt.
                 let theta = upright(&expected.field)?;
                 let north = atan2(expected.field.y, expected.field.x);
                 let (innovation, row) = angle(wrap_angle(north - atan2(field.y, field.x)), theta);
-                Some((innovation, Row { slow: Some(magnetic(&self.rotation, &expected.field)), ..row }))
+                Some((innovation, JacobianRow { slow: Some(magnetic(&self.rotation, &expected.field)), ..row }))
             }
-            Target::Heading(heading) => {
+            ObservedQuantity::Heading(heading) => {
                 let nose = Vector3::new(self.rotation.m11, self.rotation.m21, self.rotation.m31);
                 let theta = upright(&nose)?;
                 Some(angle(wrap_angle(heading - self.heading()), theta))
@@ -135,18 +144,18 @@ impl Horizon {
         }
     }
 
-    fn position_row(&self, at: Coordinate, none: Row) -> Row {
+    fn position_row(&self, at: VectorComponent, none: JacobianRow) -> JacobianRow {
         let unit = at.unit();
-        Row { theta: self.distance.cross(&unit), velocity: -self.tau_s, position: 1.0, ..none }
+        JacobianRow { theta: self.distance.cross(&unit), velocity: -self.tau_s, position: 1.0, ..none }
     }
 }
 
 /// Returns the derivative of the direction of `north` by fields along body x and y, in shares of the earth's horizontal
 /// field.
-pub(crate) fn magnetic(rotation: &Matrix3<f32>, north: &Vector3<f32>) -> Slows {
+pub(crate) fn magnetic(rotation: &Matrix3<f32>, north: &Vector3<f32>) -> SlowErrors {
     let across = Vector3::new(north.y, -north.x, 0.0) * (1.0 / sqrt(max(north.x * north.x + north.y * north.y, 1e-12)));
     let body = rotation.tr_mul(&across);
-    Slows::new(0.0, 0.0, 0.0, body.x, body.y)
+    SlowErrors::new(0.0, 0.0, 0.0, body.x, body.y)
 }
 
 /// Returns the derivative of the direction of a vector's horizontal part by a rotation of the earth frame, `None`

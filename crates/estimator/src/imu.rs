@@ -40,14 +40,14 @@ impl ImuHealth {
 
 /// Sensors whose sample is at the end of its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Clipped {
+pub(crate) struct ClippedSensors {
     pub(crate) gyro: bool,
     pub(crate) accel: bool,
 }
 
 /// Monitor of the IMU samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Monitor {
+pub(crate) struct ImuMonitor {
     last: Option<ImuSample>,
     /// Time of the last change of the numbers \[us\].
     same_us: u64,
@@ -60,7 +60,7 @@ pub(crate) struct Monitor {
     in_a_row: u32,
 }
 
-impl Monitor {
+impl ImuMonitor {
     /// Returns the time of the last accepted sample \[us\].
     pub(crate) fn at_us(&self) -> Option<u64> {
         self.last.map(|last| last.at_us)
@@ -97,7 +97,7 @@ impl Monitor {
     }
 
     /// Accepts a sample that is neither refused nor a repetition of a stuck sensor. Returns what is clipped.
-    pub(crate) fn take(&mut self, sample: &ImuSample, settings: &Settings) -> Clipped {
+    pub(crate) fn take(&mut self, sample: &ImuSample, settings: &Settings) -> ClippedSensors {
         self.in_a_row = 0;
         if let Some(last) = &self.last {
             let rates = sample.rates_rad_s - last.rates_rad_s;
@@ -111,7 +111,7 @@ impl Monitor {
         } else {
             self.same_us = sample.at_us;
         }
-        let clipped = Clipped {
+        let clipped = ClippedSensors {
             gyro: abs_max(&sample.rates_rad_s) >= 0.98 * settings.gyro_range_rad_s,
             accel: abs_max(&sample.specific_force_m_s2) >= 0.98 * settings.accel_range_m_s2,
         };
@@ -142,30 +142,30 @@ impl Monitor {
 
 /// Second-order low-pass filter (Butterworth, bilinear transform) at one kilohertz.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct LowPass {
+pub(crate) struct LowPassFilter2p {
     /// b0, a1, a2; b1 = 2 b0, b2 = b0. `None` for no filter.
     coefficients: Option<(f32, f32, f32)>,
 }
 
-/// Memory of a [`LowPass`]: the two sums of the transposed direct form, and the output.
+/// Memory of a [`LowPassFilter2p`]: the two sums of the transposed direct form, and the output.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Smoothed {
+pub(crate) struct LowPassFilter2pMemory {
     sums: Option<(Vector3<f32>, Vector3<f32>)>,
     pub(crate) output: Vector3<f32>,
 }
 
-impl LowPass {
+impl LowPassFilter2p {
     pub(crate) fn new(cutoff_hz: f32) -> Self {
         let k = tan(core::f32::consts::PI * cutoff_hz * 1e-3);
         let norm = 1.0 / (1.0 + core::f32::consts::SQRT_2 * k + k * k);
         let a1 = 2.0 * (k * k - 1.0) * norm;
         let a2 = (1.0 - core::f32::consts::SQRT_2 * k + k * k) * norm;
-        LowPass { coefficients: (cutoff_hz > 0.0).then_some((k * k * norm, a1, a2)) }
+        LowPassFilter2p { coefficients: (cutoff_hz > 0.0).then_some((k * k * norm, a1, a2)) }
     }
 
     /// Filters the next sample. The first one passes unchanged.
     #[inline]
-    pub(crate) fn advance(&self, memory: &mut Smoothed, input: &Vector3<f32>) {
+    pub(crate) fn advance(&self, memory: &mut LowPassFilter2pMemory, input: &Vector3<f32>) {
         let Some((b0, a1, a2)) = self.coefficients else {
             memory.output = *input;
             return;

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// State at the time of the last IMU sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Inertial {
+pub struct InertialState {
     /// Time of the sample \[us\].
     pub at_us: u64,
     /// Rotation from body to earth.

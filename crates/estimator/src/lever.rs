@@ -64,11 +64,11 @@ const CHANGES_M_S: f32 = 2.0;
 /// Finds in flight how far the IMU is from the position in the vehicle file, and corrects the samples. An axis is
 /// corrected only once its lever is certain: above 1 cm and five standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LeverFinder {
-    low_pass: [Section; 2],
-    lever: Lever,
+pub struct LeverArmEstimator {
+    low_pass: [BiquadSection; 2],
+    lever: LeverArm,
     /// Filters, `None` before the first sample and after a gap.
-    filters: Option<Filters>,
+    filters: Option<LeverArmFilters>,
     /// Lever that the correction uses \[m\].
     corrected_m: Vector3<f32>,
     /// Time \[us\] and rates of the last sample.
@@ -77,7 +77,7 @@ pub struct LeverFinder {
 
 /// Estimate of the lever.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Lever {
+struct LeverArm {
     lever_m: Vector3<f32>,
     covariance: Matrix3<f32>,
     /// Variances of the forces along x and y that the lever does not explain.
@@ -90,7 +90,7 @@ struct Lever {
 
 /// Band-pass filters of rates and force, in this order.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Filters {
+struct LeverArmFilters {
     /// Number of samples in this cycle.
     part: u8,
     /// Weighted sums for the triangular mean: `late` has this cycle's samples with rising weights; `sums` has the
@@ -111,17 +111,17 @@ struct Filters {
 
 /// Section of the low-pass filter (bilinear transform), run once per cycle. b1 = 2 b0, b2 = b0.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Section {
+struct BiquadSection {
     b0: f32,
     a1: f32,
     a2: f32,
 }
 
-impl Section {
+impl BiquadSection {
     fn new(corner_rad_s: f32, quality: f32) -> Self {
         let k = tan(0.5 * CYCLE_S * corner_rad_s);
         let norm = 1.0 / (1.0 + k / quality + k * k);
-        Section { b0: k * k * norm, a1: 2.0 * (k * k - 1.0) * norm, a2: (1.0 - k / quality + k * k) * norm }
+        BiquadSection { b0: k * k * norm, a1: 2.0 * (k * k - 1.0) * norm, a2: (1.0 - k / quality + k * k) * norm }
     }
 
     /// Returns the memory after a long constant input.
@@ -137,14 +137,14 @@ impl Section {
     }
 }
 
-impl LeverFinder {
+impl LeverArmEstimator {
     /// Creates the finder for a vehicle whose rotors turn at this speed in hover \[rad/s\].
     #[must_use]
     pub fn new(hover_rad_s: f32) -> Self {
         let corner_rad_s = max(1.0, min(hover_rad_s / BELOW_ROTORS, CORNER_MAX_RAD_S));
-        LeverFinder {
-            low_pass: QUALITIES.map(|quality| Section::new(corner_rad_s, quality)),
-            lever: Lever {
+        LeverArmEstimator {
+            low_pass: QUALITIES.map(|quality| BiquadSection::new(corner_rad_s, quality)),
+            lever: LeverArm {
                 lever_m: Vector3::zeros(),
                 covariance: Matrix3::from_diagonal_element(BEFORE_M * BEFORE_M),
                 variances: Vector2::repeat(FORCE_FIRST_M_S2 * FORCE_FIRST_M_S2),
@@ -209,8 +209,8 @@ impl LeverFinder {
     /// Does this sample's part of the work of a cycle.
     fn learn(&mut self, sample: &ImuSample, in_the_air: bool) {
         let inputs = [sample.rates_rad_s, sample.specific_force_m_s2];
-        let LeverFinder { low_pass, lever, filters, .. } = self;
-        let filters = filters.get_or_insert_with(|| Filters::settled(low_pass, &inputs));
+        let LeverArmEstimator { low_pass, lever, filters, .. } = self;
+        let filters = filters.get_or_insert_with(|| LeverArmFilters::settled(low_pass, &inputs));
         let (late, early) = (f32::from(filters.part), f32::from(CYCLE.saturating_sub(filters.part)));
         for ((input, rising), falling) in inputs.iter().zip(&mut filters.late).zip(&mut filters.sums) {
             *rising += input * late;
@@ -222,20 +222,20 @@ impl LeverFinder {
         }
         match filters.part {
             1 => filters.high_pass(&lever.lever_m),
-            axis @ 2..=3 if filters.settled == SETTLES => lever.hear(axis, &mut filters.quick),
+            axis @ 2..=3 if filters.settled == SETTLES => lever.update(axis, &mut filters.quick),
             CYCLE => filters.low_pass(low_pass),
             _ => (),
         }
     }
 }
 
-impl Filters {
+impl LeverArmFilters {
     /// Returns the filters after long constant inputs.
-    fn settled([first, second]: &[Section; 2], inputs: &[Vector3<f32>; 2]) -> Self {
+    fn settled([first, second]: &[BiquadSection; 2], inputs: &[Vector3<f32>; 2]) -> Self {
         // Weights of the previous cycle: 0 + 1 + ... + 7.
         let weights = 0.5 * f32::from(CYCLE) * (f32::from(CYCLE) - 1.0);
         let [_, force] = *inputs;
-        Filters {
+        LeverArmFilters {
             part: 0,
             late: [Vector3::zeros(); 2],
             sums: inputs.map(|input| input * weights),
@@ -249,7 +249,7 @@ impl Filters {
     }
 
     /// Ends a cycle: runs the low-pass filter on the weighted mean.
-    fn low_pass(&mut self, low_pass: &[Section; 2]) {
+    fn low_pass(&mut self, low_pass: &[BiquadSection; 2]) {
         self.part = 0;
         self.before = self.smooth;
         for ((sum, memories), smooth) in self.sums.iter().zip(&mut self.memories).zip(&mut self.smooth) {
@@ -276,9 +276,9 @@ impl Filters {
     }
 }
 
-impl Lever {
+impl LeverArm {
     /// Updates the lever with the force along body x (sample 2 of a cycle) or y (sample 3).
-    fn hear(&mut self, part: u8, [acceleration, rests]: &mut [Vector3<f32>; 2]) {
+    fn update(&mut self, part: u8, [acceleration, rests]: &mut [Vector3<f32>; 2]) {
         let a = *acceleration;
         // Row of the cross product a x r.
         let (row, rest, variance) = match part {

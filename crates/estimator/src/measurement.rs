@@ -37,7 +37,7 @@ pub enum Measurement {
         /// Standard deviation of each coordinate \[m\].
         sigma_m: f32,
     },
-    /// Fix of a GNSS receiver in local coordinates ([`Origin::local`](crate::Origin::local)).
+    /// Fix of a GNSS receiver in local coordinates ([`GeodeticOrigin::local`](crate::GeodeticOrigin::local)).
     Gnss {
         /// Position in the earth frame \[m\].
         position_m: Vector3<f32>,

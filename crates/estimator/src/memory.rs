@@ -1,17 +1,17 @@
 //! Memory of the estimator: everything that changes from step to step.
 
-use crate::aid::{Aids, Repeated};
-use crate::align::Align;
+use crate::aid::{AidRecords, FrozenPoseDetector};
+use crate::align::Alignment;
 use crate::covariance::Covariance;
-use crate::errors::Interval;
-use crate::estimate::{Dropped, Resets};
-use crate::history::History;
-use crate::imu::{Monitor, Smoothed};
-use crate::inertial::Inertial;
+use crate::errors::PredictionInterval;
+use crate::estimate::{DroppedMeasurements, Resets};
+use crate::history::StateHistory;
+use crate::imu::{ImuMonitor, LowPassFilter2pMemory};
+use crate::inertial::InertialState;
 use crate::measurement::Measurement;
-use crate::nominal::Nominal;
-use crate::queue::{Fix, Queue};
-use crate::rest::Rest;
+use crate::nominal::NominalState;
+use crate::queue::{MeasurementQueue, PendingFusion};
+use crate::rest::RestDetector;
 use crate::rotation::identity;
 use crate::settings::Settings;
 use crate::yaw_bank::YawBank;
@@ -25,18 +25,18 @@ pub struct Memory {
     pub(crate) runs: bool,
     /// Whether the motors cannot carry the vehicle; `None` if unknown.
     pub(crate) on_ground: Option<bool>,
-    pub(crate) rest: Rest,
-    pub(crate) align: Align,
-    pub(crate) monitor: Monitor,
-    pub(crate) smoothed: Smoothed,
-    pub(crate) nominal: Nominal,
+    pub(crate) rest: RestDetector,
+    pub(crate) align: Alignment,
+    pub(crate) monitor: ImuMonitor,
+    pub(crate) smoothed: LowPassFilter2pMemory,
+    pub(crate) nominal: NominalState,
     pub(crate) covariance: Covariance,
     /// Number of the covariance block that was checked last.
     pub(crate) watched: u8,
     /// Time of the covariance and of the history's newest entry \[us\].
     pub(crate) covariance_us: u64,
     /// Motion since `covariance_us`.
-    pub(crate) interval: Interval,
+    pub(crate) interval: PredictionInterval,
     /// Rotation at `covariance_us`.
     pub(crate) rotation: Matrix3<f32>,
     /// Product of the attitude corrections since `covariance_us`.
@@ -45,7 +45,7 @@ pub struct Memory {
     pub(crate) rough: (f32, f32),
     /// Sum of the variances for recent clipped or missing samples, and the time of the last one \[us\].
     pub(crate) lately: ((f32, f32), u64),
-    pub(crate) history: History,
+    pub(crate) history: StateHistory,
     /// Sum of the horizontal velocity changes by specific force, never corrected \[m/s\].
     pub(crate) pushed: Vector2<f32>,
     pub(crate) yaw_bank: YawBank,
@@ -56,19 +56,19 @@ pub struct Memory {
     pub(crate) carried_us: Option<u64>,
     /// Change of position \[m\] and velocity \[m/s\] by measurements in the last step.
     pub(crate) moved: (Vector3<f32>, Vector3<f32>),
-    pub(crate) queue: Queue,
+    pub(crate) queue: MeasurementQueue,
     /// Fix that is being fused.
-    pub(crate) fix: Option<Fix>,
+    pub(crate) fix: Option<PendingFusion>,
     /// Barometer offset \[m\], meaningful once it is known.
     pub(crate) height_offset: f32,
-    pub(crate) knows: Known,
+    pub(crate) knows: KnownStates,
     /// Strength and sine of the inclination of the magnetic field, `None` until measured.
     pub(crate) field: Option<(f32, f32)>,
-    pub(crate) aids: Aids,
+    pub(crate) aids: AidRecords,
     /// Mean innovations of motion and rotation along the earth's axes, in standard deviations.
     pub(crate) leaning: [Vector3<f32>; 2],
-    pub(crate) repeated: Repeated,
-    pub(crate) repeated_field: Repeated,
+    pub(crate) repeated: FrozenPoseDetector,
+    pub(crate) repeated_field: FrozenPoseDetector,
     /// Time of the last zero-velocity fusion \[us\].
     pub(crate) still_us: u64,
     /// Time at which the vehicle was last held at rest \[us\].
@@ -76,12 +76,12 @@ pub struct Memory {
     /// Time of the last reset by a rejected aid \[us\].
     pub(crate) reset_us: Option<u64>,
     pub(crate) resets: Resets,
-    pub(crate) dropped: Dropped,
+    pub(crate) dropped: DroppedMeasurements,
 }
 
 /// Parts of the state that were measured since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Known {
+pub(crate) struct KnownStates {
     pub(crate) position: bool,
     pub(crate) heading: bool,
     pub(crate) height_offset: bool,
@@ -91,7 +91,7 @@ pub(crate) struct Known {
 const LATELY_US: u64 = 300_000;
 
 /// Interval of zero length.
-pub(crate) const NO_INTERVAL: Interval = Interval {
+pub(crate) const NO_INTERVAL: PredictionInterval = PredictionInterval {
     time_s: 0.0,
     turn: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     thrust: Vector3::new(0.0, 0.0, 0.0),
@@ -102,11 +102,11 @@ impl Default for Memory {
         Memory {
             runs: false,
             on_ground: None,
-            rest: Rest::default(),
-            align: Align::default(),
-            monitor: Monitor::default(),
-            smoothed: Smoothed::default(),
-            nominal: Nominal::default(),
+            rest: RestDetector::default(),
+            align: Alignment::default(),
+            monitor: ImuMonitor::default(),
+            smoothed: LowPassFilter2pMemory::default(),
+            nominal: NominalState::default(),
             covariance: Covariance::default(),
             watched: 0,
             covariance_us: 0,
@@ -115,26 +115,26 @@ impl Default for Memory {
             turned: identity(),
             rough: (0.0, 0.0),
             lately: ((0.0, 0.0), 0),
-            history: History::default(),
+            history: StateHistory::default(),
             pushed: Vector2::zeros(),
             yaw_bank: YawBank::default(),
             contradicted_us: None,
             carried_us: None,
             moved: (Vector3::zeros(), Vector3::zeros()),
-            queue: Queue::default(),
+            queue: MeasurementQueue::default(),
             fix: None,
             height_offset: 0.0,
-            knows: Known::default(),
+            knows: KnownStates::default(),
             field: None,
-            aids: Aids::default(),
+            aids: AidRecords::default(),
             leaning: [Vector3::zeros(); 2],
-            repeated: Repeated::default(),
-            repeated_field: Repeated::default(),
+            repeated: FrozenPoseDetector::default(),
+            repeated_field: FrozenPoseDetector::default(),
             still_us: 0,
             held_us: None,
             reset_us: None,
             resets: Resets::default(),
-            dropped: Dropped::default(),
+            dropped: DroppedMeasurements::default(),
         }
     }
 }
@@ -165,7 +165,7 @@ impl Memory {
 
     /// Adds variances of attitude and velocity for a clipped sample or a gap at `at_us`.
     #[cold]
-    pub(crate) fn roughen(&mut self, at_us: u64, theta: f32, velocity: f32) {
+    pub(crate) fn inflate_variances(&mut self, at_us: u64, theta: f32, velocity: f32) {
         self.rough = (self.rough.0 + theta, self.rough.1 + velocity);
         let (sum, last_us) = self.lately;
         let (before, soon) = (sum, at_us.saturating_sub(last_us) <= LATELY_US);
@@ -180,13 +180,13 @@ impl Memory {
 
     /// Returns the fusion records of the aiding sensors.
     #[must_use]
-    pub fn aids(&self) -> &Aids {
+    pub fn aids(&self) -> &AidRecords {
         &self.aids
     }
 
     /// Returns the numbers of measurements dropped before the gate.
     #[must_use]
-    pub fn dropped(&self) -> &Dropped {
+    pub fn dropped(&self) -> &DroppedMeasurements {
         &self.dropped
     }
 
@@ -199,11 +199,11 @@ impl Memory {
     /// Returns the state at the last IMU sample, `None` before the filter runs. `to_body` is the IMU's rotation
     /// ([`ImuCalibration::to_body`](crate::ImuCalibration::to_body)).
     #[must_use]
-    pub fn inertial(&self, settings: &Settings, to_body: Matrix3<f32>) -> Option<Inertial> {
-        let Nominal { rotation, velocity, rates, force, gyro_bias, accel_bias, .. } = self.nominal;
+    pub fn inertial(&self, settings: &Settings, to_body: Matrix3<f32>) -> Option<InertialState> {
+        let NominalState { rotation, velocity, rates, force, gyro_bias, accel_bias, .. } = self.nominal;
         let at_us = self.monitor.at_us().filter(|_| self.runs)?;
         let gravity = settings.gravity_m_s2;
-        Some(Inertial { at_us, rotation, velocity, rates, force, gyro_bias, accel_bias, gravity, to_body })
+        Some(InertialState { at_us, rotation, velocity, rates, force, gyro_bias, accel_bias, gravity, to_body })
     }
 
     /// Returns the covariance of the errors (truth minus estimate) as symmetric rows, in the order: rotation in the

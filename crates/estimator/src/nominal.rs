@@ -14,7 +14,7 @@ use nalgebra::{Matrix3, Quaternion, Vector3};
 
 /// Nominal state at the time of the last sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Nominal {
+pub(crate) struct NominalState {
     /// Attitude, body to earth.
     pub(crate) attitude: Quaternion<f32>,
     /// Attitude as a matrix.
@@ -35,10 +35,10 @@ pub(crate) struct Nominal {
     pub(crate) force: Vector3<f32>,
 }
 
-impl Default for Nominal {
+impl Default for NominalState {
     fn default() -> Self {
         let zero = Vector3::zeros();
-        Nominal {
+        NominalState {
             attitude: identity(),
             rotation: Matrix3::identity(),
             velocity: zero,
@@ -52,10 +52,10 @@ impl Default for Nominal {
     }
 }
 
-impl Nominal {
+impl NominalState {
     /// Creates a state with this attitude, at rest at the origin, without biases.
     pub(crate) fn new(attitude: Quaternion<f32>) -> Self {
-        let mut new = Nominal::default();
+        let mut new = NominalState::default();
         new.turn_to(attitude);
         new
     }

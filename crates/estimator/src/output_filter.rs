@@ -35,12 +35,13 @@ const BORNE: f32 = 24.0;
 
 /// Velocity caused by fast forces along body x and y: F/m times (T s/(1 + T s))^2/s, T = 0.4 s.
 ///
-/// On its feet a vehicle cannot find the IMU's lever ([`crate::LeverFinder`]), but the lever may make it tumble at
-/// take-off. In the air only a lever makes such fast forces, so a controller need not see the velocity they cause; but
-/// hiding it would delay the reaction to a gust. So the forces are hidden once the vehicle has stood for a second, and
-/// no longer once it has been in the air for a second. A vehicle that is dropped before its motors turn has not stood.
+/// On its feet a vehicle cannot find the IMU's lever ([`crate::LeverArmEstimator`]), but the lever may make it tumble
+/// at take-off. In the air only a lever makes such fast forces, so a controller need not see the velocity they cause;
+/// but hiding it would delay the reaction to a gust. So the forces are hidden once the vehicle has stood for a second,
+/// and no longer once it has been in the air for a second. A vehicle that is dropped before its motors turn has not
+/// stood.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Forced {
+struct FastForceVelocity {
     /// Slow part of the force, in body axes \[m/s2\].
     slow_m_s2: Vector3<f32>,
     /// Velocity caused by the fast forces, earth frame \[m/s\].
@@ -68,19 +69,19 @@ pub struct OutputFilter {
     position_m: Vector3<f32>,
     velocity_m_s: Vector3<f32>,
     /// Memory of the notch, `None` before the first velocity.
-    passed: Option<Passed>,
+    passed: Option<NotchMemory>,
     /// True if resets are handed over.
     hands_over: bool,
     /// Reset counts and yaw of the last estimate.
-    last: Option<Last>,
+    last: Option<LastResets>,
     /// Reset that the last step found.
     reset: Option<ResetDelta>,
-    forced: Forced,
+    forced: FastForceVelocity,
 }
 
 /// Reset counts and yaw of an estimate, to detect a reset in the next one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Last {
+struct LastResets {
     positions: u32,
     headings: u32,
     yaw_rad: f32,
@@ -88,7 +89,7 @@ struct Last {
 
 /// Memory of a notch: a low-pass of its input for the lead, and two sums.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Passed {
+struct NotchMemory {
     slow_m_s: Vector3<f32>,
     sums: [Vector3<f32>; 2],
 }
@@ -128,8 +129,8 @@ impl VelocityNotch {
 
     /// Converts the memory of the previous notch `from`. For a constant velocity both sums are (b0 - a2) times the
     /// velocity, so a constant velocity passes without a step.
-    fn take_over(&self, from: &Self, passed: &mut Option<Passed>) {
-        if let Some(Passed { sums, .. }) = passed {
+    fn take_over(&self, from: &Self, passed: &mut Option<NotchMemory>) {
+        if let Some(NotchMemory { sums, .. }) = passed {
             // b0 - a2 is proportional to k/Q and above zero at every permitted speed.
             *sums = sums.map(|sum| sum * ((self.b0 - self.a2) / (from.b0 - from.a2)));
         }
@@ -137,10 +138,10 @@ impl VelocityNotch {
 
     /// Filters the next value. The first one passes unchanged.
     #[inline]
-    fn pass(&self, passed: &mut Option<Passed>, input: &Vector3<f32>) -> Vector3<f32> {
+    fn pass(&self, passed: &mut Option<NotchMemory>, input: &Vector3<f32>) -> Vector3<f32> {
         let VelocityNotch { b0, b1, a2, share, .. } = *self;
-        let Passed { slow_m_s, sums: [first, second] } =
-            passed.get_or_insert_with(|| Passed { slow_m_s: *input, sums: [input * (b0 - a2); 2] });
+        let NotchMemory { slow_m_s, sums: [first, second] } =
+            passed.get_or_insert_with(|| NotchMemory { slow_m_s: *input, sums: [input * (b0 - a2); 2] });
         let quick = input - *slow_m_s;
         *slow_m_s += quick * share;
         let led = input + quick * (LEAD / QUALITY);
@@ -194,8 +195,8 @@ impl OutputFilter {
 
     /// Takes the specific force and the attitude of a sample; call it before [`step`](Self::step). Once the vehicle has
     /// stood, this hides the velocity caused by forces along body x and y.
-    pub fn feel(&mut self, specific_force_m_s2: &Vector3<f32>, [w, x, y, z]: [f32; 4], in_the_air: bool) {
-        let Forced { slow_m_s2, velocity_m_s, share } = &mut self.forced;
+    pub fn update_fast_forces(&mut self, specific_force_m_s2: &Vector3<f32>, [w, x, y, z]: [f32; 4], in_the_air: bool) {
+        let FastForceVelocity { slow_m_s2, velocity_m_s, share } = &mut self.forced;
         let stands = !in_the_air && specific_force_m_s2.norm_squared() > BORNE;
         *share = if stands { min(*share + UNHIDES, 1.0) } else { max(*share - UNHIDES, 0.0) };
         if *share > 0.0 && specific_force_m_s2.norm_squared().is_finite() {
@@ -208,8 +209,8 @@ impl OutputFilter {
     }
 
     /// Stops hiding forces.
-    pub fn unhide(&mut self) {
-        self.forced = Forced::default();
+    pub fn stop_hiding(&mut self) {
+        self.forced = FastForceVelocity::default();
     }
 
     /// Returns the state to output for this estimate; call it every millisecond. Nothing is hidden in the first
@@ -220,7 +221,7 @@ impl OutputFilter {
         let mut state = estimate.state;
         self.reset = None;
         if self.hands_over {
-            self.look(estimate);
+            self.detect_resets(estimate);
         }
         if !estimate.validity.position {
             let OutputFilter { notch, hands_over, last, reset, forced, .. } = *self;
@@ -251,9 +252,9 @@ impl OutputFilter {
 
     /// Detects resets since the last estimate.
     #[inline]
-    fn look(&mut self, estimate: &Estimate) {
+    fn detect_resets(&mut self, estimate: &Estimate) {
         let Resets { position, heading, .. } = estimate.resets;
-        let now = Last { positions: position, headings: heading, yaw_rad: estimate.state.attitude_rad.z };
+        let now = LastResets { positions: position, headings: heading, yaw_rad: estimate.state.attitude_rad.z };
         if let Some(last) = self.last.replace(now)
             && (last.positions, last.headings) != (position, heading)
         {
@@ -399,7 +400,7 @@ mod tests {
             let (time_s, rad_s) = (1e-3 * ms as f32, 27.0_f32);
             let (speed, force) =
                 if swings { ((rad_s * time_s).sin(), rad_s * (rad_s * time_s).cos()) } else { (time_s, 1.0) };
-            output_filter.feel(&Vector3::new(force, 0.0, 9.81), level, in_the_air);
+            output_filter.update_fast_forces(&Vector3::new(force, 0.0, 9.81), level, in_the_air);
             let mut estimate = estimate(ms, 0.0, 0.0);
             estimate.state.velocity_m_s.x = speed;
             (output_filter.step(&estimate).velocity_m_s.x, speed)

@@ -1,9 +1,9 @@
 //! Queue of waiting measurements, and the fix that is being fused.
 
-use crate::aid::Aid;
-use crate::errors::Coordinate;
-use crate::history::Past;
-use crate::horizon::Target;
+use crate::aid::AidSource;
+use crate::errors::VectorComponent;
+use crate::history::PastState;
+use crate::horizon::ObservedQuantity;
 use crate::measurement::Measurement;
 use crate::rotation::normalized;
 use afbc_control::math::max;
@@ -15,13 +15,13 @@ const WAITING_MAX: usize = 8;
 
 /// Measurements with their arrival numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Queue {
+pub(crate) struct MeasurementQueue {
     waiting: [Option<(u32, Stamped<Measurement>)>; WAITING_MAX],
     arrived: u32,
     count: u8,
 }
 
-impl Queue {
+impl MeasurementQueue {
     /// Returns the number of waiting measurements.
     pub(crate) fn waiting(&self) -> u8 {
         self.count
@@ -61,7 +61,7 @@ impl Queue {
 
 /// Coordinates of a position or velocity that pass the gate together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Axes {
+pub(crate) enum FusedAxes {
     /// x, y and z.
     All,
     /// x and y.
@@ -70,24 +70,24 @@ pub(crate) enum Axes {
     Vertical,
 }
 
-impl Axes {
+impl FusedAxes {
     /// Returns the coordinate of the scalar with this number.
     #[inline]
-    pub(crate) fn coordinate(self, number: u8) -> Coordinate {
+    pub(crate) fn coordinate(self, number: u8) -> VectorComponent {
         match (self, number) {
-            (Axes::Vertical, _) => Coordinate::Z,
-            (_, 0) => Coordinate::X,
-            (_, 1) => Coordinate::Y,
-            _ => Coordinate::Z,
+            (FusedAxes::Vertical, _) => VectorComponent::Z,
+            (_, 0) => VectorComponent::X,
+            (_, 1) => VectorComponent::Y,
+            _ => VectorComponent::Z,
         }
     }
 
     /// Returns true if the coordinate belongs to these axes.
-    pub(crate) fn contain(self, at: Coordinate) -> bool {
+    pub(crate) fn contain(self, at: VectorComponent) -> bool {
         match self {
-            Axes::All => true,
-            Axes::Level => at != Coordinate::Z,
-            Axes::Vertical => at == Coordinate::Z,
+            FusedAxes::All => true,
+            FusedAxes::Level => at != VectorComponent::Z,
+            FusedAxes::Vertical => at == VectorComponent::Z,
         }
     }
 
@@ -95,52 +95,53 @@ impl Axes {
     #[inline]
     pub(crate) fn only(self, v: &Vector3<f32>) -> Vector3<f32> {
         match self {
-            Axes::All => *v,
-            Axes::Level => Vector3::new(v.x, v.y, 0.0),
-            Axes::Vertical => Vector3::new(0.0, 0.0, v.z),
+            FusedAxes::All => *v,
+            FusedAxes::Level => Vector3::new(v.x, v.y, 0.0),
+            FusedAxes::Vertical => Vector3::new(0.0, 0.0, v.z),
         }
     }
 }
 
 /// Part of a fix with one kind of aid: one to three scalars.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Part {
-    pub(crate) aid: Option<Aid>,
-    pub(crate) target: Target,
+pub(crate) struct AidObservation {
+    pub(crate) aid: Option<AidSource>,
+    pub(crate) target: ObservedQuantity,
     /// Coordinates that are fused, for a position or velocity.
-    pub(crate) axes: Axes,
+    pub(crate) axes: FusedAxes,
     /// Variances of the scalars; a single scalar uses the first one, a vertical one the third.
     pub(crate) variance: Vector3<f32>,
     /// Variance added to a field's direction after clipped or missing samples.
     pub(crate) rough: f32,
 }
 
-impl Part {
+impl AidObservation {
     /// Returns true if a GNSS receiver's slow error affects this part.
     #[inline]
     pub(crate) fn is_slow(&self) -> bool {
-        matches!(self.aid, Some(Aid::GnssPosition | Aid::GnssHeight))
+        matches!(self.aid, Some(AidSource::GnssPosition | AidSource::GnssHeight))
     }
 
     /// Returns the number of scalars.
     #[inline]
     pub(crate) fn scalars(&self) -> u8 {
         match (&self.target, self.axes) {
-            (Target::Height(_) | Target::Field(_) | Target::Heading(_), _) | (_, Axes::Vertical) => 1,
-            (_, Axes::Level) => 2,
-            (_, Axes::All) => 3,
+            (ObservedQuantity::Height(_) | ObservedQuantity::Field(_) | ObservedQuantity::Heading(_), _)
+            | (_, FusedAxes::Vertical) => 1,
+            (_, FusedAxes::Level) => 2,
+            (_, FusedAxes::All) => 3,
         }
     }
 
     /// Adds the uncertainty from clipped or missing samples since the measurement to the variances.
     #[inline]
-    pub(crate) fn roughen(&mut self, (theta, velocity): (f32, f32), tau_s: f32) {
+    pub(crate) fn inflate_variances(&mut self, (theta, velocity): (f32, f32), tau_s: f32) {
         if theta + velocity > 0.0 {
             let more = match self.target {
-                Target::Position(_) | Target::Height(_) => velocity * tau_s * tau_s,
-                Target::Velocity(_) => velocity,
-                Target::Attitude(_) | Target::Heading(_) => theta,
-                Target::Field(_) => 0.0,
+                ObservedQuantity::Position(_) | ObservedQuantity::Height(_) => velocity * tau_s * tau_s,
+                ObservedQuantity::Velocity(_) => velocity,
+                ObservedQuantity::Attitude(_) | ObservedQuantity::Heading(_) => theta,
+                ObservedQuantity::Field(_) => 0.0,
             };
             self.variance += Vector3::repeat(more);
             self.rough = theta;
@@ -150,21 +151,21 @@ impl Part {
 
 /// Measurement that is being fused, scalar by scalar.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Fix {
+pub(crate) struct PendingFusion {
     pub(crate) at_us: u64,
     /// State at the measurement's time, without corrections.
-    pub(crate) past: Past,
-    pub(crate) parts: [Option<Part>; 3],
+    pub(crate) past: PastState,
+    pub(crate) parts: [Option<AidObservation>; 3],
     /// Number of the first part's next scalar.
     pub(crate) next: u8,
     /// Normalised innovation squared of the first part so far.
     pub(crate) nis: f32,
 }
 
-impl Fix {
+impl PendingFusion {
     /// Returns true for a GNSS receiver's fix.
     pub(crate) fn is_gnss(&self) -> bool {
-        let of_gnss = |part: &Part| part.is_slow() || part.aid == Some(Aid::GnssVelocity);
+        let of_gnss = |part: &AidObservation| part.is_slow() || part.aid == Some(AidSource::GnssVelocity);
         self.parts.iter().flatten().any(of_gnss)
     }
 }
@@ -175,24 +176,35 @@ const LEAST_M_S: f32 = 1e-3;
 
 /// Returns the parts of a measurement. For a field, the variance is that of its coordinates; the variance of its
 /// heading depends on the attitude.
-pub(crate) fn parts(measurement: &Measurement) -> [Option<Part>; 3] {
+pub(crate) fn parts(measurement: &Measurement) -> [Option<AidObservation>; 3] {
     let square = |sigma: f32, least: f32| max(sigma, least) * max(sigma, least);
-    let of_axes =
-        |aid, target, variance: Vector3<f32>, axes| Some(Part { aid: Some(aid), target, axes, variance, rough: 0.0 });
-    let part = |aid, target, variance| of_axes(aid, target, variance, Axes::All);
+    let of_axes = |aid, target, variance: Vector3<f32>, axes| {
+        Some(AidObservation { aid: Some(aid), target, axes, variance, rough: 0.0 })
+    };
+    let part = |aid, target, variance| of_axes(aid, target, variance, FusedAxes::All);
     let same = |variance: f32| Vector3::new(variance, variance, variance);
     match *measurement {
         Measurement::Pose { position_m, attitude: [w, x, y, z], position_sigma_m, attitude_sigma_rad } => {
             let attitude = normalized(&Quaternion::new(w, x, y, z));
             [
-                part(Aid::TrackerPosition, Target::Position(position_m), same(square(position_sigma_m, LEAST))),
-                part(Aid::TrackerAttitude, Target::Attitude(attitude), same(square(attitude_sigma_rad, LEAST))),
+                part(
+                    AidSource::TrackerPosition,
+                    ObservedQuantity::Position(position_m),
+                    same(square(position_sigma_m, LEAST)),
+                ),
+                part(
+                    AidSource::TrackerAttitude,
+                    ObservedQuantity::Attitude(attitude),
+                    same(square(attitude_sigma_rad, LEAST)),
+                ),
                 None,
             ]
         }
-        Measurement::Position { position_m, sigma_m } => {
-            [part(Aid::TrackerPosition, Target::Position(position_m), same(square(sigma_m, LEAST))), None, None]
-        }
+        Measurement::Position { position_m, sigma_m } => [
+            part(AidSource::TrackerPosition, ObservedQuantity::Position(position_m), same(square(sigma_m, LEAST))),
+            None,
+            None,
+        ],
         Measurement::Gnss {
             position_m,
             velocity_m_s,
@@ -206,19 +218,21 @@ pub(crate) fn parts(measurement: &Measurement) -> [Option<Part>; 3] {
             let velocity = level(square(speed_sigma_m_s, LEAST_M_S), square(climb_sigma_m_s, LEAST_M_S));
             // The height is a part of its own: it is a receiver's worst coordinate, and a barometer can contradict it.
             [
-                of_axes(Aid::GnssPosition, Target::Position(position_m), position, Axes::Level),
-                of_axes(Aid::GnssHeight, Target::Position(position_m), position, Axes::Vertical),
-                part(Aid::GnssVelocity, Target::Velocity(velocity_m_s), velocity),
+                of_axes(AidSource::GnssPosition, ObservedQuantity::Position(position_m), position, FusedAxes::Level),
+                of_axes(AidSource::GnssHeight, ObservedQuantity::Position(position_m), position, FusedAxes::Vertical),
+                part(AidSource::GnssVelocity, ObservedQuantity::Velocity(velocity_m_s), velocity),
             ]
         }
         Measurement::Height { height_m, sigma_m } => {
-            [part(Aid::Height, Target::Height(height_m), same(square(sigma_m, LEAST))), None, None]
+            [part(AidSource::Height, ObservedQuantity::Height(height_m), same(square(sigma_m, LEAST))), None, None]
         }
         Measurement::MagneticField { field, sigma } => {
-            [part(Aid::Heading, Target::Field(field), same(sigma * sigma)), None, None]
+            [part(AidSource::Heading, ObservedQuantity::Field(field), same(sigma * sigma)), None, None]
         }
-        Measurement::Heading { heading_rad, sigma_rad } => {
-            [part(Aid::Heading, Target::Heading(heading_rad), same(square(sigma_rad, LEAST))), None, None]
-        }
+        Measurement::Heading { heading_rad, sigma_rad } => [
+            part(AidSource::Heading, ObservedQuantity::Heading(heading_rad), same(square(sigma_rad, LEAST))),
+            None,
+            None,
+        ],
     }
 }

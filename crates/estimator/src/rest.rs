@@ -23,7 +23,7 @@ const SLOW: f32 = 0.25;
 
 /// Rest detector of one sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Watch {
+struct SensorRestDetector {
     /// Mean since the vehicle came to rest; before that, the first sample.
     usual: Vector3<f32>,
     /// Integrals of the deviation and of its square over the current block.
@@ -31,10 +31,10 @@ struct Watch {
     squares: Vector3<f32>,
 }
 
-impl Watch {
+impl SensorRestDetector {
     /// Starts with this mean.
     fn new(usual: Vector3<f32>) -> Self {
-        Watch { usual, ..Watch::default() }
+        SensorRestDetector { usual, ..SensorRestDetector::default() }
     }
 
     /// Takes a sample. Returns true if it shows motion, for a standard deviation of at most `limit` at rest.
@@ -52,16 +52,16 @@ impl Watch {
     fn end(&mut self, time_s: f32, limit: f32, share: f32) -> bool {
         let mean = self.moved * (1.0 / time_s);
         let variance = self.squares * (1.0 / time_s) - mean.component_mul(&mean);
-        *self = Watch::new(self.usual + mean * share);
+        *self = SensorRestDetector::new(self.usual + mean * share);
         max(max(variance.x, variance.y), variance.z) > limit * limit
     }
 }
 
 /// Memory of the rest detector.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Rest {
-    rates: Watch,
-    force: Watch,
+pub(crate) struct RestDetector {
+    rates: SensorRestDetector,
+    force: SensorRestDetector,
     /// Length of the current block so far \[s\].
     time_s: f32,
     /// Number of quiet blocks, up to [`REMEMBERED`].
@@ -70,11 +70,11 @@ pub(crate) struct Rest {
     pub(crate) unmoved: bool,
 }
 
-impl Rest {
+impl RestDetector {
     /// Continues from an alignment at rest, with its mean rates and specific force.
     pub(crate) fn aligned(rates: Vector3<f32>, force: Vector3<f32>) -> Self {
-        let (rates, force) = (Watch::new(rates), Watch::new(force));
-        Rest { rates, force, time_s: 0.0, blocks: ENOUGH, unmoved: true }
+        let (rates, force) = (SensorRestDetector::new(rates), SensorRestDetector::new(force));
+        RestDetector { rates, force, time_s: 0.0, blocks: ENOUGH, unmoved: true }
     }
 
     /// Returns true if the vehicle has been at rest for long enough.
@@ -100,7 +100,8 @@ impl Rest {
             self.time_s = 0.0;
         }
         if moves {
-            (self.rates, self.force) = (Watch::new(*rates_rad_s), Watch::new(*specific_force_m_s2));
+            (self.rates, self.force) =
+                (SensorRestDetector::new(*rates_rad_s), SensorRestDetector::new(*specific_force_m_s2));
             (self.time_s, self.blocks, self.unmoved) = (0.0, 0, false);
         }
     }

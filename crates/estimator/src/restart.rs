@@ -1,15 +1,15 @@
 //! Starts and restarts of the filter, and increases of its variances.
 
-use crate::align::Aligned;
+use crate::align::AlignmentResult;
 use crate::covariance::{Covariance, angle_variance};
-use crate::errors::{Coordinate, Errors, Slows};
+use crate::errors::{ErrorVector, SlowErrors, VectorComponent};
 use crate::estimate::{Sigmas, count};
 use crate::estimator::Estimator;
-use crate::history::Past;
+use crate::history::PastState;
 use crate::horizon::magnetic;
-use crate::memory::{Known, Memory, NO_INTERVAL};
-use crate::nominal::Nominal;
-use crate::rest::Rest;
+use crate::memory::{KnownStates, Memory, NO_INTERVAL};
+use crate::nominal::NominalState;
+use crate::rest::RestDetector;
 use crate::rotation::{identity, normalized};
 use crate::settings::Settings;
 use crate::yaw_bank::YawBank;
@@ -36,16 +36,16 @@ const LEANING_M_S2: f32 = 0.02;
 const LEANT: f32 = 0.01;
 
 /// Factors that keep all errors.
-pub(crate) const KEEP: Errors = {
+pub(crate) const KEEP: ErrorVector = {
     const ONES: Vector3<f32> = Vector3::new(1.0, 1.0, 1.0);
-    Errors {
+    ErrorVector {
         theta: ONES,
         velocity: ONES,
         position: ONES,
         gyro: ONES,
         accel: ONES,
         baro: 1.0,
-        slow: Slows::new(1.0, 1.0, 1.0, 1.0, 1.0),
+        slow: SlowErrors::new(1.0, 1.0, 1.0, 1.0, 1.0),
     }
 };
 pub(crate) const NONE: Vector3<f32> = Vector3::new(0.0, 0.0, 0.0);
@@ -61,10 +61,10 @@ fn squared(sigma: &Vector3<f32>) -> Vector3<f32> {
 
 impl Memory {
     /// Starts the filter from an alignment at rest.
-    pub(crate) fn begin(&mut self, now_us: u64, aligned: &Aligned, estimator: &Estimator) {
+    pub(crate) fn begin(&mut self, now_us: u64, aligned: &AlignmentResult, estimator: &Estimator) {
         let settings = &estimator.settings;
         let Settings { gravity_m_s2: gravity, accel_bias_m_s2: bias, .. } = *settings;
-        let mut nominal = Nominal::new(aligned.attitude);
+        let mut nominal = NominalState::new(aligned.attitude);
         nominal.gyro_bias = aligned.gyro_bias;
         // Levelling takes the accelerometer bias for a tilt, theta = (-(R a)_y, (R a)_x)/g, and an inclined field turns
         // that tilt into a heading error.
@@ -92,19 +92,19 @@ impl Memory {
             aa: diagonal(&Vector3::repeat(bias * bias)),
             ..Covariance::default()
         };
-        self.knows = Known { heading: aligned.heading_variance.is_some(), ..Known::default() };
+        self.knows = KnownStates { heading: aligned.heading_variance.is_some(), ..KnownStates::default() };
         self.field = aligned.field.and_then(|field| reference(&field));
         self.run(now_us, nominal);
-        self.rest = Rest::aligned(aligned.gyro_bias, aligned.force);
+        self.rest = RestDetector::aligned(aligned.gyro_bias, aligned.force);
         if aligned.by_field {
-            self.covariance.slow.magnetize(estimator.magnetic_variance);
+            self.covariance.slow.set_field_variance(estimator.magnetic_variance);
             self.point(estimator.magnetic_north);
         }
     }
 
     /// Starts in the state `state` with the standard deviations `sigmas`, limited to what is possible.
     pub(crate) fn begin_at(&mut self, now_us: u64, state: &State, sigmas: &Sigmas) {
-        let mut nominal = Nominal::new(normalized(&state.quaternion().into_inner()));
+        let mut nominal = NominalState::new(normalized(&state.quaternion().into_inner()));
         nominal.velocity = state.velocity_m_s;
         nominal.move_to(state.position_m);
         let theta = squared(&sigmas.attitude_rad).map(angle_variance);
@@ -118,7 +118,7 @@ impl Memory {
         };
         let heading = theta.z < 1.0;
         let position = abs_max(&sigmas.position_m) < 1e3;
-        self.knows = Known { position, heading, height_offset: false };
+        self.knows = KnownStates { position, heading, height_offset: false };
         self.field = None;
         // The last sample does not belong to this state, so the next sample starts the integration.
         self.monitor.forget();
@@ -136,7 +136,7 @@ impl Memory {
         let attitude = [Some(old.attitude), past.map(|past| past.attitude)].into_iter().flatten().find(sound);
         let finite = |v: &Vector3<f32>, most: f32| abs_max(v) < most && v.norm_squared().is_finite();
         let or_none = |v: Vector3<f32>, most: f32| if finite(&v, most) { v } else { NONE };
-        let mut nominal = Nominal::new(attitude.map_or(identity(), |attitude| normalized(&attitude)));
+        let mut nominal = NominalState::new(attitude.map_or(identity(), |attitude| normalized(&attitude)));
         nominal.velocity = or_none(old.velocity, 50.0);
         nominal.gyro_bias = or_none(old.gyro_bias, 1.0);
         nominal.accel_bias = or_none(old.accel_bias, 5.0);
@@ -149,7 +149,7 @@ impl Memory {
             aa: diagonal(&Vector3::repeat(0.1)),
             ..Covariance::default()
         };
-        self.knows = Known::default();
+        self.knows = KnownStates::default();
         self.align.again(crate::align::Unready::Moving);
         self.run(now_us, nominal);
     }
@@ -160,7 +160,7 @@ impl Memory {
         self.align.again(crate::align::Unready::Moving);
     }
 
-    fn run(&mut self, now_us: u64, nominal: Nominal) {
+    fn run(&mut self, now_us: u64, nominal: NominalState) {
         self.runs = true;
         self.nominal = nominal;
         self.rotation = nominal.rotation;
@@ -176,16 +176,16 @@ impl Memory {
         self.carried_us = None;
         self.leaning = [NONE; 2];
         self.held_us = None;
-        self.rest = Rest::default();
+        self.rest = RestDetector::default();
         self.covariance.hold();
         self.history.clear();
-        self.remember(now_us);
+        self.store_history(now_us);
     }
 
     /// Stores the present state in the history; the covariance has the same time.
-    pub(crate) fn remember(&mut self, at_us: u64) {
+    pub(crate) fn store_history(&mut self, at_us: u64) {
         self.covariance_us = at_us;
-        self.history.store(&Past {
+        self.history.store(&PastState {
             at_us: at_us as u32,
             attitude: self.nominal.attitude,
             velocity: self.nominal.velocity,
@@ -201,7 +201,7 @@ impl Memory {
     }
 
     /// Raises the variance of roll and pitch, after the second reset in a row.
-    pub(crate) fn doubt_tilt(&mut self) {
+    pub(crate) fn inflate_tilt(&mut self) {
         count(&mut self.resets.tilt);
         let variance = DOUBT_RAD * DOUBT_RAD;
         let tt = &mut self.covariance.tt;
@@ -226,8 +226,8 @@ impl Memory {
 
     /// Raises the variance of the gyroscope bias about the vertical, after a heading reset. The other axes get a little
     /// too; otherwise rounding of the large increase would swamp their small variance.
-    pub(crate) fn doubt_turn(&mut self) {
-        let up = Coordinate::Z.row(&self.nominal.rotation) * DOUBT_RAD_S;
+    pub(crate) fn inflate_vertical_gyro_bias(&mut self) {
+        let up = VectorComponent::Z.row(&self.nominal.rotation) * DOUBT_RAD_S;
         self.covariance.gg += up * up.transpose() + diagonal(&Vector3::repeat(LEANT * DOUBT_RAD_S * DOUBT_RAD_S));
         self.covariance.hold();
     }

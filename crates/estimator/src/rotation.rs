@@ -87,7 +87,7 @@ pub(crate) fn difference(to: &Quaternion<f32>, from: &Quaternion<f32>) -> Vector
 
 /// Returns the angle of the rotation from `from` to `to` about the earth's z, ignoring the tilt \[rad\], within \[-pi,
 /// pi\].
-pub(crate) fn twist(to: &Quaternion<f32>, from: &Quaternion<f32>) -> f32 {
+pub(crate) fn yaw_between(to: &Quaternion<f32>, from: &Quaternion<f32>) -> f32 {
     let q = to * from.conjugate();
     afbc_control::math::wrap_angle(2.0 * atan2(q.k, q.w))
 }

@@ -11,35 +11,35 @@
 //! Innovations only contain the noise and the change of the slow error; for the heading, that change comes from the
 //! vehicle's turns.
 
-use crate::errors::{Block, Errors, Interval, Row, Slows};
+use crate::errors::{CovarianceBlock, ErrorVector, JacobianRow, PredictionInterval, SlowErrors};
 use nalgebra::{Matrix3x5, Vector3};
 
 /// Covariances of a three-coordinate error with the slow errors.
-pub(crate) type Columns = Matrix3x5<f32>;
+pub(crate) type SlowCovariance = Matrix3x5<f32>;
 
 /// Variances of the slow errors (x, y, z of d; x, y of f) and their covariances with the filter's errors, one column
 /// each.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Slow {
+pub(crate) struct SlowErrorCovariances {
     /// Diagonal of D. It is zero until a sensor has a slow error; then all covariances are zero too.
-    pub(crate) variance: Slows,
-    pub(crate) theta: Columns,
-    pub(crate) velocity: Columns,
-    pub(crate) position: Columns,
-    pub(crate) gyro: Columns,
-    pub(crate) accel: Columns,
-    pub(crate) baro: Slows,
+    pub(crate) variance: SlowErrors,
+    pub(crate) theta: SlowCovariance,
+    pub(crate) velocity: SlowCovariance,
+    pub(crate) position: SlowCovariance,
+    pub(crate) gyro: SlowCovariance,
+    pub(crate) accel: SlowCovariance,
+    pub(crate) baro: SlowErrors,
 }
 
 /// Multiplies each row by its factor.
-fn scale(m: &mut Columns, by: &Vector3<f32>) {
+fn scale(m: &mut SlowCovariance, by: &Vector3<f32>) {
     m.column_iter_mut().for_each(|mut column| column.component_mul_assign(by));
 }
 
 /// Returns -[s]x m.
 #[inline]
-fn minus_cross(s: &Vector3<f32>, m: &Columns) -> Columns {
-    Columns::new(
+fn minus_cross(s: &Vector3<f32>, m: &SlowCovariance) -> SlowCovariance {
+    SlowCovariance::new(
         s.z * m.m21 - s.y * m.m31,
         s.z * m.m22 - s.y * m.m32,
         s.z * m.m23 - s.y * m.m33,
@@ -58,11 +58,11 @@ fn minus_cross(s: &Vector3<f32>, m: &Columns) -> Columns {
     )
 }
 
-impl Slow {
+impl SlowErrorCovariances {
     /// Returns true if there are no slow errors.
     #[inline]
     pub(crate) fn is_none(&self) -> bool {
-        self.variance == Slows::zeros()
+        self.variance == SlowErrors::zeros()
     }
 
     /// Sets the variances of a new fix; d has kept `share` of its value since the last fix. If the new variance is
@@ -86,30 +86,30 @@ impl Slow {
     }
 
     /// Sets the variance of each coordinate of f.
-    pub(crate) fn magnetize(&mut self, variance: f32) {
+    pub(crate) fn set_field_variance(&mut self, variance: f32) {
         (self.variance.w, self.variance.a) = (variance, variance);
     }
 
     /// Sets the heading error after a start by a field that measures f with `row`: the error is entirely caused by f,
     /// and no other error depends on f.
-    pub(crate) fn point(&mut self, row: &Slows) {
+    pub(crate) fn point(&mut self, row: &SlowErrors) {
         let by = -row.component_mul(&self.variance);
         self.theta.row_mut(2).copy_from(&by.transpose());
     }
 
     /// Returns the variance that the slow errors alone add to a measurement with this row.
-    pub(crate) fn of_row(&self, row: &Slows) -> f32 {
+    pub(crate) fn of_row(&self, row: &SlowErrors) -> f32 {
         row.component_mul(&self.variance).dot(row)
     }
 
     /// Predicts X = F X, like the covariance itself.
     #[inline]
-    pub(crate) fn predict(&mut self, interval: &Interval) {
+    pub(crate) fn predict(&mut self, interval: &PredictionInterval) {
         // With a tracker alone everything is zero, so such a vehicle skips the products.
         if self.is_none() {
             return;
         }
-        let Interval { time_s, turn, thrust } = interval;
+        let PredictionInterval { time_s, turn, thrust } = interval;
         self.position += self.velocity * *time_s;
         self.velocity += minus_cross(thrust, &self.theta) - turn * self.accel;
         self.theta -= turn * self.gyro;
@@ -117,14 +117,14 @@ impl Slow {
 
     /// Rotates the angular error by r.
     #[inline]
-    pub(crate) fn turn(&mut self, r: &Block) {
+    pub(crate) fn turn(&mut self, r: &CovarianceBlock) {
         if !self.is_none() {
             self.theta = r * self.theta;
         }
     }
 
     /// Multiplies each error by its factor.
-    pub(crate) fn scale(&mut self, by: &Errors) {
+    pub(crate) fn scale(&mut self, by: &ErrorVector) {
         scale(&mut self.theta, &by.theta);
         scale(&mut self.velocity, &by.velocity);
         scale(&mut self.position, &by.position);
@@ -136,7 +136,7 @@ impl Slow {
     /// Completes `y` = P h: adds X' h for the slow errors and, if the row measures slow errors, their covariances with
     /// the other errors.
     #[inline]
-    pub(crate) fn complete(&self, row: &Row, y: &mut Errors) {
+    pub(crate) fn complete(&self, row: &JacobianRow, y: &mut ErrorVector) {
         if self.is_none() {
             return;
         }
@@ -170,11 +170,11 @@ impl Slow {
 
     /// Subtracts k y' from the covariances with the slow errors, which have no gain themselves.
     #[inline]
-    pub(crate) fn subtract(&mut self, k: &Errors, y: &Errors) {
+    pub(crate) fn subtract(&mut self, k: &ErrorVector, y: &ErrorVector) {
         if self.is_none() {
             return;
         }
-        let outer = |m: &mut Columns, x: &Vector3<f32>| {
+        let outer = |m: &mut SlowCovariance, x: &Vector3<f32>| {
             for (mut column, y) in m.column_iter_mut().zip(&y.slow) {
                 column -= x * *y;
             }
@@ -189,7 +189,7 @@ impl Slow {
 
     /// Returns the variance that d adds to a position of `tau_s` ago, including its covariance with that position.
     pub(crate) fn of_position(&self, tau_s: f32) -> Vector3<f32> {
-        let along = |m: &Columns| Vector3::new(m.m11, m.m22, m.m33);
+        let along = |m: &SlowCovariance| Vector3::new(m.m11, m.m22, m.m33);
         self.gnss_variance() + (along(&self.position) - along(&self.velocity) * tau_s) * 2.0
     }
 }

@@ -8,15 +8,15 @@ mod parts;
 mod resets;
 mod steps;
 
-use crate::covariance::{Covariance, Growth};
-use crate::errors::{Coordinate, Errors, Interval, Replaced, Row, Slows};
+use crate::covariance::{Covariance, ProcessNoise};
+use crate::errors::{ErrorVector, JacobianRow, PredictionInterval, ReplacedError, SlowErrors, VectorComponent};
 use crate::estimator::Estimator;
-use crate::history::{History, Past};
-use crate::horizon::{Expected, Horizon, Target};
+use crate::history::{PastState, StateHistory};
+use crate::horizon::{ExpectedReadings, FusionHorizon, ObservedQuantity};
 use crate::memory::Memory;
-use crate::queue::{Axes, Part};
+use crate::queue::{AidObservation, FusedAxes};
 use crate::settings::Settings;
-use crate::slow::Slow;
+use crate::slow::SlowErrorCovariances;
 use nalgebra::{Matrix3, Quaternion, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use std::vec::Vec;
@@ -31,7 +31,7 @@ fn memory(p: &M21, turn: &V3) -> Memory {
     memory.knows.position = true;
     memory.knows.heading = true;
     memory.knows.height_offset = true;
-    memory.remember(1_000_000);
+    memory.store_history(1_000_000);
     memory
 }
 
@@ -79,14 +79,14 @@ fn blocks(p: &M21) -> Covariance {
         gb: column(3),
         ab: column(4),
         bb: p[(15, 15)] as f32,
-        slow: Slow {
-            variance: Slows::from_fn(|i, _| p[(16 + i, 16 + i)] as f32),
+        slow: SlowErrorCovariances {
+            variance: SlowErrors::from_fn(|i, _| p[(16 + i, 16 + i)] as f32),
             theta: slow(0),
             velocity: slow(1),
             position: slow(2),
             gyro: slow(3),
             accel: slow(4),
-            baro: Slows::from_fn(|i, _| p[(15, 16 + i)] as f32),
+            baro: SlowErrors::from_fn(|i, _| p[(15, 16 + i)] as f32),
         },
     }
 }
@@ -106,7 +106,7 @@ fn dense(p: &Covariance) -> M21 {
     })
 }
 
-fn dense_errors(e: &Errors) -> V21 {
+fn dense_errors(e: &ErrorVector) -> V21 {
     let parts = [e.theta, e.velocity, e.position, e.gyro, e.accel];
     V21::from_fn(|i, _| {
         f64::from(match i {
@@ -117,10 +117,10 @@ fn dense_errors(e: &Errors) -> V21 {
     })
 }
 
-fn dense_row(row: &Row) -> V21 {
+fn dense_row(row: &JacobianRow) -> V21 {
     let none = Vector3::zeros();
     let at = row.coordinate.unit();
-    dense_errors(&Errors {
+    dense_errors(&ErrorVector {
         theta: row.theta,
         velocity: at * row.velocity,
         position: at * row.position,
@@ -159,28 +159,28 @@ fn vector([x, y, z]: [f64; 3]) -> V3 {
     V3::new(x, y, z)
 }
 
-fn row() -> impl Strategy<Value = Row> {
+fn row() -> impl Strategy<Value = JacobianRow> {
     let slow = numbers::<5>();
     (numbers::<3>(), numbers::<3>(), numbers::<3>(), numbers::<3>(), slow, 0..3_usize, any::<[bool; 6]>()).prop_map(
         |(theta, gyro, accel, [v, p, b], slow, coordinate, on)| {
             let single = |x: [f64; 3]| vector(x).map(|x| x as f32);
             let number = |x: f64, on: bool| if on { x as f32 } else { 0.0 };
-            Row {
-                coordinate: Coordinate::ALL[coordinate],
+            JacobianRow {
+                coordinate: VectorComponent::ALL[coordinate],
                 theta: single(theta),
                 velocity: number(v, on[0]),
                 position: number(p, on[1]),
                 gyro: on[2].then(|| single(gyro)),
                 accel: on[3].then(|| single(accel)),
                 baro: number(b, on[4]),
-                slow: on[5].then(|| Slows::from_fn(|i, _| slow[i] as f32)),
+                slow: on[5].then(|| SlowErrors::from_fn(|i, _| slow[i] as f32)),
             }
         },
     )
 }
 
 /// Returns the transition matrix as a dense matrix.
-fn transition(interval: &Interval) -> M21 {
+fn transition(interval: &PredictionInterval) -> M21 {
     let mut f = M21::identity();
     let t = f64::from(interval.time_s);
     let c = interval.turn.map(f64::from);
@@ -192,7 +192,7 @@ fn transition(interval: &Interval) -> M21 {
     f
 }
 
-const GROWTH: Growth = Growth { theta: 1e-6, velocity: 4e-4, gyro: 1e-9, accel: 1e-7, baro: 4e-4 };
+const GROWTH: ProcessNoise = ProcessNoise { theta: 1e-6, velocity: 4e-4, gyro: 1e-9, accel: 1e-7, baro: 4e-4 };
 
 proptest! {
     /// `of_motion` is the upper left corner of the whole matrix.
@@ -210,7 +210,7 @@ proptest! {
         p in covariance(), turn in numbers::<3>(), thrust in numbers::<3>(), t in 1e-3..0.02_f64,
     ) {
         let rotation: Matrix3<f64> = Rotation3::new(vector(turn) * 3.0).into_inner();
-        let interval = Interval {
+        let interval = PredictionInterval {
             time_s: t as f32,
             turn: rotation.map(|x| (x * t) as f32),
             thrust: (vector(thrust) * 30.0 * t).map(|x| x as f32),
@@ -248,9 +248,9 @@ proptest! {
         // Any other gain.
         let k = V21::from_fn(|i, _| if i < 16 { any_gain[i] * size(i) / s.sqrt() } else { 0.0 });
         let part = |i: usize| k.fixed_rows::<3>(3 * i).map(|x| x as f32).into_owned();
-        let gain = Errors {
+        let gain = ErrorVector {
             theta: part(0), velocity: part(1), position: part(2), gyro: part(3), accel: part(4), baro: k[15] as f32,
-            slow: Slows::zeros(),
+            slow: SlowErrors::zeros(),
         };
         let mut other = ours;
         other.fuse_with(&gain, &y, s as f32);
@@ -283,14 +283,15 @@ proptest! {
         let estimator = Estimator::new(settings).unwrap();
         let field = Rotation3::new(V3::z() * by) * V3::new(0.7, 0.3, -0.6);
         let body = memory.nominal.rotation.tr_mul(&field.map(|x| x as f32));
-        let part = Part {
-            aid: Some(crate::Aid::Heading), target: Target::Field(body), axes: Axes::All,
+        let part = AidObservation {
+            aid: Some(crate::AidSource::Heading), target: ObservedQuantity::Field(body), axes: FusedAxes::All,
             variance: Vector3::repeat(1e-6), rough: 0.0,
         };
         let now = memory.history.newest().unwrap();
-        estimator.follow(&mut memory, &part, &Horizon::new(&now, &now, 9.81));
+        estimator.follow(&mut memory, &part, &FusionHorizon::new(&now, &now, 9.81));
         let now = memory.history.newest().unwrap();
-        let seen = Horizon::new(&now, &now, 9.81).row(&part.target, Coordinate::Z, &estimator.expected(&memory));
+        let horizon = FusionHorizon::new(&now, &now, 9.81);
+        let seen = horizon.row(&part.target, VectorComponent::Z, &estimator.expected(&memory));
         let (innovation, row) = seen.unwrap();
         prop_assert!(innovation.abs() < 1e-4, "{innovation}");
         let y = memory.covariance.times(&row);
@@ -305,24 +306,24 @@ proptest! {
     fn a_replaced_error_is_the_measurements(
         p in covariance(), h in numbers::<21>(), which in 0..8_usize, sigma in 0.01..0.5_f64,
     ) {
-        let at = Coordinate::ALL[which % 3];
+        let at = VectorComponent::ALL[which % 3];
         let (index, replaced) = match which {
-            0..3 => (6 + which, Replaced::Position(at)),
-            3..6 => (which, Replaced::Velocity(at)),
-            6 => (2, Replaced::Heading),
-            _ => (15, Replaced::Offset),
+            0..3 => (6 + which, ReplacedError::Position(at)),
+            3..6 => (which, ReplacedError::Velocity(at)),
+            6 => (2, ReplacedError::Heading),
+            _ => (15, ReplacedError::Offset),
         };
-        let at = if which < 6 { at } else { Coordinate::Z };
+        let at = if which < 6 { at } else { VectorComponent::Z };
         let three = |i: usize| Vector3::from_fn(|c, _| (h[3 * i + c] * size(index) / size(3 * i)) as f32);
-        let mut row = Row {
+        let mut row = JacobianRow {
             coordinate: at, theta: three(0), velocity: three(1).x, position: three(2).y, gyro: Some(three(3)),
-            accel: Some(three(4)), baro: h[15] as f32, slow: Some(Slows::from_fn(|i, _| h[16 + i] as f32)),
+            accel: Some(three(4)), baro: h[15] as f32, slow: Some(SlowErrors::from_fn(|i, _| h[16 + i] as f32)),
         };
         match replaced {
-            Replaced::Heading => row.theta.z = 0.0,
-            Replaced::Velocity(_) => row.velocity = 0.0,
-            Replaced::Position(_) => row.position = 0.0,
-            Replaced::Offset => row.baro = 0.0,
+            ReplacedError::Heading => row.theta.z = 0.0,
+            ReplacedError::Velocity(_) => row.velocity = 0.0,
+            ReplacedError::Position(_) => row.position = 0.0,
+            ReplacedError::Offset => row.baro = 0.0,
         }
         let mut ours = blocks(&p);
         ours.replace(replaced, &row, (sigma * sigma) as f32);
@@ -411,10 +412,10 @@ fn moved(x: &True, e: &V21) -> True {
     True { r: Rotation3::new(part(0)) * x.r, v: x.v + part(1), p: x.p + part(2), g: x.g + part(3), a: x.a + part(4) }
 }
 
-fn past(x: &True, at_us: u32) -> Past {
+fn past(x: &True, at_us: u32) -> PastState {
     let q = UnitQuaternion::from_rotation_matrix(&x.r).into_inner();
     let single = |v: V3| v.map(|x| x as f32);
-    Past {
+    PastState {
         at_us,
         attitude: Quaternion::new(q.w as f32, q.i as f32, q.j as f32, q.k as f32),
         velocity: single(x.v),
@@ -439,11 +440,11 @@ proptest! {
         let now = True { r, v: vector(v) * 5.0, p: vector(p) * 20.0, g: V3::zeros(), a: V3::zeros() };
         let then = back(now, tau, &motion);
         let at_us = 1_000_000 - tau_ms * 1000;
-        let horizon = Horizon::new(&past(&now, 1_000_000), &past(&then, at_us), GRAVITY as f32);
+        let horizon = FusionHorizon::new(&past(&now, 1_000_000), &past(&then, at_us), GRAVITY as f32);
         let field = vector(field) + V3::new(1.0, 0.0, -1.5);
         // The field that the body measures.
         let body = (then.r.inverse() * field).map(|x| x as f32);
-        let expected = Expected { height_offset: 0.0, field: field.map(|x| x as f32) };
+        let expected = ExpectedReadings { height_offset: 0.0, field: field.map(|x| x as f32) };
         // Derivatives by fields of the vehicle, in shares of the horizontal field.
         let level = field.xy().norm();
         let own = |axis: V3| {
@@ -454,7 +455,8 @@ proptest! {
         let upright = (then.r * V3::x()).z.abs() > 0.8 || field.z.abs() > 0.9 * field.norm();
 
         if !upright {
-            let row = horizon.row(&Target::Field(body), Coordinate::X, &expected).unwrap().1.slow.unwrap();
+            let field = ObservedQuantity::Field(body);
+            let row = horizon.row(&field, VectorComponent::X, &expected).unwrap().1.slow.unwrap();
             for (ours, theirs) in row.iter().zip([0.0, 0.0, 0.0, -own(V3::x()), -own(V3::y())]) {
                 prop_assert!((f64::from(*ours) - theirs).abs() < 1e-3, "{row}, not {theirs}");
             }
@@ -464,11 +466,11 @@ proptest! {
             let error = V21::from_fn(|j, _| if i == j { step } else { 0.0 });
             let (plus, minus) = (back(moved(&now, &error), tau, &motion), back(moved(&now, &-error), tau, &motion));
             let slope = |of: &dyn Fn(&True) -> f64| (of(&plus) - of(&minus)) / (2.0 * step);
-            for (c, coordinate) in Coordinate::ALL.into_iter().enumerate() {
+            for (c, coordinate) in VectorComponent::ALL.into_iter().enumerate() {
                 let zero = Vector3::zeros();
-                let row = |target: Target| horizon.row(&target, coordinate, &expected).unwrap().1;
-                let (p_row, v_row) = (row(Target::Position(zero)), row(Target::Velocity(zero)));
-                let a_row = row(Target::Attitude(past(&then, 0).attitude));
+                let row = |target: ObservedQuantity| horizon.row(&target, coordinate, &expected).unwrap().1;
+                let (p_row, v_row) = (row(ObservedQuantity::Position(zero)), row(ObservedQuantity::Velocity(zero)));
+                let a_row = row(ObservedQuantity::Attitude(past(&then, 0).attitude));
                 // Rotation vector of a small rotation: the skew part.
                 let rotated = |x: &True| {
                     let m = (x.r * then.r.inverse()).into_inner();
@@ -479,14 +481,14 @@ proptest! {
                 pairs.push(("velocity", slope(&|x| x.v[c]), dense_row(&v_row)[i]));
                 pairs.push(("position", slope(&|x| x.p[c]), dense_row(&p_row)[i]));
                 if c == 2 {
-                    let h_row = row(Target::Height(0.0));
+                    let h_row = row(ObservedQuantity::Height(0.0));
                     prop_assert_eq!(h_row.baro, 1.0);
                     pairs.push(("height", slope(&|x| x.p.z), dense_row(&h_row)[i]));
                 }
                 if c == 0 && !upright {
                     let seen = |x: &True| angle(&(x.r * then.r.inverse() * field));
-                    pairs.push(("field", slope(&seen), dense_row(&row(Target::Field(body)))[i]));
-                    pairs.push(("heading", slope(&nose), dense_row(&row(Target::Heading(0.0)))[i]));
+                    pairs.push(("field", slope(&seen), dense_row(&row(ObservedQuantity::Field(body)))[i]));
+                    pairs.push(("heading", slope(&nose), dense_row(&row(ObservedQuantity::Heading(0.0)))[i]));
                 }
                 for (name, theirs, ours) in pairs {
                     // The rows leave out the effect of the gyroscope bias on velocity and position, and use the mean
@@ -517,7 +519,7 @@ proptest! {
             g: V3::zeros(),
             a: V3::zeros(),
         };
-        let mut history = History::default();
+        let mut history = StateHistory::default();
         let base = u32::MAX - 100_000;
         for i in (0..72).rev() {
             let x = back(now, f64::from(i) * 4e-3, &motion.map(|x| x * 0.3));

@@ -28,7 +28,7 @@ const LEAST_WEIGHT: f32 = 1e-4;
 
 /// One filter of the bank.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Guess {
+struct YawHypothesis {
     velocity: Vector2<f32>,
     /// True heading minus the estimate's heading \[rad\].
     delta: f32,
@@ -42,7 +42,7 @@ struct Guess {
 /// Bank of yaw filters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct YawBank {
-    guesses: [Guess; FILTERS],
+    guesses: [YawHypothesis; FILTERS],
     /// Sum of the IMU's velocity changes at the last fix, and the fix's time \[us\].
     last: Option<(Vector2<f32>, u64)>,
     /// Corrections of the estimate's heading since the last fix \[rad\].
@@ -61,7 +61,7 @@ impl YawBank {
                 let delta = wrap_angle(TAU / FILTERS as f32 * k as f32);
                 // Half the distance to the next filter.
                 let dd = (0.5 * TAU / FILTERS as f32) * (0.5 * TAU / FILTERS as f32);
-                *guess = Guess { delta, dd, weight: 1.0 / FILTERS as f32, ..Guess::default() };
+                *guess = YawHypothesis { delta, dd, weight: 1.0 / FILTERS as f32, ..YawHypothesis::default() };
             }
         }
         let turned = core::mem::take(&mut self.turned);
@@ -108,9 +108,10 @@ impl YawBank {
         if !self.begun {
             return None;
         }
-        let sum = |of: &dyn Fn(&Guess) -> f32| self.guesses.iter().map(|guess| guess.weight * of(guess)).sum::<f32>();
+        let sum =
+            |of: &dyn Fn(&YawHypothesis) -> f32| self.guesses.iter().map(|guess| guess.weight * of(guess)).sum::<f32>();
         let mean = atan2(sum(&|guess| sin(guess.delta)), sum(&|guess| cos(guess.delta)));
-        let spread = |guess: &Guess| {
+        let spread = |guess: &YawHypothesis| {
             let off = wrap_angle(guess.delta - mean);
             guess.dd + off * off
         };
@@ -119,7 +120,7 @@ impl YawBank {
     }
 }
 
-impl Guess {
+impl YawHypothesis {
     /// Predicts v' = v + R(delta) dV.
     fn predict(&mut self, change: &Vector2<f32>, time_s: f32) {
         let (sine, cosine) = (sin(self.delta), cos(self.delta));

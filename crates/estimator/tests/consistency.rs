@@ -2,11 +2,12 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
 use crate::common::{Flight, ICM, MOCAP, OUTDOOR, Path, Sensors, eight, fly, rest, settings};
-use afbc_estimator::{Aid, Settings};
+use afbc_estimator::{AidSource, Settings};
 
 const RUNS: usize = 100;
 /// Aids of the outdoor sensors.
-const OUTDOOR_AIDS: [Aid; 4] = [Aid::GnssPosition, Aid::GnssVelocity, Aid::Height, Aid::Heading];
+const OUTDOOR_AIDS: [AidSource; 4] =
+    [AidSource::GnssPosition, AidSource::GnssVelocity, AidSource::Height, AidSource::Heading];
 
 /// Returns the 95 % bounds for the mean of `count` chi-square numbers with `degrees` of freedom each, in the normal
 /// approximation.
@@ -22,7 +23,7 @@ fn inside(name: &str, mean: f64, degrees: f64, count: f64) {
 }
 
 /// Flies `RUNS` times with seeds from `first` on; checks the NEES of `N` states and the NIS of `aids`.
-fn check<const N: usize>(name: &str, first: usize, sensors: Sensors, settings: Settings, aids: &[Aid]) {
+fn check<const N: usize>(name: &str, first: usize, sensors: Sensors, settings: Settings, aids: &[AidSource]) {
     const TIMES: [usize; 8] = [5000, 6000, 8000, 10_000, 12_000, 14_000, 17_000, 20_000];
     let truth = fly(eight, 20.0);
     let mut nees = [0.0; TIMES.len()];
@@ -80,8 +81,8 @@ fn check<const N: usize>(name: &str, first: usize, sensors: Sensors, settings: S
         let scalars: f64 = flights.iter().map(|(_, scalars)| scalars).sum();
         let mean = flights.iter().map(|(sum, _)| sum).sum::<f64>() / scalars;
         let name = format!("{name}, NIS of {aid:?} per scalar");
-        let slow = *aid == Aid::GnssPosition && sensors.slow.is_some();
-        if slow || *aid == Aid::Heading && sensors.iron.is_some() {
+        let slow = *aid == AidSource::GnssPosition && sensors.slow.is_some();
+        if slow || *aid == AidSource::Heading && sensors.iron.is_some() {
             // A slow error is the same in successive innovations, so a flight counts once.
             let spread = flights.iter().map(|(sum, scalars)| (sum / scalars - mean).powi(2)).sum::<f64>();
             // Three sigma for the vehicle's own field, because flights with few turns show little of it.
@@ -96,7 +97,7 @@ fn check<const N: usize>(name: &str, first: usize, sensors: Sensors, settings: S
 
 #[test]
 fn mocap() {
-    check::<15>("mocap", 1000, MOCAP, settings(&ICM), &[Aid::TrackerPosition, Aid::TrackerAttitude]);
+    check::<15>("mocap", 1000, MOCAP, settings(&ICM), &[AidSource::TrackerPosition, AidSource::TrackerAttitude]);
 }
 
 #[test]

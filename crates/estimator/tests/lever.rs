@@ -1,7 +1,7 @@
 //! The IMU's lever is found in flights of a rigid body that vibrates.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
-use afbc_estimator::{ImuSample, LeverFinder};
+use afbc_estimator::{ImuSample, LeverArmEstimator};
 use core::f64::consts::TAU;
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -127,7 +127,7 @@ proptest! {
         pushed in 0.0..2.0_f64,
     ) {
         let mut body = Body::new(seed, lever_m, hover_rad_s, [shaken, pushed]);
-        let mut finder = LeverFinder::new(hover_rad_s as f32);
+        let mut finder = LeverArmEstimator::new(hover_rad_s as f32);
         for _ in 0..10_000 {
             let _ = finder.correct(body.sample(0.3, 2.0), true);
         }
@@ -150,7 +150,7 @@ proptest! {
         seed in any::<u64>(), hover_rad_s in 180.0..1800.0_f64, shaken in 0.0..0.1_f64, pushed in 0.0..4.0_f64,
     ) {
         let mut body = Body::new(seed, Vector3::zeros(), hover_rad_s, [shaken, pushed]);
-        let mut finder = LeverFinder::new(hover_rad_s as f32);
+        let mut finder = LeverArmEstimator::new(hover_rad_s as f32);
         for _ in 0..20_000 {
             let sample = body.sample(0.02, 0.5);
             prop_assert_eq!(finder.correct(sample, true), sample);

@@ -6,7 +6,7 @@ use afbc_flight_core::{
     ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, RequestAnswer, Stamped, Ticketed,
     Tracker,
 };
-use afbc_mavlink::{Address, Command, Counters, Decoder, FRAME_MAX, Sender, Uplink};
+use afbc_mavlink::{Address, Counters, Decoder, Encoder, FRAME_MAX, Uplink, VehicleCommand};
 use afbc_types::{Parameters, PoseSigmas, RotorSpeeds, Setpoint, State};
 
 const STATION: Address = Address { system: 255, component: 190 };
@@ -35,7 +35,7 @@ enum Kind {
 
 /// Returns the frames of an undisturbed flight: a state per millisecond, a setpoint every 100 ms, one command.
 fn flight() -> Vec<Frame> {
-    let mut sender = Sender::new(STATION);
+    let mut sender = Encoder::new(STATION);
     let mut frames = Vec::new();
     for ms in 0..END_MS {
         let mut push = |kind, message| {
@@ -51,7 +51,7 @@ fn flight() -> Vec<Frame> {
             Uplink::State { sent_us: 7_000_000 + ms * 1000, state: standing(ms), sigmas: PoseSigmas::UNKNOWN },
         );
         if ms == ARM_MS {
-            push(Kind::Command, Uplink::Command(Command::Arm));
+            push(Kind::Command, Uplink::Command(VehicleCommand::Arm));
         }
     }
     frames
@@ -66,7 +66,7 @@ fn standing(ms: u64) -> State {
 
 /// Returns a frame with a message from the station.
 fn frame(at_ms: i64, message: Uplink) -> Frame {
-    let bytes = Sender::new(Address { component: 1, ..STATION }).send(&message, &mut [0; FRAME_MAX]).to_vec();
+    let bytes = Encoder::new(Address { component: 1, ..STATION }).send(&message, &mut [0; FRAME_MAX]).to_vec();
     Frame { at_ms, kind: Kind::Command, bytes }
 }
 
@@ -104,10 +104,10 @@ fn play(mut frames: Vec<Frame>) -> Seen {
                     }
                 }
                 Uplink::Setpoint(value) => inbox.put_setpoint(Stamped { value, at_us: now_us }),
-                Uplink::Command(Command::Arm) => ask(&mut inbox, Request::Arm),
-                Uplink::Command(Command::Engage) => ask(&mut inbox, Request::Engage),
-                Uplink::Command(Command::Disarm) => ask(&mut inbox, Request::Disarm),
-                Uplink::Command(Command::Kill) => ask(&mut inbox, Request::Kill),
+                Uplink::Command(VehicleCommand::Arm) => ask(&mut inbox, Request::Arm),
+                Uplink::Command(VehicleCommand::Engage) => ask(&mut inbox, Request::Engage),
+                Uplink::Command(VehicleCommand::Disarm) => ask(&mut inbox, Request::Disarm),
+                Uplink::Command(VehicleCommand::Kill) => ask(&mut inbox, Request::Kill),
                 _ => {}
             });
         }
@@ -168,8 +168,8 @@ fn mavlink_crc(bytes: &[u8], extra: u8) -> u16 {
 
 const FOREVER: std::ops::Range<i64> = 0..i64::MAX;
 
-use Command::Kill;
 use Mode::{Coasting, Descending, Disarmed, Flying};
+use VehicleCommand::Kill;
 
 /// A fault, the resulting modes with their first milliseconds, and a further check.
 type Case = (&'static str, fn(&mut Vec<Frame>), &'static [(i64, Mode)], fn(&Seen) -> bool);
@@ -249,7 +249,7 @@ const CASES: &[Case] = &[
         |f| states(f, 0..50, |frame| { rewrite(frame, |p| p[228] = 4); Some(()) }),
         &[(0, Flying), (20, Coasting), (149, Flying)], |s| s.counters.unsupported == 50),
     ("a disarm command with a flipped bit does nothing", |f| {
-        let mut disarm = frame(10, Uplink::Command(Command::Disarm));
+        let mut disarm = frame(10, Uplink::Command(VehicleCommand::Disarm));
         disarm.bytes[12] ^= 1;
         f.push(disarm);
     }, &[(0, Flying)], |s| s.answers.is_empty() && s.counters.bad_checksum == 1),
@@ -267,22 +267,24 @@ const CASES: &[Case] = &[
             frame.bytes.clone_from(&old);
         }
     }, &[(0, Flying), (20, Coasting), (250, Descending), (2250, Disarmed)], |_| true),
-    ("arming again in flight is refused and changes nothing", |f| f.push(frame(10, Uplink::Command(Command::Arm))),
+    ("arming again in flight is refused and changes nothing", |f| {
+        f.push(frame(10, Uplink::Command(VehicleCommand::Arm)));
+    },
         &[(0, Flying)], |s| s.answers == [Err(Refusal::AlreadyArmed)]),
     ("stopped and armed within a millisecond: stopped, and not at rest", |f| {
         f.push(frame(10, Uplink::Command(Kill)));
-        f.push(frame(10, Uplink::Command(Command::Arm)));
+        f.push(frame(10, Uplink::Command(VehicleCommand::Arm)));
         for frame in f.iter_mut().filter(|f| f.kind == Kind::State && f.at_ms > 10) {
             rewrite(frame, |p| p[44..48].copy_from_slice(&1.0f32.to_le_bytes()));
         }
     }, &[(0, Flying), (10, Disarmed)], |s| s.answers == [Ok(Request::Kill), Err(Refusal::NotAtRest)]),
     ("armed and stopped within a millisecond: stopped", |f| {
-        f.push(frame(10, Uplink::Command(Command::Arm)));
+        f.push(frame(10, Uplink::Command(VehicleCommand::Arm)));
         f.push(frame(10, Uplink::Command(Kill)));
     }, &[(0, Flying), (10, Disarmed)], |s| s.answers == [Err(Refusal::Overtaken), Ok(Request::Kill)]),
 
     // Commands during a fault.
-    ("disarmed in flight: refused", |f| f.push(frame(10, Uplink::Command(Command::Disarm))),
+    ("disarmed in flight: refused", |f| f.push(frame(10, Uplink::Command(VehicleCommand::Disarm))),
         &[(0, Flying)], |s| s.answers == [Err(Refusal::InFlight)]),
     ("stopped in flight", |f| f.push(frame(10, Uplink::Command(Kill))), &[(0, Flying), (10, Disarmed)], |_| true),
     ("stopped while coasting", |f| { drop_states(f, FOREVER); f.push(frame(100, Uplink::Command(Kill))); },
@@ -291,13 +293,13 @@ const CASES: &[Case] = &[
         &[(0, Flying), (20, Coasting), (250, Descending), (400, Disarmed)], |_| true),
     ("armed again while descending: refused", |f| {
         drop_states(f, 0..300);
-        f.push(frame(400, Uplink::Command(Command::Arm)));
+        f.push(frame(400, Uplink::Command(VehicleCommand::Arm)));
     }, &[(0, Flying), (20, Coasting), (250, Descending), (1322, Disarmed)],
         |s| s.answers == [Err(Refusal::AlreadyArmed)]),
     ("armed on the ground without a state: refused", |f| {
         drop_states(f, FOREVER);
         f.push(frame(10, Uplink::Command(Kill)));
-        f.push(frame(500, Uplink::Command(Command::Arm)));
+        f.push(frame(500, Uplink::Command(VehicleCommand::Arm)));
     }, &[(0, Flying), (10, Disarmed)], |s| s.answers == [Ok(Request::Kill), Err(Refusal::StateStale)]),
 ];
 

@@ -1,7 +1,7 @@
 //! Tests the observer alone, and inside the flight core with arbitrary inputs. `crates/sim/tests/observer.rs` compares
 //! it with the plant.
 
-use afbc::monitor::Bounds;
+use afbc::monitor::MonitorBounds;
 use afbc::{Guarded, Profile, guarded};
 use afbc_flight_core::dead_reckoning::{DeadReckoning, Reckoning};
 use afbc_flight_core::motor::Response;
@@ -135,7 +135,7 @@ type Memory = FlightCoreMemory<guarded::Memory<4>>;
 fn flying() -> (FlightCore<Guarded>, Memory, Inbox, u64) {
     let (vehicle, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.settings());
     let gains = Profile::Flight.gains();
-    let bounds = Bounds::new(&gains, &vehicle, &settings);
+    let bounds = MonitorBounds::new(&gains, &vehicle, &settings);
     let law = Guarded::new(vehicle, settings, gains, bounds).expect("valid");
     let vehicle = FlightCore::new(vehicle, ArmingLimits::default(), law).expect("valid");
     let (mut memory, mut inbox, mut now_us) = (Memory::default(), Inbox::EMPTY, 0);

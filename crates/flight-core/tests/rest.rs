@@ -13,7 +13,7 @@ use afbc_flight_core::{
 use afbc_types::{Inputs, Parameters, Setpoint, State};
 use nalgebra::Vector3;
 
-type Adapted = afbc::Cascade<afbc::AdaptiveEstimate>;
+type Adapted = afbc::CascadeMemory<afbc::AdaptiveEstimate>;
 
 fn controller() -> Controller<Adaptive> {
     let settings = Settings { reference: ReferenceModel::DEFAULT, ..Profile::Flight.settings() };

@@ -13,7 +13,7 @@ use afbc_types::{Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
 
-type Adapted = afbc::Cascade<afbc::AdaptiveEstimate>;
+type Adapted = afbc::CascadeMemory<afbc::AdaptiveEstimate>;
 
 /// Settings without a reference model, so that errors are distances from the setpoint.
 fn settings() -> Settings {

@@ -6,8 +6,8 @@ use crate::repeated::Patience;
 use crate::uploads::{UploadEnd, Uploads};
 use crate::vehicle::{VehicleState, VehicleText};
 use afbc_mavlink::{
-    Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, MissionItem, ParameterRequest, Plan,
-    ReceivedFrame, Sender, Uplink,
+    Address, CommandResult, Counters, Decoder, Downlink, Encoder, FRAME_MAX, MissionItem, MissionType,
+    ParameterRequest, ReceivedFrame, Uplink, VehicleCommand,
 };
 
 /// A ground station or companion computer that talks to one vehicle.
@@ -16,7 +16,7 @@ use afbc_mavlink::{
 /// and [`Client::send`] hands out the frames to send.
 pub struct Client {
     address: Address,
-    sender: Sender,
+    sender: Encoder,
     decoder: Decoder<Downlink>,
     outgoing: Vec<Uplink>,
     now_ms: Option<u64>,
@@ -35,7 +35,7 @@ impl Client {
     pub fn new(address: Address) -> Self {
         Client {
             address,
-            sender: Sender::new(address),
+            sender: Encoder::new(address),
             decoder: Decoder::new(address),
             outgoing: Vec::new(),
             now_ms: None,
@@ -78,18 +78,18 @@ impl Client {
     }
 
     /// Sends a command, and repeats it until it is answered or `patience` ends.
-    pub fn command(&mut self, command: Command, patience: Patience) {
+    pub fn command(&mut self, command: VehicleCommand, patience: Patience) {
         self.commands.give(command, patience, self.now_ms());
         self.say(Uplink::Command(command));
     }
 
     /// Returns the state of the last command with the same number as `command`.
-    pub fn state(&self, command: Command) -> Option<CommandState> {
+    pub fn state(&self, command: VehicleCommand) -> Option<CommandState> {
         self.commands.state(command)
     }
 
     /// Returns the answer to `command`, once there is one.
-    pub fn answer(&self, command: Command) -> Option<Answer> {
+    pub fn answer(&self, command: VehicleCommand) -> Option<CommandResult> {
         match self.commands.state(command) {
             Some(CommandState::Answered { answer, .. }) => Some(answer),
             _ => None,
@@ -97,7 +97,7 @@ impl Client {
     }
 
     /// Uploads plans one after the other. They replace the plans that have not been uploaded yet.
-    pub fn upload(&mut self, plans: impl IntoIterator<Item = (Plan, Vec<MissionItem>)>, patience: Patience) {
+    pub fn upload(&mut self, plans: impl IntoIterator<Item = (MissionType, Vec<MissionItem>)>, patience: Patience) {
         let offer = self.uploads.begin(plans, patience, self.now_ms());
         self.outgoing.extend(offer.map(Uplink::Mission));
     }
@@ -175,7 +175,7 @@ impl Client {
     pub fn receive(&mut self, from: Address, message: &Downlink) -> bool {
         let now_ms = self.now_ms();
         let to = match message {
-            Downlink::Answer { to, .. }
+            Downlink::CommandAck { to, .. }
             | Downlink::Mission { to, .. }
             | Downlink::ParameterError { to, .. }
             | Downlink::Refusal { to, .. } => *to,
@@ -185,7 +185,7 @@ impl Client {
             return false;
         }
         match message {
-            Downlink::Answer { command, answer, .. } => self.commands.hear(*command, *answer, now_ms),
+            Downlink::CommandAck { command, answer, .. } => self.commands.hear(*command, *answer, now_ms),
             Downlink::Mission { message, .. } => {
                 let answer = self.uploads.hear(message, now_ms);
                 self.outgoing.extend(answer.map(Uplink::Mission));

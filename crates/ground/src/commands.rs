@@ -2,11 +2,11 @@
 //! time.
 
 use crate::repeated::{Due, Patience, Repeated};
-use afbc_mavlink::{Answer, Command, MavCmd};
+use afbc_mavlink::{CommandResult, MavCmd, VehicleCommand};
 use std::collections::BTreeMap;
 
 /// A command that no vehicle knows: it is answered at once and changes nothing.
-pub const PING: Command = Command::Other(MavCmd::MAV_CMD_USER_5 as u16);
+pub const PING: VehicleCommand = VehicleCommand::Other(MavCmd::MAV_CMD_USER_5 as u16);
 
 /// State of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,7 +16,7 @@ pub enum CommandState {
     /// The vehicle has answered.
     Answered {
         /// The final answer, never [`Answer::InProgress`].
-        answer: Answer,
+        answer: CommandResult,
         /// Time since the last try, or since the last [`Answer::InProgress`] \[ms\].
         after_ms: u64,
     },
@@ -25,7 +25,7 @@ pub enum CommandState {
 }
 
 struct Given {
-    command: Command,
+    command: VehicleCommand,
     repeated: Repeated,
     state: CommandState,
 }
@@ -35,25 +35,25 @@ pub(crate) struct Commands(BTreeMap<u16, Given>);
 
 impl Commands {
     /// Stores a command. It replaces an earlier one of the same number, whose answer no longer counts.
-    pub(crate) fn give(&mut self, command: Command, patience: Patience, now_ms: u64) {
+    pub(crate) fn give(&mut self, command: VehicleCommand, patience: Patience, now_ms: u64) {
         let repeated = Repeated::new(patience, now_ms);
         self.0.insert(command.id(), Given { command, repeated, state: CommandState::Waiting });
     }
 
-    pub(crate) fn state(&self, command: Command) -> Option<CommandState> {
+    pub(crate) fn state(&self, command: VehicleCommand) -> Option<CommandState> {
         self.0.get(&command.id()).map(|given| given.state)
     }
 
-    pub(crate) fn hear(&mut self, id: u16, answer: Answer, now_ms: u64) {
+    pub(crate) fn hear(&mut self, id: u16, answer: CommandResult, now_ms: u64) {
         let Some(given) = self.0.get_mut(&id).filter(|given| given.state == CommandState::Waiting) else { return };
-        if answer == Answer::InProgress {
+        if answer == CommandResult::InProgress {
             return given.repeated.goes_on(now_ms);
         }
         given.state = CommandState::Answered { answer, after_ms: given.repeated.waited_ms(now_ms) };
     }
 
     /// Passes to `say` the commands that are due to be repeated.
-    pub(crate) fn turn(&mut self, now_ms: u64, mut say: impl FnMut(Command)) {
+    pub(crate) fn turn(&mut self, now_ms: u64, mut say: impl FnMut(VehicleCommand)) {
         for given in self.0.values_mut().filter(|given| given.state == CommandState::Waiting) {
             match given.repeated.due(now_ms) {
                 Due::Nothing => (),

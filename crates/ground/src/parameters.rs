@@ -46,7 +46,7 @@ impl VehicleParameters {
 
     pub(crate) fn hear(&mut self, value: &ParameterValue, now_ms: u64) {
         self.count = Some(value.count);
-        if value.place >= value.count || self.values.insert(value.place, *value).is_some() {
+        if value.index >= value.count || self.values.insert(value.index, *value).is_some() {
             return;
         }
         if self.are_complete() {
@@ -65,7 +65,7 @@ impl VehicleParameters {
                 None => say(ParameterRequest::List),
                 Some(count) => {
                     let missing = (0..count).filter(|place| !self.values.contains_key(place)).take(MISSING_MAX);
-                    missing.map(ParameterRequest::ReadPlace).for_each(say);
+                    missing.map(ParameterRequest::ReadIndex).for_each(say);
                 }
             },
         }

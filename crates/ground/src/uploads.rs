@@ -1,7 +1,7 @@
 //! Uploads of missions, fences and rally points. The vehicle requests them item by item.
 
 use crate::repeated::{Due, Patience, Repeated};
-use afbc_mavlink::{Mission, MissionItem, MissionResult, Plan};
+use afbc_mavlink::{MissionItem, MissionMessage, MissionResult, MissionType};
 use std::collections::VecDeque;
 
 /// Result of an upload.
@@ -10,18 +10,18 @@ pub enum UploadEnd {
     /// The vehicle has accepted all plans.
     Accepted,
     /// The vehicle has refused this plan, and keeps its old one.
-    Refused(Plan, MissionResult),
+    Refused(MissionType, MissionResult),
     /// The vehicle does not answer while this plan is being uploaded.
-    Silent(Plan),
+    Silent(MissionType),
 }
 
 /// Plans that are still to be uploaded; the first one is in progress.
 pub(crate) struct Uploads {
-    plans: VecDeque<(Plan, Vec<MissionItem>)>,
+    plans: VecDeque<(MissionType, Vec<MissionItem>)>,
     patience: Patience,
     repeated: Repeated,
     /// Last message sent; it is repeated if no answer comes.
-    said: Option<Mission>,
+    said: Option<MissionMessage>,
     /// Number of items of the first plan that the vehicle has requested.
     asked: usize,
     end: Option<UploadEnd>,
@@ -38,10 +38,10 @@ impl Uploads {
     /// Replaces the current upload; returns the first message to send.
     pub(crate) fn begin(
         &mut self,
-        plans: impl IntoIterator<Item = (Plan, Vec<MissionItem>)>,
+        plans: impl IntoIterator<Item = (MissionType, Vec<MissionItem>)>,
         patience: Patience,
         now_ms: u64,
-    ) -> Option<Mission> {
+    ) -> Option<MissionMessage> {
         (self.plans, self.patience, self.end) = (plans.into_iter().collect(), patience, None);
         self.offer(now_ms)
     }
@@ -51,16 +51,16 @@ impl Uploads {
         self.end.take()
     }
 
-    fn offer(&mut self, now_ms: u64) -> Option<Mission> {
+    fn offer(&mut self, now_ms: u64) -> Option<MissionMessage> {
         self.asked = 0;
-        let count = self.plans.front().map(|(plan, items)| Mission::Count(items.len() as u16, *plan));
+        let count = self.plans.front().map(|(plan, items)| MissionMessage::Count(items.len() as u16, *plan));
         if count.is_none() {
             self.end = Some(UploadEnd::Accepted);
         }
         self.say(count, now_ms)
     }
 
-    fn say(&mut self, message: Option<Mission>, now_ms: u64) -> Option<Mission> {
+    fn say(&mut self, message: Option<MissionMessage>, now_ms: u64) -> Option<MissionMessage> {
         (self.said, self.repeated) = (message, Repeated::new(self.patience, now_ms));
         message
     }
@@ -71,21 +71,21 @@ impl Uploads {
     }
 
     /// Handles a message of the vehicle; returns the reply.
-    pub(crate) fn hear(&mut self, message: &Mission, now_ms: u64) -> Option<Mission> {
+    pub(crate) fn hear(&mut self, message: &MissionMessage, now_ms: u64) -> Option<MissionMessage> {
         let (plan, items) = self.plans.front()?;
         let plan = *plan;
         match *message {
-            Mission::Request(number, asked) if asked == plan => {
+            MissionMessage::Request(number, asked) if asked == plan => {
                 let item = *items.get(usize::from(number))?;
                 self.asked = self.asked.max(usize::from(number) + 1);
-                self.say(Some(Mission::Item(item, plan)), now_ms)
+                self.say(Some(MissionMessage::Item(item, plan)), now_ms)
             }
             // An acknowledgement before all items were requested answers an earlier upload.
-            Mission::Ack(MissionResult::ACCEPTED, of) if of == plan && self.asked == items.len() => {
+            MissionMessage::Ack(MissionResult::ACCEPTED, of) if of == plan && self.asked == items.len() => {
                 self.plans.pop_front();
                 self.offer(now_ms)
             }
-            Mission::Ack(result, of) if of == plan && result != MissionResult::ACCEPTED => {
+            MissionMessage::Ack(result, of) if of == plan && result != MissionResult::ACCEPTED => {
                 self.end(UploadEnd::Refused(plan, result));
                 None
             }
@@ -94,7 +94,7 @@ impl Uploads {
     }
 
     /// Returns the message that is due to be repeated.
-    pub(crate) fn turn(&mut self, now_ms: u64) -> Option<Mission> {
+    pub(crate) fn turn(&mut self, now_ms: u64) -> Option<MissionMessage> {
         let plan = self.plans.front()?.0;
         match self.repeated.due(now_ms) {
             Due::Nothing => None,

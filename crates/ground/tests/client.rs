@@ -5,7 +5,8 @@ mod line;
 
 use afbc_ground::{Client, CommandState, Patience, UploadEnd};
 use afbc_mavlink::{
-    Address, Answer, Command, Downlink, Mission, MissionItem, MissionResult, ParameterRequest, Plan, Uplink,
+    Address, CommandResult, Downlink, MissionItem, MissionMessage, MissionResult, MissionType, ParameterRequest,
+    Uplink, VehicleCommand,
 };
 use line::{COMPANION, Line, OTHER_VEHICLE, VEHICLE};
 use proptest::prelude::*;
@@ -23,12 +24,12 @@ fn items(count: u16) -> Vec<MissionItem> {
         .collect()
 }
 
-fn answer(command: Command, answer: Answer, to: Address) -> Downlink {
-    Downlink::Answer { command: command.id(), answer, to }
+fn answer(command: VehicleCommand, answer: CommandResult, to: Address) -> Downlink {
+    Downlink::CommandAck { command: command.id(), answer, to }
 }
 
-fn ack(result: MissionResult, plan: Plan, to: Address) -> Downlink {
-    Downlink::Mission { message: Mission::Ack(result, plan), to }
+fn ack(result: MissionResult, plan: MissionType, to: Address) -> Downlink {
+    Downlink::Mission { message: MissionMessage::Ack(result, plan), to }
 }
 
 /// Returns the messages that the client would send now.
@@ -46,10 +47,10 @@ proptest! {
     #[test]
     fn commands_get_through(seed: u64, lost in 0..40_u64, again in 0..40_u64, late_ms in 0..200_u64) {
         let mut line = Line::new(seed, [lost, again, late_ms]);
-        for (count, command) in (1..).zip([Command::Arm, Command::Land, Command::Arm]) {
+        for (count, command) in (1..).zip([VehicleCommand::Arm, VehicleCommand::Land, VehicleCommand::Arm]) {
             line.client.command(command, PATIENT);
             line.run_until(LONG_MS, |client| client.state(command) != Some(CommandState::Waiting));
-            prop_assert_eq!(line.client.answer(command), Some(Answer::Accepted));
+            prop_assert_eq!(line.client.answer(command), Some(CommandResult::Accepted));
             prop_assert!(line.vehicle.commands.len() >= count);
             line.run_until(UNDER_WAY_MS, |_| false);
         }
@@ -64,7 +65,8 @@ proptest! {
         let mut line = Line::new(seed, [lost, again, late_ms]);
         // Upload twice: no frame of the first upload may count for the second.
         for counts in [[5, 0, 2], counts] {
-            let plans = [Plan::FENCE, Plan::RALLY, Plan::MISSION].into_iter().zip(counts.map(items));
+            let types = [MissionType::FENCE, MissionType::RALLY, MissionType::MISSION];
+            let plans = types.into_iter().zip(counts.map(items));
             line.client.upload(plans.clone(), PATIENT);
             let mut end = None;
             line.run_until(LONG_MS, |client| { end = end.or(client.take_upload_end()); end.is_some() });
@@ -119,29 +121,32 @@ proptest! {
 #[test]
 fn silence_is_told() {
     let mut client = Client::new(STATION);
-    let plans = [(Plan::MISSION, items(2))];
-    client.command(Command::Land, Patience::REPEATED);
+    let plans = [(MissionType::MISSION, items(2))];
+    client.command(VehicleCommand::Land, Patience::REPEATED);
     client.upload(plans.clone(), Patience::REPEATED);
-    client.command(Command::Return, Patience::ONCE);
-    let land = Uplink::Command(Command::Land);
-    let count = Uplink::Mission(Mission::Count(2, Plan::MISSION));
+    client.command(VehicleCommand::Return, Patience::ONCE);
+    let land = Uplink::Command(VehicleCommand::Land);
+    let count = Uplink::Mission(MissionMessage::Count(2, MissionType::MISSION));
     let mut times = Vec::new();
     for now_ms in 0..5_000 {
         client.turn(now_ms);
         times.extend(said(&mut client).into_iter().map(|message| (now_ms, message)));
         let waits = |until_ms| if now_ms < until_ms { CommandState::Waiting } else { CommandState::Silent };
-        assert_eq!(client.state(Command::Land), Some(waits(3_000)), "{now_ms}");
-        assert_eq!(client.state(Command::Return), Some(waits(3_000)), "{now_ms}");
-        assert_eq!(client.take_upload_end(), (now_ms == 3_000).then_some(UploadEnd::Silent(Plan::MISSION)));
+        assert_eq!(client.state(VehicleCommand::Land), Some(waits(3_000)), "{now_ms}");
+        assert_eq!(client.state(VehicleCommand::Return), Some(waits(3_000)), "{now_ms}");
+        assert_eq!(client.take_upload_end(), (now_ms == 3_000).then_some(UploadEnd::Silent(MissionType::MISSION)));
     }
-    let once = (0, Uplink::Command(Command::Return));
+    let once = (0, Uplink::Command(VehicleCommand::Return));
     let of = |now_ms| [land, count].map(|message| (now_ms, message));
     assert_eq!(times, [&of(0)[..], &[once], &of(1_000), &of(2_000)].concat());
     // Answers that come too late, or that answer no question, change nothing.
-    for command in [Command::Land, Command::Arm] {
-        client.receive(VEHICLE, &answer(command, Answer::Accepted, STATION));
+    for command in [VehicleCommand::Land, VehicleCommand::Arm] {
+        client.receive(VEHICLE, &answer(command, CommandResult::Accepted, STATION));
     }
-    assert_eq!((client.state(Command::Land), client.state(Command::Arm)), (Some(CommandState::Silent), None));
+    assert_eq!(
+        (client.state(VehicleCommand::Land), client.state(VehicleCommand::Arm)),
+        (Some(CommandState::Silent), None)
+    );
 }
 
 /// The client requests the list until it comes, then the missing parameters, but not for ever.
@@ -154,7 +159,7 @@ fn missing_parameters_are_asked_for() {
     assert_eq!(said(&mut line.client), [Uplink::Parameter(ParameterRequest::List)]);
     line.client.turn(1_500);
     let all = line.vehicle.parameters();
-    for value in all.iter().filter(|value| value.place % 2 == 0) {
+    for value in all.iter().filter(|value| value.index % 2 == 0) {
         line.client.receive(VEHICLE, &Downlink::Parameter(*value));
     }
     line.client.turn(2_499);
@@ -164,7 +169,7 @@ fn missing_parameters_are_asked_for() {
     assert!(odd.len() == 10);
     assert_eq!(
         said(&mut line.client),
-        odd.iter().map(|it| Uplink::Parameter(ParameterRequest::ReadPlace(*it))).collect::<Vec<_>>()
+        odd.iter().map(|it| Uplink::Parameter(ParameterRequest::ReadIndex(*it))).collect::<Vec<_>>()
     );
     (3..60).for_each(|now_s| line.client.turn(1_000 * now_s));
     assert!(!line.client.parameters().are_being_read() && !line.client.parameters().are_complete());
@@ -174,23 +179,23 @@ fn missing_parameters_are_asked_for() {
 #[test]
 fn what_is_in_progress_is_waited_for() {
     let mut client = Client::new(STATION);
-    client.command(Command::SelfTest, Patience::REPEATED);
+    client.command(VehicleCommand::SelfTest, Patience::REPEATED);
     said(&mut client);
     for now_ms in (0..10_000).step_by(500) {
         client.turn(now_ms);
-        client.receive(VEHICLE, &answer(Command::SelfTest, Answer::InProgress, STATION));
+        client.receive(VEHICLE, &answer(VehicleCommand::SelfTest, CommandResult::InProgress, STATION));
         assert_eq!(said(&mut client), [], "{now_ms}");
     }
-    assert_eq!(client.state(Command::SelfTest), Some(CommandState::Waiting));
+    assert_eq!(client.state(VehicleCommand::SelfTest), Some(CommandState::Waiting));
     client.turn(9_700);
-    client.receive(VEHICLE, &answer(Command::SelfTest, Answer::Failed, STATION));
-    let failed = CommandState::Answered { answer: Answer::Failed, after_ms: 200 };
-    assert_eq!(client.state(Command::SelfTest), Some(failed));
+    client.receive(VEHICLE, &answer(VehicleCommand::SelfTest, CommandResult::Failed, STATION));
+    let failed = CommandState::Answered { answer: CommandResult::Failed, after_ms: 200 };
+    assert_eq!(client.state(VehicleCommand::SelfTest), Some(failed));
     // The first final answer counts. The next command waits for its own answer.
-    client.receive(VEHICLE, &answer(Command::SelfTest, Answer::Accepted, STATION));
-    assert_eq!(client.state(Command::SelfTest), Some(failed));
-    client.command(Command::SelfTest, Patience::ONCE);
-    assert_eq!(client.state(Command::SelfTest), Some(CommandState::Waiting));
+    client.receive(VEHICLE, &answer(VehicleCommand::SelfTest, CommandResult::Accepted, STATION));
+    assert_eq!(client.state(VehicleCommand::SelfTest), Some(failed));
+    client.command(VehicleCommand::SelfTest, Patience::ONCE);
+    assert_eq!(client.state(VehicleCommand::SelfTest), Some(CommandState::Waiting));
 }
 
 /// Answers for other stations, and answers by other vehicles, are ignored.
@@ -201,28 +206,30 @@ fn answers_to_others_are_not_heard() {
     // A station's own heartbeat that is sent back does not count as a vehicle's.
     assert!(client.receive(STATION, &beat) && client.vehicle().address.is_none());
     assert!(client.receive(VEHICLE, &beat));
-    client.command(Command::Arm, Patience::ONCE);
-    client.upload([(Plan::MISSION, items(1))], Patience::ONCE);
+    client.command(VehicleCommand::Arm, Patience::ONCE);
+    client.upload([(MissionType::MISSION, items(1))], Patience::ONCE);
     said(&mut client);
-    let request = |to| Downlink::Mission { message: Mission::Request(0, Plan::MISSION), to };
+    let request = |to| Downlink::Mission { message: MissionMessage::Request(0, MissionType::MISSION), to };
     for (from, to) in [(VEHICLE, COMPANION), (OTHER_VEHICLE, STATION)] {
         let armed = Downlink::Heartbeat { armed: true, failsafe: false, mode: 8 };
-        for message in
-            [answer(Command::Arm, Answer::Denied, to), ack(MissionResult::ERROR, Plan::MISSION, to), request(to)]
-        {
+        for message in [
+            answer(VehicleCommand::Arm, CommandResult::Denied, to),
+            ack(MissionResult::ERROR, MissionType::MISSION, to),
+            request(to),
+        ] {
             assert!(!client.receive(from, &message), "{message:?}");
         }
         assert_eq!(client.receive(from, &armed), from == VEHICLE);
-        assert_eq!((client.state(Command::Arm), said(&mut client)), (Some(CommandState::Waiting), Vec::new()));
+        assert_eq!((client.state(VehicleCommand::Arm), said(&mut client)), (Some(CommandState::Waiting), Vec::new()));
         assert_eq!((client.vehicle().armed, client.vehicle().mode), (true, 8));
         assert_eq!(client.take_upload_end(), None);
         client.receive(VEHICLE, &beat);
         client.receive(VEHICLE, &armed);
     }
     assert!(client.receive(VEHICLE, &request(STATION)));
-    assert_eq!(said(&mut client), [Uplink::Mission(Mission::Item(items(1)[0], Plan::MISSION))]);
-    assert!(client.receive(VEHICLE, &answer(Command::Arm, Answer::Refused(3), STATION)));
-    assert_eq!(client.answer(Command::Arm), Some(Answer::Refused(3)));
+    assert_eq!(said(&mut client), [Uplink::Mission(MissionMessage::Item(items(1)[0], MissionType::MISSION))]);
+    assert!(client.receive(VEHICLE, &answer(VehicleCommand::Arm, CommandResult::Refused(3), STATION)));
+    assert_eq!(client.answer(VehicleCommand::Arm), Some(CommandResult::Refused(3)));
 }
 
 /// A refusal ends the upload, including the plans that would follow. An acknowledgement before all items were requested
@@ -230,16 +237,16 @@ fn answers_to_others_are_not_heard() {
 #[test]
 fn refused_plans_end_the_upload() {
     let mut client = Client::new(STATION);
-    client.upload([(Plan::FENCE, items(2)), (Plan::MISSION, items(1))], Patience::ONCE);
+    client.upload([(MissionType::FENCE, items(2)), (MissionType::MISSION, items(1))], Patience::ONCE);
     said(&mut client);
-    client.receive(VEHICLE, &ack(MissionResult::ACCEPTED, Plan::FENCE, STATION));
-    client.receive(VEHICLE, &ack(MissionResult::ERROR, Plan::MISSION, STATION));
+    client.receive(VEHICLE, &ack(MissionResult::ACCEPTED, MissionType::FENCE, STATION));
+    client.receive(VEHICLE, &ack(MissionResult::ERROR, MissionType::MISSION, STATION));
     // The first request has an unknown item number; the second names a plan that is not being uploaded.
-    for message in [Mission::Request(2, Plan::FENCE), Mission::Request(0, Plan::MISSION)] {
+    for message in [MissionMessage::Request(2, MissionType::FENCE), MissionMessage::Request(0, MissionType::MISSION)] {
         client.receive(VEHICLE, &Downlink::Mission { message, to: STATION });
     }
     assert_eq!((said(&mut client), client.take_upload_end()), (Vec::new(), None));
-    client.receive(VEHICLE, &ack(MissionResult::NO_SPACE, Plan::FENCE, STATION));
-    assert_eq!(client.take_upload_end(), Some(UploadEnd::Refused(Plan::FENCE, MissionResult::NO_SPACE)));
+    client.receive(VEHICLE, &ack(MissionResult::NO_SPACE, MissionType::FENCE, STATION));
+    assert_eq!(client.take_upload_end(), Some(UploadEnd::Refused(MissionType::FENCE, MissionResult::NO_SPACE)));
     assert_eq!(said(&mut client), []);
 }

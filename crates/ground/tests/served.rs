@@ -2,7 +2,9 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc_ground::bring_up::{BringUpLog, BringUpOptions, Error, Verdict, bring_up};
-use afbc_mavlink::{Address, Command, Downlink, FRAME_MAX, Key, SIGNED_FRAME_MAX, Sender, Stamp, Uplink};
+use afbc_mavlink::{
+    Address, Downlink, Encoder, FRAME_MAX, SIGNED_FRAME_MAX, SigningKey, Stamp, Uplink, VehicleCommand,
+};
 use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
 
@@ -118,17 +120,17 @@ fn alone_it_does_what_needs_no_hand() {
 fn what_is_no_board_is_named() {
     let beat = |armed| {
         let beat = Downlink::Heartbeat { armed, failsafe: false, mode: 0 };
-        Sender::new(Address { system: 1, component: 1 }).send(&beat, &mut [0; FRAME_MAX]).to_vec()
+        Encoder::new(Address { system: 1, component: 1 }).send(&beat, &mut [0; FRAME_MAX]).to_vec()
     };
     let signed = {
         let beat = Downlink::Heartbeat { armed: false, failsafe: false, mode: 0 };
         let (stamp, mut buffer) = (Stamp { link: 0, time_10us: 1 }, [0; SIGNED_FRAME_MAX]);
-        let mut vehicle = Sender::new(Address { system: 1, component: 1 });
-        vehicle.send_signed(&beat, Some((&Key([1; 32]), stamp)), &mut buffer).to_vec()
+        let mut vehicle = Encoder::new(Address { system: 1, component: 1 });
+        vehicle.send_signed(&beat, Some((&SigningKey([1; 32]), stamp)), &mut buffer).to_vec()
     };
-    let arm = Sender::new(Address { system: 255, component: 190 });
+    let arm = Encoder::new(Address { system: 255, component: 190 });
     let mut own = arm;
-    let mut uplink = own.send(&Uplink::Command(Command::Disarm), &mut [0; FRAME_MAX]).to_vec();
+    let mut uplink = own.send(&Uplink::Command(VehicleCommand::Disarm), &mut [0; FRAME_MAX]).to_vec();
     uplink.extend_from_slice(own.send(&Uplink::Heartbeat, &mut [0; FRAME_MAX]));
     for (bytes, wanted) in [
         (Vec::new(), "sends nothing"),

@@ -4,14 +4,14 @@
 #![allow(clippy::unwrap_used, reason = "an example whose settings are not valid should say so")]
 
 use afbc_flight_core::{Mode, Ticketed};
-use afbc_guidance::{FailedSensors, Guidance, GuidanceInputs, Lift, Order, Orders, Settings};
+use afbc_guidance::{AvailableThrust, FailedSensors, Guidance, GuidanceInputs, Order, Orders, Settings};
 use afbc_types::State;
 use nalgebra::Vector3;
 
 fn main() {
     let mut guidance = Guidance::new(Settings::DEFAULT).unwrap();
     let (mut orders, mut state) = (Orders::default(), State::default());
-    let lift = Lift { most_m_s2: 20.0, gravity_m_s2: 9.81, given_m_s2: Some(9.81) };
+    let lift = AvailableThrust { most_m_s2: 20.0, gravity_m_s2: 9.81, given_m_s2: Some(9.81) };
     for ms in 1..=20_000_u64 {
         let order = match ms {
             1500 => Some(Order::TakeOff(Some(2.0))),
@@ -31,7 +31,7 @@ fn main() {
             rested: ms > 1000,
             battery: None,
             sensors: FailedSensors::default(),
-            lift,
+            available_thrust: lift,
         };
         let guided = guidance.tick(&inputs, &orders);
         orders.given.pop_front();

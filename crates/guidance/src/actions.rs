@@ -1,4 +1,4 @@
-//! Actions that each cause of the [safety net](crate::net) can have. The numbers are PX4's.
+//! Actions that each cause of the [failsafe checks](crate::failsafe) can have. The numbers are PX4's.
 
 use crate::table::FailsafeAction;
 use afbc_types::Choice;

@@ -33,14 +33,14 @@ impl BatteryReading {
 
 /// Properties of the battery's cells. A `number` of 0 means: use the monitor's charge.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Cells {
+pub(crate) struct BatteryCells {
     pub(crate) number: u32,
     pub(crate) empty_v: f32,
     pub(crate) full_v: f32,
     pub(crate) resistance_ohm: f32,
 }
 
-impl Cells {
+impl BatteryCells {
     /// Returns the charge, 0 to 1, if the reading is plausible. Uses the monitor's charge if the number of cells is 0.
     fn charge(&self, reading: &BatteryReading) -> Option<f32> {
         let BatteryReading { voltage_v, current_a, charge } = *reading;

@@ -104,11 +104,11 @@ pub(crate) struct Return {
     to_m: Vector2<f32>,
     /// Place of the climb; not set while the vehicle still stops.
     hold: Hold,
-    stage: Stage,
+    stage: ReturnStage,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Stage {
+enum ReturnStage {
     Climbs,
     /// Flies home with this heading \[rad\].
     Flies(f32),
@@ -123,7 +123,7 @@ impl Return {
         let safe_m = inputs.home_m.z + inputs.flying.return_height_m;
         // A return must not itself cross the geofence's ceiling.
         let height_m = if near { position_m.z } else { min(max(position_m.z, safe_m), inputs.ceiling_m) };
-        Return { height_m, to_m, hold: Hold::default(), stage: Stage::Climbs }
+        Return { height_m, to_m, hold: Hold::default(), stage: ReturnStage::Climbs }
     }
 
     /// Shifts the place of the climb by an estimator reset. Home does not move.
@@ -135,30 +135,30 @@ impl Return {
 
     /// True once the vehicle has stopped and climbed.
     pub(crate) fn is_on_its_way(&self) -> bool {
-        self.stage != Stage::Climbs
+        self.stage != ReturnStage::Climbs
     }
 
     pub(crate) fn fly(&mut self, inputs: &ModeInputs<'_>) -> ModeOutput {
         let home_m = Vector3::new(self.to_m.x, self.to_m.y, self.height_m);
         match self.stage {
-            Stage::Climbs => {
+            ReturnStage::Climbs => {
                 let mut aim = self.hold.fly(inputs);
                 let short_m = |z: f32| self.height_m - z;
                 // The vehicle must have climbed, too: one that cannot climb must not fly home too low.
                 if short_m(inputs.present.position_m.z) < CLIMBED_M && short_m(inputs.state.position_m.z) < 1.0 {
-                    self.stage = Stage::Flies(inputs.towards(&home_m));
+                    self.stage = ReturnStage::Flies(inputs.towards(&home_m));
                 }
                 // Climbs while still stopping.
                 aim.position_m.z = self.height_m;
                 ModeOutput::fly(aim)
             }
-            Stage::Flies(yaw_rad) => {
+            ReturnStage::Flies(yaw_rad) => {
                 if inputs.is_at(&home_m, OVER_HOME_M) && inputs.present.velocity_m_s.norm_squared() < 0.3 * 0.3 {
-                    self.stage = Stage::Descends;
+                    self.stage = ReturnStage::Descends;
                 }
                 ModeOutput::fly(LimiterTarget { yaw_rad, ..inputs.to(home_m) })
             }
-            Stage::Descends => ModeOutput { lands: true, ..ModeOutput::fly(inputs.down(home_m)) },
+            ReturnStage::Descends => ModeOutput { lands: true, ..ModeOutput::fly(inputs.down(home_m)) },
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Geofence by prediction: checks the vehicle's stopping path against the boundaries of areas. Horizontal, local frame.
 //!
 //! The communication code holds the areas. It checks a few boundaries after each tick, and passes the result to the
-//! guidance as [`FenceView`].
+//! guidance as [`FenceStatus`].
 
-use crate::shaper::Shape;
+use crate::shaper::MotionShaper;
 use afbc_control::math::{max, min, sqrt};
 use nalgebra::Vector2;
 
@@ -25,7 +25,7 @@ const CURVE: f32 = 0.12;
 /// State of the uploaded geofence in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct FenceView {
+pub struct FenceStatus {
     /// True if the vehicle would cross a boundary even if it braked now. Stays true until it has stopped.
     pub leaves: bool,
     /// True if the vehicle is outside.
@@ -34,15 +34,15 @@ pub struct FenceView {
 
 /// Limits of acceleration and jerk that the vehicle brakes with.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Braking {
+pub struct BrakingLimits {
     acceleration_m_s2: f32,
     jerk_m_s3: f32,
 }
 
-impl Braking {
+impl BrakingLimits {
     /// Makes the limits from the largest acceleration \[m/s2\] and jerk \[m/s3\].
     pub const fn new(acceleration_m_s2: f32, jerk_m_s3: f32) -> Self {
-        Braking { acceleration_m_s2, jerk_m_s3 }
+        BrakingLimits { acceleration_m_s2, jerk_m_s3 }
     }
 }
 
@@ -62,7 +62,7 @@ pub struct StopPath {
 impl StopPath {
     /// Returns the path of a setpoint that brakes with the limits of acceleration and jerk of an approach.
     pub fn of_setpoint(
-        braking: &Braking,
+        braking: &BrakingLimits,
         position_m: Vector2<f32>,
         velocity_m_s: Vector2<f32>,
         acceleration_m_s2: Vector2<f32>,
@@ -72,7 +72,7 @@ impl StopPath {
 
     /// Returns the path of the vehicle itself, which lags behind its setpoint.
     pub fn of_vehicle(
-        braking: &Braking,
+        braking: &BrakingLimits,
         position_m: Vector2<f32>,
         velocity_m_s: Vector2<f32>,
         acceleration_m_s2: Vector2<f32>,
@@ -82,12 +82,12 @@ impl StopPath {
 
     fn after(
         reaction_s: f32,
-        braking: &Braking,
+        braking: &BrakingLimits,
         from_m: Vector2<f32>,
         velocity_m_s: Vector2<f32>,
         acceleration_m_s2: Vector2<f32>,
     ) -> Self {
-        let shape = Shape::new(braking.acceleration_m_s2, braking.jerk_m_s3);
+        let shape = MotionShaper::new(braking.acceleration_m_s2, braking.jerk_m_s3);
         let brakes_m_s2 = shape.braking(length(velocity_m_s));
         // The acceleration changes in a straight line to `wanted_m_s2`, as fast as the jerk allows.
         let turns = |wanted_m_s2: Vector2<f32>| {

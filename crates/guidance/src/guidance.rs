@@ -3,20 +3,20 @@
 mod flying;
 mod orders;
 
+use crate::available_thrust::{AccelerationTrim, AvailableThrust};
 use crate::battery::BatteryReading;
 use crate::course::{Hold, Land, Return, Takeoff};
-use crate::lift::{Lift, Trim};
+use crate::failsafe::{self, FailedSensors, FailsafeInputs, FailsafeMemory};
 use crate::limiter::{Limiter, LimiterTarget};
-use crate::mission::Mission;
+use crate::mission::MissionMemory;
 use crate::mode::FlightMode;
-use crate::net::{self, FailedSensors, Findings, Watch};
-use crate::notice::{Cause, ModeReason, Notice, Notices};
+use crate::notice::{FailsafeCause, GuidanceNotice, GuidanceNotices, ModeReason};
+use crate::offboard::{self, OffboardMemory};
 use crate::orbit::Orbit;
 use crate::order::{Item, OffboardTarget, OrderRefusal, Orders, Sticks};
 use crate::settings::Settings;
 use crate::sticks;
 use crate::table::{self, FailsafeAction, TransitionInputs};
-use crate::targets::{self, Targets};
 use afbc_control::math::{max, min};
 use afbc_flight_core::{Mode, RateTarget, Reasons, Refusal, Request, Stamped};
 use afbc_types::{Declared, OutOfRange, ResetDelta, Setpoint, State};
@@ -47,12 +47,12 @@ pub struct GuidanceInputs<'a> {
     /// Sensors that have failed.
     pub sensors: FailedSensors,
     /// Thrust of the rotors.
-    pub lift: Lift,
+    pub available_thrust: AvailableThrust,
 }
 
 /// Outputs of a tick of the guidance, for the flight core, stations and logs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Guided {
+pub struct GuidanceOutputs {
     /// Setpoint for the flight core; none without a state.
     pub setpoint: Option<Setpoint>,
     /// True if the motors shall idle: the vehicle is armed and stays on the ground, or touches it while landing.
@@ -64,7 +64,7 @@ pub struct Guided {
     /// Flight mode.
     pub mode: FlightMode,
     /// Announcements.
-    pub notices: Notices,
+    pub notices: GuidanceNotices,
     /// Number of the mission item that [`Orders::leg`] must contain. After an item that ends the mission with another
     /// mode, its number stays here until that mode has landed.
     pub wanted: u16,
@@ -73,7 +73,7 @@ pub struct Guided {
     /// Home position \[m\].
     pub home_m: Option<Vector3<f32>>,
     /// Failsafe cause that selected the present mode; none once a pilot or a station has selected another mode.
-    pub failsafe: Option<Cause>,
+    pub failsafe: Option<FailsafeCause>,
     /// True if the vehicle is armed and in the air.
     pub airborne: bool,
     /// Charge of the battery, 0 to 1.
@@ -94,18 +94,18 @@ pub struct Guidance {
 struct Memory {
     limiter: Limiter,
     mode: FlightMode,
-    plan: Plan,
-    mission: Mission,
-    watch: Watch,
+    mode_memory: ModeMemory,
+    mission: MissionMemory,
+    failsafe_memory: FailsafeMemory,
     home_m: Option<Vector3<f32>>,
     /// True if home was set by order. Then arming does not change it.
     home_ordered: bool,
     /// Ordered speed limit; infinite for none \[m/s\].
     speed_m_s: f32,
     /// Target of the last tick, flown on while the state is missing.
-    aim: LimiterTarget,
+    last_target: LimiterTarget,
     /// Correction of attitude and thrust in modes that command these.
-    trim: Trim,
+    trim: AccelerationTrim,
     /// Body rates that the sticks command in mode acro.
     rates: Option<RateTarget>,
     was_armed: bool,
@@ -115,9 +115,9 @@ struct Memory {
     enters: bool,
     /// True if the vehicle has been in the air since it was armed.
     flown: bool,
-    failsafe: Option<Cause>,
+    failsafe: Option<FailsafeCause>,
     /// Mode that the flight core's descent interrupted; kept until it resumes or another mode is selected.
-    interrupted: Option<Interrupted>,
+    interrupted: Option<InterruptedMode>,
     /// Mission item that counts as done once the vehicle has landed.
     lands_item: Option<u16>,
     /// Time for which the motors have idled on the ground \[s\].
@@ -137,17 +137,17 @@ struct Memory {
 
 /// State of an interrupted mode, to be resumed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Interrupted {
+struct InterruptedMode {
     mode: FlightMode,
-    plan: Plan,
-    failsafe: Option<Cause>,
+    mode_memory: ModeMemory,
+    failsafe: Option<FailsafeCause>,
     lands_item: Option<u16>,
     speed_m_s: f32,
 }
 
 /// Memory of the present mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Plan {
+enum ModeMemory {
     /// Not started yet.
     New,
     Hold(Hold),
@@ -155,7 +155,7 @@ enum Plan {
     Takeoff(Takeoff),
     Land(Land),
     Return(Return),
-    Targets(Targets),
+    Targets(OffboardMemory),
 }
 
 impl Guidance {
@@ -168,14 +168,14 @@ impl Guidance {
         let memory = Memory {
             limiter: Limiter::new(settings.limits)?,
             mode: FlightMode::Hold,
-            plan: Plan::New,
-            mission: Mission::default(),
-            watch: Watch::default(),
+            mode_memory: ModeMemory::New,
+            mission: MissionMemory::default(),
+            failsafe_memory: FailsafeMemory::default(),
             home_m: None,
             home_ordered: false,
             speed_m_s: f32::INFINITY,
-            aim: LimiterTarget::stop(1.0, 1.0, 1.0),
-            trim: Trim::default(),
+            last_target: LimiterTarget::stop(1.0, 1.0, 1.0),
+            trim: AccelerationTrim::default(),
             rates: None,
             was_armed: false,
             was_seen: false,
@@ -219,7 +219,7 @@ impl Guidance {
 
     /// Returns what it has against arming, as it was while the vehicle was disarmed.
     // Not in what a tick gives, of which the firmware has a queue: the flight core's reasons include these.
-    pub fn against(&self) -> Reasons {
+    pub fn arming_refusals(&self) -> Reasons {
         self.memory.against
     }
 
@@ -231,20 +231,20 @@ impl Guidance {
     /// Runs one tick. Call it every millisecond. Cannot fail.
     #[must_use = "the vehicle flies by it"]
     #[inline]
-    pub fn tick(&mut self, given: &GuidanceInputs<'_>, orders: &Orders) -> Guided {
+    pub fn tick(&mut self, given: &GuidanceInputs<'_>, orders: &Orders) -> GuidanceOutputs {
         self.memory.tick(&self.settings, given, orders)
     }
 }
 
 impl Memory {
     #[inline]
-    fn tick(&mut self, settings: &Settings, given: &GuidanceInputs<'_>, orders: &Orders) -> Guided {
+    fn tick(&mut self, settings: &Settings, given: &GuidanceInputs<'_>, orders: &Orders) -> GuidanceOutputs {
         // The comparison is false for NaN.
         let dt_s = if given.dt_s > 0.0 { min(max(given.dt_s, 1e-4), 0.02) } else { 0.001 };
         let state = given.state.filter(|state| state.is_plausible());
         let armed = given.core.armed();
         let airborne = armed && given.airborne;
-        let mut notices = Notices::default();
+        let mut notices = GuidanceNotices::default();
         self.time(airborne, dt_s);
         if let Some(reset) = given.reset.filter(|_| self.was_seen) {
             self.shift(reset, settings.flying.within_m);
@@ -259,7 +259,7 @@ impl Memory {
         // Failsafe checks.
         let target = fresh_target(orders, given.now_us, settings.flying.targets_lost_s);
         let sticks = fresh_sticks(orders, given.now_us, settings.flying.sticks_lost_s);
-        let findings = Findings {
+        let findings = FailsafeInputs {
             mode: self.mode,
             armed,
             descends: given.core == Mode::Descending,
@@ -276,7 +276,7 @@ impl Memory {
             fence: orders.fence.unwrap_or_default(),
             dt_s,
         };
-        let (held, cause, new) = self.watch.look(&settings.net, &findings, &mut notices);
+        let (held, cause, new) = self.failsafe_memory.update(&settings.failsafe, &findings, &mut notices);
         let seen = TransitionInputs {
             armed,
             airborne,
@@ -291,7 +291,7 @@ impl Memory {
 
         // Decides the mode.
         // Only when the cause is new: otherwise each tick until the vehicle stops would restart the mode.
-        let leaves = findings.fence.leaves && net::is_new(new, Cause::Fence);
+        let leaves = findings.fence.leaves && failsafe::is_new(new, FailsafeCause::Fence);
         let back = state.is_some() && !findings.descends;
         self.decide(settings, &seen, cause, new, [leaves, back], &mut notices);
         let first = orders.given.front();
@@ -305,7 +305,7 @@ impl Memory {
             }
             None => {
                 if armed && airborne {
-                    self.limiter.advance(&self.aim, dt_s);
+                    self.limiter.advance(&self.last_target, dt_s);
                 }
                 self.was_seen = false;
                 None
@@ -314,10 +314,10 @@ impl Memory {
         // Without a state, the flight core alone decides in the air, and the motors idle on the ground.
         let (setpoint, idle_on_ground) = flight.unwrap_or((None, armed && !airborne));
         if !armed {
-            self.against = self.against(settings, given, state, findings.fence.outside);
+            self.against = self.find_arming_refusals(settings, given, state, findings.fence.outside);
         }
         let request = self.disarms(settings, armed, airborne, idle_on_ground, held, dt_s, &mut reached, &mut notices);
-        Guided {
+        GuidanceOutputs {
             setpoint,
             idle_on_ground,
             request,
@@ -329,8 +329,8 @@ impl Memory {
             home_m: self.home_m,
             failsafe: self.failsafe,
             airborne,
-            charge: self.watch.charge(),
-            orbits: matches!(self.plan, Plan::Orbit(_)),
+            charge: self.failsafe_memory.charge(),
+            orbits: matches!(self.mode_memory, ModeMemory::Orbit(_)),
         }
     }
 
@@ -342,10 +342,10 @@ impl Memory {
         &mut self,
         settings: &Settings,
         seen: &TransitionInputs,
-        cause: Cause,
+        cause: FailsafeCause,
         new: u16,
         [leaves, back]: [bool; 2],
-        notices: &mut Notices,
+        notices: &mut GuidanceNotices,
     ) {
         if self.was_armed && !seen.armed {
             self.disarmed(notices);
@@ -356,18 +356,18 @@ impl Memory {
         }
         let mut announced = None;
         if let Some(next) = table::forced(self.mode, seen) {
-            let Memory { mode, plan, failsafe, lands_item, speed_m_s, .. } = *self;
+            let Memory { mode, mode_memory, failsafe, lands_item, speed_m_s, .. } = *self;
             self.change(next, ModeReason::Failsafe(cause), notices);
             (self.failsafe, announced) = (Some(cause), Some(cause));
             if seen.descends {
-                self.interrupted = Some(Interrupted { mode, plan, failsafe, lands_item, speed_m_s });
+                self.interrupted = Some(InterruptedMode { mode, mode_memory, failsafe, lands_item, speed_m_s });
             }
         }
         if leaves && seen.airborne {
-            self.stop_at_fence(settings.net.fence_action.action(), notices);
+            self.stop_at_fence(settings.failsafe.fence_action.action(), notices);
         }
         if new != 0 {
-            net::announce(&settings.net, new, announced, notices);
+            failsafe::announce(&settings.failsafe, new, announced, notices);
         }
     }
 
@@ -390,12 +390,12 @@ impl Memory {
         self.limiter.shift(reset);
         self.stood_m += reset.position_m;
         self.mission.shift(reset);
-        match &mut self.plan {
-            Plan::Hold(hold) => hold.shift(reset, present_m, within_m),
-            Plan::Takeoff(takeoff) => takeoff.shift(reset),
-            Plan::Land(land) => land.shift(reset),
-            Plan::Return(home) => home.shift(reset, present_m, within_m),
-            Plan::New | Plan::Orbit(_) | Plan::Targets(_) => {}
+        match &mut self.mode_memory {
+            ModeMemory::Hold(hold) => hold.shift(reset, present_m, within_m),
+            ModeMemory::Takeoff(takeoff) => takeoff.shift(reset),
+            ModeMemory::Land(land) => land.shift(reset),
+            ModeMemory::Return(home) => home.shift(reset, present_m, within_m),
+            ModeMemory::New | ModeMemory::Orbit(_) | ModeMemory::Targets(_) => {}
         }
     }
 
@@ -406,7 +406,7 @@ impl Memory {
     }
 
     /// Resets the flight's memory after disarming.
-    fn disarmed(&mut self, notices: &mut Notices) {
+    fn disarmed(&mut self, notices: &mut GuidanceNotices) {
         (self.flown, self.failsafe, self.speed_m_s) = (false, None, f32::INFINITY);
         (self.ground_s, self.lift_s) = (0.0, 0.0);
         self.mission.resume(0);
@@ -416,39 +416,39 @@ impl Memory {
         }
     }
 
-    fn change(&mut self, next: FlightMode, reason: ModeReason, notices: &mut Notices) {
+    fn change(&mut self, next: FlightMode, reason: ModeReason, notices: &mut GuidanceNotices) {
         if next != self.mode {
-            notices.push(Notice::Mode(next, reason));
+            notices.push(GuidanceNotice::Mode(next, reason));
         }
         self.speed_m_s = f32::INFINITY;
         self.mission.pause();
-        (self.mode, self.plan, self.enters, self.lift_s) = (next, Plan::New, true, 0.0);
-        (self.trim, self.rates) = (Trim::default(), None);
+        (self.mode, self.mode_memory, self.enters, self.lift_s) = (next, ModeMemory::New, true, 0.0);
+        (self.trim, self.rates) = (AccelerationTrim::default(), None);
         (self.lands_item, self.interrupted) = (None, None);
     }
 
     /// Resumes the mode that a loss of the state interrupted, from the vehicle's present place.
     #[cold]
     #[inline(never)]
-    fn resume(&mut self, flown: &Interrupted, notices: &mut Notices) {
+    fn resume(&mut self, flown: &InterruptedMode, notices: &mut GuidanceNotices) {
         self.change(flown.mode, ModeReason::Back, notices);
-        (self.plan, self.failsafe) = (flown.plan, flown.failsafe);
+        (self.mode_memory, self.failsafe) = (flown.mode_memory, flown.failsafe);
         (self.lands_item, self.speed_m_s) = (flown.lands_item, flown.speed_m_s);
     }
 
     /// Stops a vehicle about to cross the uploaded geofence in a mode that the failsafe action does not replace: a
     /// flight in hold stops, and a return lands.
-    fn stop_at_fence(&mut self, action: FailsafeAction, notices: &mut Notices) {
+    fn stop_at_fence(&mut self, action: FailsafeAction, notices: &mut GuidanceNotices) {
         if action < FailsafeAction::Hold {
             return;
         }
-        let next = match &self.plan {
-            Plan::Return(home) if home.is_on_its_way() => FlightMode::Land,
-            Plan::Hold(_) | Plan::Orbit(_) if self.mode == FlightMode::Hold => FlightMode::Hold,
+        let next = match &self.mode_memory {
+            ModeMemory::Return(home) if home.is_on_its_way() => FlightMode::Land,
+            ModeMemory::Hold(_) | ModeMemory::Orbit(_) if self.mode == FlightMode::Hold => FlightMode::Hold,
             _ => return,
         };
-        self.change(next, ModeReason::Failsafe(Cause::Fence), notices);
-        self.failsafe = Some(Cause::Fence);
+        self.change(next, ModeReason::Failsafe(FailsafeCause::Fence), notices);
+        self.failsafe = Some(FailsafeCause::Fence);
     }
 
     /// Returns a disarm request for a vehicle on the ground, if it shall disarm.
@@ -462,7 +462,7 @@ impl Memory {
         held: FailsafeAction,
         dt_s: f32,
         reached: &mut Option<u16>,
-        notices: &mut Notices,
+        notices: &mut GuidanceNotices,
     ) -> Option<Request> {
         if !armed || airborne || !idle_on_ground {
             (self.ground_s, self.disarms) = (0.0, false);
@@ -481,7 +481,7 @@ impl Memory {
         }
         if !self.disarms {
             self.disarms = true;
-            notices.push(Notice::Disarms);
+            notices.push(GuidanceNotice::Disarms);
         }
         if self.request_s < REQUEST_S {
             return None;
@@ -491,7 +491,7 @@ impl Memory {
     }
 
     /// Returns the reasons against arming that only the guidance knows.
-    fn against(
+    fn find_arming_refusals(
         &self,
         settings: &Settings,
         given: &GuidanceInputs<'_>,
@@ -499,9 +499,12 @@ impl Memory {
         outside_fence: bool,
     ) -> Reasons {
         let mut reasons = Reasons::NONE;
-        let watched = self.watch.is_watched(&settings.net);
-        let known = given.battery.is_some() && self.watch.charge().is_some();
-        reasons.note(watched && (!known || self.watch.holds(Cause::BatteryLow)), Refusal::BatteryLow);
+        let watched = self.failsafe_memory.is_watched(&settings.failsafe);
+        let known = given.battery.is_some() && self.failsafe_memory.charge().is_some();
+        reasons.note(
+            watched && (!known || self.failsafe_memory.is_present(FailsafeCause::BatteryLow)),
+            Refusal::BatteryLow,
+        );
         reasons.note(given.sensors.any(), Refusal::SensorFailed);
         let outside = state.is_some_and(|state| !self.is_inside(settings, &state.position_m));
         reasons.note(outside || outside_fence, Refusal::OutsideFence);
@@ -513,7 +516,7 @@ impl Memory {
 #[inline]
 fn fresh_target(orders: &Orders, now_us: u64, lost_s: f32) -> Option<&Stamped<OffboardTarget>> {
     let target = orders.target.as_ref().filter(|target| is_fresh(target, now_us, lost_s))?;
-    targets::is_plausible(&target.value).then_some(target)
+    offboard::is_plausible(&target.value).then_some(target)
 }
 
 /// Returns the newest sticks, if plausible and not older than `lost_s`.

@@ -16,7 +16,7 @@ const REACHED_RAD_S: f32 = 5e-3;
 
 /// Target of the heading.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Turn {
+pub(crate) enum HeadingTarget {
     /// Heading that itself turns at a rate \[rad, rad/s\].
     To(f32, f32),
     /// Yaw rate without a heading \[rad/s\].
@@ -33,7 +33,7 @@ pub(crate) struct Heading {
 
 /// Limits of yaw rate and acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Turning {
+pub(crate) struct YawLimits {
     pub(crate) rate_rad_s: f32,
     pub(crate) acceleration_rad_s2: f32,
 }
@@ -45,12 +45,12 @@ impl Heading {
     }
 
     /// Advances the heading by one step.
-    pub(crate) fn advance(&mut self, turn: &Turn, limits: &Turning, dt_s: f32) {
+    pub(crate) fn advance(&mut self, turn: &HeadingTarget, limits: &YawLimits, dt_s: f32) {
         let most = AIM * limits.rate_rad_s;
         let bounded = |value: f32, most: f32| max(min(value, most), -most);
         let (wanted, change) = match *turn {
-            Turn::By(rate) => (bounded(rate, most), 0.0),
-            Turn::To(yaw, rate) => {
+            HeadingTarget::By(rate) => (bounded(rate, most), 0.0),
+            HeadingTarget::To(yaw, rate) => {
                 let error = wrap_angle(yaw - self.yaw_rad);
                 let off = rate - self.rate_rad_s;
                 // The remaining step is too small to matter to the law.

@@ -4,9 +4,9 @@
 //! acceleration fit one another and the limits, and the limiter has caught up with it. Between two messages of such a
 //! stream, the limiter extrapolates with the velocity, the acceleration, and the jerk between the last two messages.
 
-use crate::heading::{Heading, Turn, Turning};
-use crate::settings::Limits;
-use crate::shaper::{Goal, Motion, Reach, Shape, capped};
+use crate::heading::{Heading, HeadingTarget, YawLimits};
+use crate::settings::MotionLimits;
+use crate::shaper::{MotionBounds, MotionGoal, MotionShaper, MotionState, capped};
 use afbc_control::math::{max, min, sqrt, wrap_angle};
 use afbc_types::{Declared, OutOfRange, ResetDelta, Setpoint, State};
 use nalgebra::{Vector1, Vector2, Vector3};
@@ -79,18 +79,18 @@ impl LimiterTarget {
 /// The limiter with its present motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limiter {
-    limits: Limits,
-    horizontal: Shape,
-    vertical: Shape,
-    now: Option<Now>,
-    stream: Option<Stream>,
+    limits: MotionLimits,
+    horizontal: MotionShaper,
+    vertical: MotionShaper,
+    now: Option<LimitedMotion>,
+    stream: Option<TargetStream>,
 }
 
 /// Present limited motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Now {
-    horizontal: Motion<2>,
-    vertical: Motion<1>,
+struct LimitedMotion {
+    horizontal: MotionState<2>,
+    vertical: MotionState<1>,
     heading: Heading,
     /// Accumulated misfits of a passing stream; none while no stream passes.
     misfit: Option<Misfit>,
@@ -104,7 +104,7 @@ struct Misfit {
 
 /// A target whose position, velocity and acceleration are all known.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Complete {
+struct CompleteTarget {
     position_m: Vector3<f32>,
     velocity_m_s: Vector3<f32>,
     acceleration_m_s2: Vector3<f32>,
@@ -112,11 +112,11 @@ struct Complete {
 
 /// A stream of target messages.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Stream {
+struct TargetStream {
     sent_us: u64,
     /// Newest message, and the target extrapolated from it to the present.
-    last: Complete,
-    present: Complete,
+    last: CompleteTarget,
+    present: CompleteTarget,
     /// Time since the newest message, and between the last two messages \[s\].
     since_s: f32,
     interval_s: f32,
@@ -131,15 +131,15 @@ impl Limiter {
     ///
     /// # Errors
     /// The first limit out of range.
-    pub fn new(limits: Limits) -> Result<Self, OutOfRange> {
+    pub fn new(limits: MotionLimits) -> Result<Self, OutOfRange> {
         limits.validate()?;
         Ok(Limiter::of(limits))
     }
 
-    fn of(limits: Limits) -> Self {
+    fn of(limits: MotionLimits) -> Self {
         Limiter {
-            horizontal: Shape::new(limits.acceleration_m_s2, limits.jerk_m_s3),
-            vertical: Shape::new(limits.vertical_acceleration_m_s2, limits.jerk_m_s3),
+            horizontal: MotionShaper::new(limits.acceleration_m_s2, limits.jerk_m_s3),
+            vertical: MotionShaper::new(limits.vertical_acceleration_m_s2, limits.jerk_m_s3),
             limits,
             now: None,
             stream: None,
@@ -147,18 +147,18 @@ impl Limiter {
     }
 
     /// Changes the limits, which must be valid. The present motion continues.
-    pub(crate) fn set(&mut self, limits: Limits) {
+    pub(crate) fn set(&mut self, limits: MotionLimits) {
         *self = Limiter { now: self.now, stream: self.stream, ..Limiter::of(limits) };
     }
 
     /// Restarts at the vehicle's position with its velocity, capped to the limits.
     pub fn anchor(&mut self, state: &State) {
         let (position, velocity) = (state.position_m, state.velocity_m_s);
-        let Limits { speed_m_s, up_m_s, down_m_s, .. } = self.limits;
+        let MotionLimits { speed_m_s, up_m_s, down_m_s, .. } = self.limits;
         let climb = min(max(velocity.z, -down_m_s), up_m_s);
-        self.now = Some(Now {
-            horizontal: Motion::new(position.xy(), capped(velocity.xy(), speed_m_s)),
-            vertical: Motion::new(Vector1::new(position.z), Vector1::new(climb)),
+        self.now = Some(LimitedMotion {
+            horizontal: MotionState::new(position.xy(), capped(velocity.xy(), speed_m_s)),
+            vertical: MotionState::new(Vector1::new(position.z), Vector1::new(climb)),
             heading: Heading::new(state.attitude_rad.z),
             misfit: None,
         });
@@ -184,13 +184,13 @@ impl Limiter {
     pub fn follow(&mut self, state: &State) {
         let capped_m_s = capped(state.velocity_m_s.xy(), self.limits.speed_m_s);
         if let Some(now) = &mut self.now {
-            now.horizontal = Motion::new(state.position_m.xy(), capped_m_s);
+            now.horizontal = MotionState::new(state.position_m.xy(), capped_m_s);
         }
     }
 
     /// Returns the present setpoint; `None` before the first [`anchor`](Self::anchor).
     pub fn setpoint(&self) -> Option<Setpoint> {
-        let Now { horizontal: h, vertical: v, heading, .. } = self.now.as_ref()?;
+        let LimitedMotion { horizontal: h, vertical: v, heading, .. } = self.now.as_ref()?;
         let joined = |h: Vector2<f32>, v: Vector1<f32>| Vector3::new(h.x, h.y, v.x);
         Some(Setpoint {
             position_m: joined(h.position, v.position),
@@ -220,7 +220,7 @@ impl Limiter {
                         stream.advance(complete, sent_us, dt_s, self.limits.jerk_max_m_s3);
                         stream
                     }
-                    none => none.insert(Stream::new(complete, sent_us)),
+                    none => none.insert(TargetStream::new(complete, sent_us)),
                 };
                 (Some(stream.present), stream.jerk_m_s3, stream.interval_s, stream.fits)
             }
@@ -232,13 +232,13 @@ impl Limiter {
         let limits = &self.limits;
         let Some(now) = &mut self.now else { return };
         let turn = match (aim.yaw_rad.is_nan(), aim.yaw_rate_rad_s.is_nan()) {
-            (true, true) => Turn::By(0.0),
-            (true, false) => Turn::By(aim.yaw_rate_rad_s),
-            (false, true) => Turn::To(aim.yaw_rad, 0.0),
-            (false, false) => Turn::To(aim.yaw_rad, aim.yaw_rate_rad_s),
+            (true, true) => HeadingTarget::By(0.0),
+            (true, false) => HeadingTarget::By(aim.yaw_rate_rad_s),
+            (false, true) => HeadingTarget::To(aim.yaw_rad, 0.0),
+            (false, false) => HeadingTarget::To(aim.yaw_rad, aim.yaw_rate_rad_s),
         };
-        let Limits { yaw_rate_rad_s, yaw_acceleration_rad_s2, .. } = *limits;
-        let turning = Turning { rate_rad_s: yaw_rate_rad_s, acceleration_rad_s2: yaw_acceleration_rad_s2 };
+        let MotionLimits { yaw_rate_rad_s, yaw_acceleration_rad_s2, .. } = *limits;
+        let turning = YawLimits { rate_rad_s: yaw_rate_rad_s, acceleration_rad_s2: yaw_acceleration_rad_s2 };
         // Must come before a stream may pass: the heading is limited then, too.
         now.heading.advance(&turn, &turning, dt_s);
         if let Some(target) = &target
@@ -254,7 +254,7 @@ impl Limiter {
         };
         let goal = goal(p.xy(), v.xy(), a.xy(), jerk_m_s3.xy());
         let (speed_m_s, approach_m_s) = (limits.speed_m_s, min(aim.speed_m_s, limits.speed_m_s));
-        let reach = Reach {
+        let reach = MotionBounds {
             approach: (approach_m_s, approach_m_s),
             speed: (speed_m_s, speed_m_s),
             acceleration: limits.acceleration_max_m_s2,
@@ -263,7 +263,7 @@ impl Limiter {
         self.horizontal.advance(&mut now.horizontal, &goal, &reach, dt_s);
         let one = |vector: Vector3<f32>| Vector1::new(vector.z);
         let goal = self::goal(one(p), one(v), one(a), one(jerk_m_s3));
-        let reach = Reach {
+        let reach = MotionBounds {
             approach: (min(aim.up_m_s, limits.up_m_s), min(aim.down_m_s, limits.down_m_s)),
             speed: (limits.up_m_s, limits.down_m_s),
             acceleration: limits.vertical_acceleration_m_s2,
@@ -275,11 +275,11 @@ impl Limiter {
 
 /// Returns the target with missing velocities and accelerations set to zero; `None` if a part of the position is
 /// missing.
-fn complete(aim: &LimiterTarget) -> Option<Complete> {
+fn complete(aim: &LimiterTarget) -> Option<CompleteTarget> {
     let or_zero = |vector: Vector3<f32>| vector.map(|value| if value.is_nan() { 0.0 } else { value });
     let LimiterTarget { position_m, velocity_m_s, acceleration_m_s2, .. } = *aim;
     let given = !position_m.iter().any(|value| value.is_nan());
-    given.then(|| Complete {
+    given.then(|| CompleteTarget {
         position_m,
         velocity_m_s: or_zero(velocity_m_s),
         acceleration_m_s2: or_zero(acceleration_m_s2),
@@ -292,13 +292,13 @@ fn goal<const D: usize>(
     velocity: nalgebra::SVector<f32, D>,
     acceleration: nalgebra::SVector<f32, D>,
     jerk: nalgebra::SVector<f32, D>,
-) -> Goal<D> {
+) -> MotionGoal<D> {
     let given = |vector: nalgebra::SVector<f32, D>| (!vector.iter().any(|value| value.is_nan())).then_some(vector);
     let zero = nalgebra::SVector::zeros();
     let (position, velocity, acceleration) = (given(position), given(velocity), given(acceleration));
     match (position, velocity, acceleration) {
-        (None, None, Some(acceleration)) => Goal { position: None, velocity: None, acceleration, jerk: zero },
-        _ => Goal {
+        (None, None, Some(acceleration)) => MotionGoal { position: None, velocity: None, acceleration, jerk: zero },
+        _ => MotionGoal {
             position,
             velocity: Some(velocity.unwrap_or(zero)),
             acceleration: acceleration.unwrap_or(zero),
@@ -307,19 +307,19 @@ fn goal<const D: usize>(
     }
 }
 
-impl Complete {
+impl CompleteTarget {
     fn advance(&mut self, jerk_m_s3: Vector3<f32>, dt_s: f32) {
-        let Complete { velocity_m_s, acceleration_m_s2, .. } = *self;
+        let CompleteTarget { velocity_m_s, acceleration_m_s2, .. } = *self;
         self.position_m += (velocity_m_s + acceleration_m_s2 * (0.5 * dt_s)) * dt_s;
         self.velocity_m_s += (acceleration_m_s2 + jerk_m_s3 * (0.5 * dt_s)) * dt_s;
         self.acceleration_m_s2 += jerk_m_s3 * dt_s;
     }
 }
 
-impl Stream {
+impl TargetStream {
     /// Starts a stream with this message.
-    fn new(target: &Complete, sent_us: u64) -> Self {
-        Stream {
+    fn new(target: &CompleteTarget, sent_us: u64) -> Self {
+        TargetStream {
             sent_us,
             last: *target,
             present: *target,
@@ -331,7 +331,7 @@ impl Stream {
     }
 
     /// Advances the stream by one step. The target is a new message if `sent_us` has changed.
-    fn advance(&mut self, target: &Complete, sent_us: u64, dt_s: f32, jerk_max_m_s3: f32) {
+    fn advance(&mut self, target: &CompleteTarget, sent_us: u64, dt_s: f32, jerk_max_m_s3: f32) {
         // Counts ticks, because `sent_us` only tells messages apart: an orbit sends a running number in it.
         self.since_s += dt_s;
         if self.sent_us == sent_us {
@@ -343,7 +343,7 @@ impl Stream {
         // Positive, since at least this tick has passed: safe to divide by.
         let interval_s = self.since_s;
         if interval_s > INTERVAL_MAX_S {
-            *self = Stream::new(target, sent_us);
+            *self = TargetStream::new(target, sent_us);
             return;
         }
         let last = &self.last;
@@ -358,17 +358,17 @@ impl Stream {
             misfit_m.norm_squared() <= allowed_m * allowed_m && misfit_m_s.norm_squared() <= MISFIT_M_S * MISFIT_M_S;
         let change_m_s2 = target.acceleration_m_s2 - last.acceleration_m_s2;
         let jerk_m_s3 = if fits { capped(change_m_s2 / interval_s, jerk_max_m_s3) } else { Vector3::zeros() };
-        *self = Stream { interval_s, jerk_m_s3, fits, ..Stream::new(target, sent_us) };
+        *self = TargetStream { interval_s, jerk_m_s3, fits, ..TargetStream::new(target, sent_us) };
     }
 }
 
-impl Now {
+impl LimitedMotion {
     /// True if `target` passes unchanged. Then the present motion is set to it.
     fn pass(
         &mut self,
-        target: &Complete,
+        target: &CompleteTarget,
         jerk_m_s3: Vector3<f32>,
-        limits: &Limits,
+        limits: &MotionLimits,
         interval_s: f32,
         dt_s: f32,
     ) -> bool {
@@ -416,15 +416,15 @@ impl Now {
         }
         let ((vh, vv), (ah, av)) = (place(target.velocity_m_s), place(target.acceleration_m_s2));
         let (jh, jv) = place(jerk_m_s3);
-        self.horizontal = Motion::moving(place_h, vh, ah, jh);
-        self.vertical = Motion::moving(place_v, vv, av, jv);
+        self.horizontal = MotionState::moving(place_h, vh, ah, jh);
+        self.vertical = MotionState::moving(place_v, vv, av, jv);
         true
     }
 }
 
 /// True if the target's speed and acceleration are within the limits.
-fn allowed(target: &Complete, limits: &Limits) -> bool {
-    let Complete { velocity_m_s: v, acceleration_m_s2: a, .. } = target;
+fn allowed(target: &CompleteTarget, limits: &MotionLimits) -> bool {
+    let CompleteTarget { velocity_m_s: v, acceleration_m_s2: a, .. } = target;
     let within = |vector: Vector2<f32>, most: f32| vector.norm_squared() <= most * most;
     within(v.xy(), limits.speed_m_s)
         && (-limits.down_m_s..=limits.up_m_s).contains(&v.z)

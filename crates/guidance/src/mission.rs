@@ -1,12 +1,12 @@
 //! Flies a mission, item by item. The communication code holds the items: the guidance requests each by its number.
 
 use crate::course::{Hold, Takeoff};
+use crate::failsafe::FailsafeSettings;
 use crate::limiter::LimiterTarget;
 use crate::mode::FlightMode;
 use crate::mode_io::{ModeInputs, ModeOutput, Shaping};
-use crate::net::Net;
-use crate::orbit::{self, Orbit, Round};
-use crate::order::{Item, Leg, OrbitHeading, OrderRefusal};
+use crate::orbit::{self, Orbit, OrbitProgress};
+use crate::order::{Item, OrbitHeading, OrderRefusal, RequestedItem};
 use crate::place::{is_place, is_within};
 use afbc_control::math::{max, min, wrap_angle};
 use afbc_types::ResetDelta;
@@ -24,11 +24,11 @@ const LED_RAD: f32 = 2.0;
 
 /// Memory of a mission in progress.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Mission {
+pub(crate) struct MissionMemory {
     /// Number of the requested item.
     pub(crate) wanted: u16,
     /// Item in progress.
-    begun: Option<Begun>,
+    begun: Option<ItemInProgress>,
     upload: Option<u16>,
     /// Speed limit set by the last speed item \[m/s\].
     speed_m_s: Option<f32>,
@@ -38,26 +38,26 @@ pub(crate) struct Mission {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Begun {
+struct ItemInProgress {
     number: u16,
     /// Heading at a waypoint, or the remaining angle of a turn \[rad\].
     yaw_rad: f32,
-    course: Course,
+    course: ItemCourse,
     stayed_s: f32,
 }
 
 /// Course of the item in progress.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Course {
+enum ItemCourse {
     Straight,
     Takeoff(Takeoff),
-    Circle(Round),
+    Circle(OrbitProgress),
 }
 
-impl Course {
+impl ItemCourse {
     fn takeoff(&self) -> Option<Takeoff> {
         match self {
-            Course::Takeoff(takeoff) => Some(*takeoff),
+            ItemCourse::Takeoff(takeoff) => Some(*takeoff),
             _ => None,
         }
     }
@@ -65,7 +65,7 @@ impl Course {
 
 /// Output of a mission in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Progress {
+pub(crate) struct MissionOutput {
     pub(crate) output: ModeOutput,
     /// Number of an item completed in this tick.
     pub(crate) reached: Option<u16>,
@@ -75,7 +75,7 @@ pub(crate) struct Progress {
     pub(crate) refused: bool,
 }
 
-impl Mission {
+impl MissionMemory {
     /// Continues with the item `number`.
     pub(crate) fn resume(&mut self, number: u16) {
         (self.wanted, self.begun) = (number, None);
@@ -88,7 +88,7 @@ impl Mission {
 
     /// Shifts a climb in progress by an estimator reset. Places of items do not move.
     pub(crate) fn shift(&mut self, reset: &ResetDelta) {
-        if let Some(Begun { course: Course::Takeoff(takeoff), .. }) = &mut self.begun {
+        if let Some(ItemInProgress { course: ItemCourse::Takeoff(takeoff), .. }) = &mut self.begun {
             takeoff.shift(reset);
         }
     }
@@ -97,27 +97,32 @@ impl Mission {
     pub(crate) fn begins_anew(&mut self, upload: u16) -> bool {
         let other = self.upload.is_some_and(|before| before != upload);
         if other {
-            *self = Mission::default();
+            *self = MissionMemory::default();
         }
         self.upload = Some(upload);
         other
     }
 
-    /// Advances by a tick. Refuses items outside the cylinder of `net`.
-    pub(crate) fn fly(&mut self, leg: Option<&Leg>, inputs: &ModeInputs<'_>, net: &Net) -> Progress {
+    /// Advances by a tick. Refuses items outside the cylinder of `failsafe`.
+    pub(crate) fn fly(
+        &mut self,
+        leg: Option<&RequestedItem>,
+        inputs: &ModeInputs<'_>,
+        failsafe: &FailsafeSettings,
+    ) -> MissionOutput {
         if let Some(leg) = leg {
             self.begins_anew(leg.upload);
         }
         let inputs =
             &ModeInputs { speed_m_s: min(inputs.speed_m_s, self.speed_m_s.unwrap_or(f32::INFINITY)), ..*inputs };
-        let none = Progress { output: ModeOutput::fly(inputs.stop()), reached: None, then: None, refused: false };
+        let none = MissionOutput { output: ModeOutput::fly(inputs.stop()), reached: None, then: None, refused: false };
         let Some(leg) = leg.filter(|leg| leg.number == self.wanted) else {
             // Stay in place until the requested item arrives. The mission is over if there is none any more.
             let done = leg.is_none();
-            return Progress { output: ModeOutput { done, ..ModeOutput::fly(self.hold.fly(inputs)) }, ..none };
+            return MissionOutput { output: ModeOutput { done, ..ModeOutput::fly(self.hold.fly(inputs)) }, ..none };
         };
-        if leg.item.check(net, Some(&inputs.home_m)).is_err() {
-            return Progress { refused: true, ..none };
+        if leg.item.check(failsafe, Some(&inputs.home_m)).is_err() {
+            return MissionOutput { refused: true, ..none };
         }
         let mut progress = self.fly_item(leg, inputs, none);
         if let (Some(at_m), Shaping::Limited(aim)) = (self.looks_at_m, &mut progress.output.shaping)
@@ -129,13 +134,13 @@ impl Mission {
     }
 
     /// Flies an item that is plausible and inside the geofence.
-    fn fly_item(&mut self, leg: &Leg, inputs: &ModeInputs<'_>, none: Progress) -> Progress {
+    fn fly_item(&mut self, leg: &RequestedItem, inputs: &ModeInputs<'_>, none: MissionOutput) -> MissionOutput {
         match leg.item {
             Item::TakeOff { height_m } => self.take_off(leg, height_m, inputs, none),
             Item::TakeOffTo { position_m } => {
                 let begun = self.begin(leg, inputs, |inputs| climb_to(position_m.z, inputs));
                 if let Some(output) = begun.climb(inputs) {
-                    return Progress { output, ..none };
+                    return MissionOutput { output, ..none };
                 }
                 let done = inputs.is_at(&position_m, inputs.flying.within_m) && is_slow(inputs);
                 let output = ModeOutput { done, ..ModeOutput::fly(inputs.to(position_m)) };
@@ -144,7 +149,7 @@ impl Mission {
             Item::Waypoint { position_m, yaw_rad, hold_s, within_m, fly_through } => {
                 let begun = self.begin(leg, inputs, from_ground);
                 if let Some(output) = begun.climb(inputs) {
-                    return Progress { output, ..none };
+                    return MissionOutput { output, ..none };
                 }
                 let yaw_rad = if yaw_rad.is_nan() { begun.yaw_rad } else { yaw_rad };
                 let aim = LimiterTarget { yaw_rad, ..inputs.to(position_m) };
@@ -157,13 +162,13 @@ impl Mission {
                 self.go_on(leg, ModeOutput { done, ..ModeOutput::fly(aim) }, Some(position_m), none)
             }
             Item::Land { position_m } => self.land(leg, &position_m, inputs, none),
-            Item::Return => Progress { then: Some((FlightMode::Return, leg.number)), ..none },
+            Item::Return => MissionOutput { then: Some((FlightMode::Return, leg.number)), ..none },
             Item::Speed(speed_m_s) => {
                 self.speed_m_s = Some(speed_m_s);
                 self.stay(leg, inputs, true, none)
             }
             Item::Wait(time_s) => {
-                let begun = self.begin(leg, inputs, |_| Course::Straight);
+                let begun = self.begin(leg, inputs, |_| ItemCourse::Straight);
                 begun.stayed_s += inputs.dt_s;
                 let done = begun.stayed_s >= time_s;
                 self.stay(leg, inputs, done, none)
@@ -190,7 +195,13 @@ impl Mission {
     }
 
     /// Climbs straight up to a height of the local frame.
-    fn take_off(&mut self, leg: &Leg, height_m: f32, inputs: &ModeInputs<'_>, none: Progress) -> Progress {
+    fn take_off(
+        &mut self,
+        leg: &RequestedItem,
+        height_m: f32,
+        inputs: &ModeInputs<'_>,
+        none: MissionOutput,
+    ) -> MissionOutput {
         let begun = self.begin(leg, inputs, |inputs| climb_to(height_m, inputs));
         let takeoff = begun.course.takeoff();
         let output = takeoff.map_or(none.output, |takeoff| takeoff.fly(inputs));
@@ -199,36 +210,42 @@ impl Mission {
     }
 
     /// Flies over the place at the present height, then lands. Lands where the vehicle is if the place is NaN.
-    fn land(&mut self, leg: &Leg, position_m: &Vector3<f32>, inputs: &ModeInputs<'_>, none: Progress) -> Progress {
+    fn land(
+        &mut self,
+        leg: &RequestedItem,
+        position_m: &Vector3<f32>,
+        inputs: &ModeInputs<'_>,
+        none: MissionOutput,
+    ) -> MissionOutput {
         let lands = Some((FlightMode::Land, leg.number));
         if is_here(position_m) {
-            return Progress { then: lands, ..none };
+            return MissionOutput { then: lands, ..none };
         }
         let height_m = inputs.present.position_m.z;
         // A take-off of zero height stores the height at which the item began.
-        let begun = self.begin(leg, inputs, |inputs| Course::Takeoff(Takeoff::new(inputs, 0.0)));
+        let begun = self.begin(leg, inputs, |inputs| ItemCourse::Takeoff(Takeoff::new(inputs, 0.0)));
         let height_m = begun.course.takeoff().map_or(height_m, |start| start.to_m.z);
         let over_m = Vector3::new(position_m.x, position_m.y, height_m);
         let then = lands.filter(|_| inputs.is_at(&over_m, 1.0) && is_slow(inputs));
-        Progress { output: ModeOutput::fly(inputs.to(over_m)), then, ..none }
+        MissionOutput { output: ModeOutput::fly(inputs.to(over_m)), then, ..none }
     }
 
     /// Flies circles around a centre at the highest allowed speed; counter-clockwise if the radius is positive.
     fn circle(
         &mut self,
-        leg: &Leg,
+        leg: &RequestedItem,
         centre_m: Vector3<f32>,
         [radius_m, turns]: [f32; 2],
         inputs: &ModeInputs<'_>,
-        none: Progress,
-    ) -> Progress {
+        none: MissionOutput,
+    ) -> MissionOutput {
         let radius = if radius_m == 0.0 { orbit::ORBIT_RADIUS_M } else { radius_m.abs() };
         let fast_m_s = min(orbit::speed_max_m_s(inputs.limits, radius), inputs.stop().speed_m_s);
         let begun = self.begin(leg, inputs, from_ground);
         if let Some(output) = begun.climb(inputs) {
-            return Progress { output, ..none };
+            return MissionOutput { output, ..none };
         }
-        let round = if let Course::Circle(round) = begun.course { round } else { Round::default() };
+        let round = if let ItemCourse::Circle(round) = begun.course { round } else { OrbitProgress::default() };
         let mut orbit = Orbit {
             centre_m,
             radius_m: radius,
@@ -238,15 +255,21 @@ impl Mission {
             round,
         };
         let output = orbit.fly(inputs);
-        begun.course = Course::Circle(orbit.round);
+        begun.course = ItemCourse::Circle(orbit.round);
         self.go_on(leg, output, None, none)
     }
 
     /// Turns by an angle, counted from the start of the item.
-    fn turn(&mut self, leg: &Leg, to_turn_rad: f32, inputs: &ModeInputs<'_>, none: Progress) -> Progress {
+    fn turn(
+        &mut self,
+        leg: &RequestedItem,
+        to_turn_rad: f32,
+        inputs: &ModeInputs<'_>,
+        none: MissionOutput,
+    ) -> MissionOutput {
         let first = self.begun.is_none_or(|begun| begun.number != leg.number);
         let present = inputs.present;
-        let begun = self.begin(leg, inputs, |_| Course::Straight);
+        let begun = self.begin(leg, inputs, |_| ItemCourse::Straight);
         // Subtract the setpoint's own rotation: a difference of headings cannot show more than half a turn.
         begun.yaw_rad = if first { to_turn_rad } else { begun.yaw_rad - present.yaw_rate_rad_s * inputs.dt_s };
         let left_rad = begun.yaw_rad;
@@ -260,7 +283,7 @@ impl Mission {
     }
 
     /// Holds the present place until `done`.
-    fn stay(&mut self, leg: &Leg, inputs: &ModeInputs<'_>, done: bool, none: Progress) -> Progress {
+    fn stay(&mut self, leg: &RequestedItem, inputs: &ModeInputs<'_>, done: bool, none: MissionOutput) -> MissionOutput {
         let output = ModeOutput { done, ..ModeOutput::fly(self.hold.fly(inputs)) };
         let at_m = self.hold.at_m;
         self.go_on(leg, output, at_m, none)
@@ -269,10 +292,10 @@ impl Mission {
     /// Returns the item in progress. Starts `leg` if another item was in progress.
     fn begin(
         &mut self,
-        leg: &Leg,
+        leg: &RequestedItem,
         inputs: &ModeInputs<'_>,
-        course: impl FnOnce(&ModeInputs<'_>) -> Course,
-    ) -> &mut Begun {
+        course: impl FnOnce(&ModeInputs<'_>) -> ItemCourse,
+    ) -> &mut ItemInProgress {
         if self.begun.is_some_and(|begun| begun.number != leg.number) {
             self.begun = None;
         }
@@ -281,46 +304,52 @@ impl Mission {
                 Item::Waypoint { position_m, .. } => inputs.towards(&position_m),
                 _ => f32::NAN,
             };
-            Begun { number: leg.number, yaw_rad, course: course(inputs), stayed_s: 0.0 }
+            ItemInProgress { number: leg.number, yaw_rad, course: course(inputs), stayed_s: 0.0 }
         })
     }
 
     /// Requests the next item if this one is done. The mission is done with its last item.
-    fn go_on(&mut self, leg: &Leg, output: ModeOutput, at_m: Option<Vector3<f32>>, none: Progress) -> Progress {
+    fn go_on(
+        &mut self,
+        leg: &RequestedItem,
+        output: ModeOutput,
+        at_m: Option<Vector3<f32>>,
+        none: MissionOutput,
+    ) -> MissionOutput {
         let done = output.done && leg.is_last;
         let reached = output.done.then_some(leg.number);
         if output.done {
             (self.begun, self.hold) = (None, Hold { at_m, ..Hold::default() });
             self.wanted = if leg.is_last { 0 } else { leg.number.saturating_add(1) };
         }
-        Progress { output: ModeOutput { done, ..output }, reached, ..none }
+        MissionOutput { output: ModeOutput { done, ..output }, reached, ..none }
     }
 }
 
-impl Begun {
+impl ItemInProgress {
     /// Climbs, if the item began on the ground. Returns `None` once the climb is done.
     fn climb(&mut self, inputs: &ModeInputs<'_>) -> Option<ModeOutput> {
         let output = self.course.takeoff()?.fly(inputs);
         if output.done {
-            self.course = Course::Straight;
+            self.course = ItemCourse::Straight;
         }
         Some(ModeOutput { done: false, ..output })
     }
 }
 
 /// Returns a straight course, preceded by a climb if the vehicle is on the ground.
-fn from_ground(inputs: &ModeInputs<'_>) -> Course {
+fn from_ground(inputs: &ModeInputs<'_>) -> ItemCourse {
     if inputs.airborne {
-        return Course::Straight;
+        return ItemCourse::Straight;
     }
     // This take-off, which no item asks for, must not leave the geofence.
     let room_m = max(inputs.ceiling_m - inputs.present.position_m.z, 0.0);
-    Course::Takeoff(Takeoff::new(inputs, min(inputs.flying.takeoff_height_m, room_m)))
+    ItemCourse::Takeoff(Takeoff::new(inputs, min(inputs.flying.takeoff_height_m, room_m)))
 }
 
 /// Returns a climb straight up to a height of the local frame, or of zero height if the vehicle is higher.
-fn climb_to(height_m: f32, inputs: &ModeInputs<'_>) -> Course {
-    Course::Takeoff(Takeoff::new(inputs, max(height_m - inputs.present.position_m.z, 0.0)))
+fn climb_to(height_m: f32, inputs: &ModeInputs<'_>) -> ItemCourse {
+    ItemCourse::Takeoff(Takeoff::new(inputs, max(height_m - inputs.present.position_m.z, 0.0)))
 }
 
 /// Returns the angle to turn from `present_rad`, positive to the left \[rad\].
@@ -352,15 +381,15 @@ fn is_here(position_m: &Vector3<f32>) -> bool {
 
 impl Item {
     /// Checks that the item can be flown: its numbers are plausible and, if home is known, its place is inside the
-    /// cylinder of `net` around home.
+    /// cylinder of `failsafe` around home.
     ///
     /// # Errors
     /// [`OrderRefusal::OutOfRange`] or [`OrderRefusal::OutsideFence`].
-    pub fn check(&self, net: &Net, home_m: Option<&Vector3<f32>>) -> Result<(), OrderRefusal> {
+    pub fn check(&self, failsafe: &FailsafeSettings, home_m: Option<&Vector3<f32>>) -> Result<(), OrderRefusal> {
         if !self.is_plausible() {
             return Err(OrderRefusal::OutOfRange);
         }
-        let inside = |home_m| self.place(home_m).is_none_or(|place_m| net.encloses(home_m, &place_m, 0.0));
+        let inside = |home_m| self.place(home_m).is_none_or(|place_m| failsafe.encloses(home_m, &place_m, 0.0));
         if home_m.is_none_or(inside) { Ok(()) } else { Err(OrderRefusal::OutsideFence) }
     }
 

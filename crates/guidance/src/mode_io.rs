@@ -1,7 +1,7 @@
 //! Inputs and outputs of a flight mode.
 
 use crate::limiter::LimiterTarget;
-use crate::settings::{Flying, Limits};
+use crate::settings::{FlightModeSettings, MotionLimits};
 use afbc_control::math::{max, min};
 use afbc_flight_core::RateTarget;
 use afbc_types::{Setpoint, State};
@@ -10,8 +10,8 @@ use nalgebra::Vector3;
 /// Inputs of a flight mode in a tick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ModeInputs<'a> {
-    pub(crate) flying: &'a Flying,
-    pub(crate) limits: &'a Limits,
+    pub(crate) flying: &'a FlightModeSettings,
+    pub(crate) limits: &'a MotionLimits,
     pub(crate) dt_s: f32,
     pub(crate) state: &'a State,
     /// Limited setpoint of the last tick.
@@ -37,7 +37,7 @@ impl ModeInputs<'_> {
 
     /// Returns a target that descends over the place `over_m`, or where the vehicle stops if that is NaN.
     pub(crate) fn down(&self, over_m: Vector3<f32>) -> LimiterTarget {
-        let Flying { land_m_s, land_slow_m, .. } = *self.flying;
+        let FlightModeSettings { land_m_s, land_slow_m, .. } = *self.flying;
         let above_m = self.present.position_m.z - self.home_m.z - land_slow_m;
         let share = if above_m > 0.0 { min(above_m / max(land_slow_m, 1.0), 1.0) } else { 0.0 };
         let fast_m_s = max(self.limits.down_m_s, land_m_s);

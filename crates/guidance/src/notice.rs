@@ -6,7 +6,7 @@ use core::fmt;
 /// Cause of a failsafe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
-pub enum Cause {
+pub enum FailsafeCause {
     /// The flight core descends because the state is lost.
     Descent,
     /// Charge below the emergency threshold.
@@ -27,32 +27,32 @@ pub enum Cause {
     Sticks,
 }
 
-impl Cause {
+impl FailsafeCause {
     /// All causes. Among those with the same action, an earlier one has precedence.
-    pub const ALL: [Cause; 9] = [
-        Cause::Descent,
-        Cause::BatteryEmergency,
-        Cause::BatteryCritical,
-        Cause::BatteryLow,
-        Cause::Fence,
-        Cause::Sensors,
-        Cause::Station,
-        Cause::Targets,
-        Cause::Sticks,
+    pub const ALL: [FailsafeCause; 9] = [
+        FailsafeCause::Descent,
+        FailsafeCause::BatteryEmergency,
+        FailsafeCause::BatteryCritical,
+        FailsafeCause::BatteryLow,
+        FailsafeCause::Fence,
+        FailsafeCause::Sensors,
+        FailsafeCause::Station,
+        FailsafeCause::Targets,
+        FailsafeCause::Sticks,
     ];
 
     /// Returns the cause in words.
     pub const fn name(self) -> &'static str {
         match self {
-            Cause::Descent => "no state, flight core descends",
-            Cause::BatteryEmergency => "battery almost empty",
-            Cause::BatteryCritical => "battery critical",
-            Cause::BatteryLow => "battery low",
-            Cause::Fence => "at the geofence",
-            Cause::Sensors => "sensor fault",
-            Cause::Station => "station lost",
-            Cause::Targets => "no targets",
-            Cause::Sticks => "no sticks",
+            FailsafeCause::Descent => "no state, flight core descends",
+            FailsafeCause::BatteryEmergency => "battery almost empty",
+            FailsafeCause::BatteryCritical => "battery critical",
+            FailsafeCause::BatteryLow => "battery low",
+            FailsafeCause::Fence => "at the geofence",
+            FailsafeCause::Sensors => "sensor fault",
+            FailsafeCause::Station => "station lost",
+            FailsafeCause::Targets => "no targets",
+            FailsafeCause::Sticks => "no sticks",
         }
     }
 }
@@ -74,8 +74,8 @@ pub enum ModeReason {
     Disarmed,
     /// The state is back after a loss, and the interrupted mode resumes.
     Back,
-    /// The safety net selects the mode.
-    Failsafe(Cause),
+    /// A failsafe selects the mode.
+    Failsafe(FailsafeCause),
 }
 
 impl ModeReason {
@@ -112,50 +112,52 @@ pub enum Severity {
 /// An announcement. Its text by [`Display`](fmt::Display) has at most 50 characters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
-pub enum Notice {
+pub enum GuidanceNotice {
     /// The mode has changed.
     Mode(FlightMode, ModeReason),
-    /// The safety net has found a cause that does not change the mode.
-    Found(Cause),
+    /// The failsafe checks have found a cause that does not change the mode.
+    Found(FailsafeCause),
     /// A cause has ended.
-    Over(Cause),
+    Over(FailsafeCause),
     /// The guidance disarms a vehicle on the ground.
     Disarms,
     /// A mission item lies outside the geofence or is not plausible.
     ItemRefused,
 }
 
-impl Notice {
+impl GuidanceNotice {
     /// Returns the announcement's urgency.
     pub const fn severity(self) -> Severity {
         match self {
-            Notice::Mode(_, ModeReason::Failsafe(cause)) | Notice::Found(cause) => match cause {
-                Cause::Descent | Cause::BatteryEmergency | Cause::BatteryCritical => Severity::Critical,
-                Cause::Fence | Cause::Sensors | Cause::Station => Severity::Error,
-                Cause::BatteryLow | Cause::Targets | Cause::Sticks => Severity::Warning,
+            GuidanceNotice::Mode(_, ModeReason::Failsafe(cause)) | GuidanceNotice::Found(cause) => match cause {
+                FailsafeCause::Descent | FailsafeCause::BatteryEmergency | FailsafeCause::BatteryCritical => {
+                    Severity::Critical
+                }
+                FailsafeCause::Fence | FailsafeCause::Sensors | FailsafeCause::Station => Severity::Error,
+                FailsafeCause::BatteryLow | FailsafeCause::Targets | FailsafeCause::Sticks => Severity::Warning,
             },
-            Notice::Mode(_, ModeReason::NoLift) => Severity::Error,
-            Notice::ItemRefused => Severity::Warning,
-            Notice::Disarms | Notice::Over(_) => Severity::Notice,
-            Notice::Mode(..) => Severity::Info,
+            GuidanceNotice::Mode(_, ModeReason::NoLift) => Severity::Error,
+            GuidanceNotice::ItemRefused => Severity::Warning,
+            GuidanceNotice::Disarms | GuidanceNotice::Over(_) => Severity::Notice,
+            GuidanceNotice::Mode(..) => Severity::Info,
         }
     }
 }
 
-impl Notice {
+impl GuidanceNotice {
     /// Returns the text in parts, for callers that do not use `core::fmt`.
     pub const fn parts(self) -> [&'static str; 3] {
         match self {
-            Notice::Mode(mode, reason) => [mode.name(), ": ", reason.name()],
-            Notice::Found(cause) => [cause.name(), "", ""],
-            Notice::Over(cause) => ["no longer: ", cause.name(), ""],
-            Notice::Disarms => ["on the ground: disarming", "", ""],
-            Notice::ItemRefused => ["mission stopped: an item cannot be flown", "", ""],
+            GuidanceNotice::Mode(mode, reason) => [mode.name(), ": ", reason.name()],
+            GuidanceNotice::Found(cause) => [cause.name(), "", ""],
+            GuidanceNotice::Over(cause) => ["no longer: ", cause.name(), ""],
+            GuidanceNotice::Disarms => ["on the ground: disarming", "", ""],
+            GuidanceNotice::ItemRefused => ["mission stopped: an item cannot be flown", "", ""],
         }
     }
 }
 
-impl fmt::Display for Notice {
+impl fmt::Display for GuidanceNotice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.parts().into_iter().try_for_each(|part| f.write_str(part))
     }
@@ -166,18 +168,18 @@ pub const NOTICES_MAX: usize = 8;
 
 /// The announcements of a tick, oldest first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Notices([Option<Notice>; NOTICES_MAX]);
+pub struct GuidanceNotices([Option<GuidanceNotice>; NOTICES_MAX]);
 
-impl Notices {
+impl GuidanceNotices {
     /// Adds an announcement; drops it if there are already [`NOTICES_MAX`].
-    pub(crate) fn push(&mut self, notice: Notice) {
+    pub(crate) fn push(&mut self, notice: GuidanceNotice) {
         if let Some(place) = self.0.iter_mut().find(|place| place.is_none()) {
             *place = Some(notice);
         }
     }
 
     /// Returns the announcements, oldest first.
-    pub fn iter(&self) -> impl Iterator<Item = Notice> {
+    pub fn iter(&self) -> impl Iterator<Item = GuidanceNotice> {
         self.0.iter().map_while(|notice| *notice)
     }
 }

@@ -3,7 +3,7 @@
 use crate::limiter::LimiterTarget;
 use crate::mode_io::{ModeInputs, ModeOutput};
 use crate::order::OrbitHeading;
-use crate::settings::Limits;
+use crate::settings::MotionLimits;
 use afbc_control::math::{cos, max, min, sin, sqrt, wrap_angle};
 use core::f32::consts::{FRAC_PI_2, PI};
 use nalgebra::Vector3;
@@ -30,12 +30,12 @@ pub(crate) struct Orbit {
     pub(crate) heading: OrbitHeading,
     /// Angle to fly; infinite for an endless orbit \[rad\].
     pub(crate) angle_rad: f32,
-    pub(crate) round: Round,
+    pub(crate) round: OrbitProgress,
 }
 
 /// Progress of an orbit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Round {
+pub(crate) struct OrbitProgress {
     /// Direction from the centre to the present place; none until the circle is reached \[rad\].
     at_rad: Option<f32>,
     turned_rad: f32,
@@ -46,7 +46,7 @@ pub(crate) struct Round {
 }
 
 /// Returns the largest speed on a circle of this radius \[m/s\].
-pub(crate) fn speed_max_m_s(limits: &Limits, radius_m: f32) -> f32 {
+pub(crate) fn speed_max_m_s(limits: &MotionLimits, radius_m: f32) -> f32 {
     // The centripetal acceleration is v^2/r.
     min(limits.speed_m_s, sqrt(SHARE * limits.acceleration_m_s2 * radius_m))
 }

@@ -1,6 +1,6 @@
 //! Orders, targets, sticks and mission items that a station, a companion computer or a pilot may send.
 
-use crate::fence::FenceView;
+use crate::fence::FenceStatus;
 use crate::mode::FlightMode;
 use afbc_flight_core::{Queue, Stamped};
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
@@ -208,7 +208,7 @@ pub enum Item {
 /// Mission item that the guidance has [requested](crate::Order::Resume).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Leg {
+pub struct RequestedItem {
     /// Number of the item.
     pub number: u16,
     /// Number of the upload of the mission, which tells missions apart.
@@ -228,11 +228,11 @@ pub struct Orders {
     /// Newest sticks of a pilot.
     pub sticks: Option<Stamped<Sticks>>,
     /// Mission item requested last.
-    pub leg: Option<Leg>,
+    pub leg: Option<RequestedItem>,
     /// Time at which the controlling station was last heard; `None` if never \[us\].
     pub heard_us: Option<u64>,
     /// State of the uploaded geofence; `None` without one.
-    pub fence: Option<FenceView>,
+    pub fence: Option<FenceStatus>,
     /// Place where a return lands: the nearest of home and the rally points; `None` for home \[m\].
     pub safe_m: Option<Vector2<f32>>,
     /// Pending orders. Each tick of the guidance answers the oldest.

@@ -1,14 +1,14 @@
 //! Parameters of the guidance. Where the meaning is PX4's, so are the name and the numbers of the actions.
 
-use crate::fence::Braking;
-use crate::net::Net;
+use crate::failsafe::FailsafeSettings;
+use crate::fence::BrakingLimits;
 use afbc_types::{Range, parameters};
 
 parameters! {
     /// Limits of the trajectory limiter.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-    pub struct Limits {
+    pub struct MotionLimits {
         /// Largest horizontal speed.
         #[parameter(MPC_XY_VEL_MAX, "m/s", 0.1..=40.0)]
         pub speed_m_s: f32 = 12.0,
@@ -42,15 +42,15 @@ parameters! {
     }
     together(limits) {
         let least = |range: Range, least: f32| Range { min: least.into(), ..range };
-        least(Limits::MPC_ACC_HOR_MAX.range, limits.acceleration_m_s2).check(limits.acceleration_max_m_s2)?;
-        least(Limits::MPC_JERK_MAX.range, limits.jerk_m_s3).check(limits.jerk_max_m_s3)
+        least(MotionLimits::MPC_ACC_HOR_MAX.range, limits.acceleration_m_s2).check(limits.acceleration_max_m_s2)?;
+        least(MotionLimits::MPC_JERK_MAX.range, limits.jerk_m_s3).check(limits.jerk_max_m_s3)
     }
 }
 
-impl Limits {
+impl MotionLimits {
     /// Returns the limits that the vehicle brakes with before a geofence.
-    pub const fn braking(&self) -> Braking {
-        Braking::new(self.acceleration_m_s2, self.jerk_m_s3)
+    pub const fn braking(&self) -> BrakingLimits {
+        BrakingLimits::new(self.acceleration_m_s2, self.jerk_m_s3)
     }
 }
 
@@ -58,7 +58,7 @@ parameters! {
     /// Parameters of the flight modes.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-    pub struct Flying {
+    pub struct FlightModeSettings {
         /// Height of take-off above where the vehicle stands.
         #[parameter(MIS_TAKEOFF_ALT, "m", 0.3..=100.0)]
         pub takeoff_height_m: f32 = 2.5,
@@ -117,12 +117,12 @@ parameters! {
     pub struct Settings {
         /// Limits of the trajectory limiter.
         #[group("")]
-        pub limits: Limits = Limits::DEFAULT,
+        pub limits: MotionLimits = MotionLimits::DEFAULT,
         /// How the modes fly.
         #[group("")]
-        pub flying: Flying = Flying::DEFAULT,
-        /// The safety net.
+        pub flying: FlightModeSettings = FlightModeSettings::DEFAULT,
+        /// Failsafes.
         #[group("")]
-        pub net: Net = Net::DEFAULT,
+        pub failsafe: FailsafeSettings = FailsafeSettings::DEFAULT,
     }
 }

@@ -31,7 +31,7 @@ const AIM: f32 = 0.98;
 /// Position and three derivatives. The position is kept in two parts, since far from the origin a step is smaller than
 /// the resolution of one number.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Motion<const D: usize> {
+pub(crate) struct MotionState<const D: usize> {
     pub(crate) position: SVector<f32, D>,
     below: SVector<f32, D>,
     pub(crate) velocity: SVector<f32, D>,
@@ -39,11 +39,11 @@ pub(crate) struct Motion<const D: usize> {
     pub(crate) jerk: SVector<f32, D>,
 }
 
-impl<const D: usize> Motion<D> {
+impl<const D: usize> MotionState<D> {
     /// Makes a motion without acceleration or jerk.
     pub(crate) fn new(position: SVector<f32, D>, velocity: SVector<f32, D>) -> Self {
         let zero = SVector::zeros();
-        Motion { position, below: zero, velocity, acceleration: zero, jerk: zero }
+        MotionState { position, below: zero, velocity, acceleration: zero, jerk: zero }
     }
 
     /// Makes a motion from position, velocity, acceleration and jerk.
@@ -53,7 +53,7 @@ impl<const D: usize> Motion<D> {
         acceleration: SVector<f32, D>,
         jerk: SVector<f32, D>,
     ) -> Self {
-        Motion { acceleration, jerk, ..Motion::new(position, velocity) }
+        MotionState { acceleration, jerk, ..MotionState::new(position, velocity) }
     }
 
     /// Returns the vector to `position`.
@@ -63,7 +63,7 @@ impl<const D: usize> Motion<D> {
 
     /// Advances the motion by a step of constant `jerk`.
     pub(crate) fn advance(&mut self, jerk: SVector<f32, D>, dt_s: f32) {
-        let Motion { velocity, acceleration, .. } = *self;
+        let MotionState { velocity, acceleration, .. } = *self;
         self.below += (velocity + (acceleration * 0.5 + jerk * (dt_s / 6.0)) * dt_s) * dt_s;
         let position = self.position + self.below;
         self.below -= position - self.position;
@@ -76,7 +76,7 @@ impl<const D: usize> Motion<D> {
 
 /// Goal of a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Goal<const D: usize> {
+pub(crate) struct MotionGoal<const D: usize> {
     /// `None` if only velocity or acceleration is given.
     pub(crate) position: Option<SVector<f32, D>>,
     /// `None` if only the acceleration is given.
@@ -87,7 +87,7 @@ pub(crate) struct Goal<const D: usize> {
 
 /// Limits that may change from tick to tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Reach {
+pub(crate) struct MotionBounds {
     /// Largest speed of approach, in positive and in negative direction; for a vector of two coordinates, the first
     /// counts.
     pub(crate) approach: (f32, f32),
@@ -100,7 +100,7 @@ pub(crate) struct Reach {
 
 /// Constants of the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Shape {
+pub(crate) struct MotionShaper {
     acceleration: f32,
     jerk: f32,
     /// B, c, J", d, 1/k2 and k3 of the module's documentation.
@@ -112,14 +112,14 @@ pub(crate) struct Shape {
     k3: f32,
 }
 
-impl Shape {
+impl MotionShaper {
     /// Makes the constants for this largest acceleration and jerk, both positive.
     pub(crate) fn new(acceleration: f32, jerk: f32) -> Self {
         let braking = BRAKING * acceleration;
         let k1 = min(EASING * jerk / (2.0 * braking), APPROACH_MAX_1_S);
         let k2 = 4.0 * k1;
         let settling = SETTLING * jerk;
-        Shape {
+        MotionShaper {
             acceleration,
             jerk,
             braking,
@@ -140,7 +140,7 @@ impl Shape {
     /// Returns the distance of a stop from this speed for a vehicle that already decelerates by `braking`. The
     /// deceleration first builds up with J to A, and decreases along g near the end.
     pub(crate) fn stop(&self, speed: f32, braking: f32) -> f32 {
-        let Shape { acceleration, jerk, settling, d, .. } = *self;
+        let MotionShaper { acceleration, jerk, settling, d, .. } = *self;
         let missing = max(acceleration - braking, 0.0);
         let builds_up_s = missing * missing / (2.0 * acceleration * jerk);
         // Speed at which g reaches A. Below it, the distance is the integral of x/g(x).
@@ -151,7 +151,13 @@ impl Shape {
     }
 
     /// Advances `motion` by one step towards `goal`.
-    pub(crate) fn advance<const D: usize>(&self, motion: &mut Motion<D>, goal: &Goal<D>, reach: &Reach, dt_s: f32) {
+    pub(crate) fn advance<const D: usize>(
+        &self,
+        motion: &mut MotionState<D>,
+        goal: &MotionGoal<D>,
+        reach: &MotionBounds,
+        dt_s: f32,
+    ) {
         let (wanted, change) = self.wanted(motion, goal, reach);
         let x = wanted - motion.velocity;
         // g(x)/x and the derivative g'.
@@ -183,8 +189,8 @@ impl Shape {
     fn guarded<const D: usize>(
         &self,
         wanted: SVector<f32, D>,
-        motion: &Motion<D>,
-        reach: &Reach,
+        motion: &MotionState<D>,
+        reach: &MotionBounds,
     ) -> Option<(SVector<f32, D>, SVector<f32, D>)> {
         let size_squared = wanted.norm_squared();
         if size_squared <= 0.0 {
@@ -207,9 +213,9 @@ impl Shape {
     /// Returns the wanted velocity, and its derivative without the goal's acceleration.
     fn wanted<const D: usize>(
         &self,
-        motion: &Motion<D>,
-        goal: &Goal<D>,
-        reach: &Reach,
+        motion: &MotionState<D>,
+        goal: &MotionGoal<D>,
+        reach: &MotionBounds,
     ) -> (SVector<f32, D>, SVector<f32, D>) {
         let zero = SVector::zeros();
         let Some(velocity) = goal.velocity else {

@@ -1,11 +1,11 @@
 //! Manual modes: turns the pilot's sticks into a mode's output.
 
-use crate::lift::Lift;
+use crate::available_thrust::AvailableThrust;
 use crate::limiter::LimiterTarget;
 use crate::mode::FlightMode;
 use crate::mode_io::{ModeInputs, ModeOutput, Shaping};
 use crate::order::Sticks;
-use crate::settings::Flying;
+use crate::settings::FlightModeSettings;
 use afbc_control::math::{cos, max, min, sin, tan};
 use afbc_flight_core::RateTarget;
 use afbc_types::Setpoint;
@@ -22,7 +22,7 @@ pub(crate) fn is_plausible(sticks: &Sticks) -> bool {
 }
 
 /// Returns the output of a [manual](FlightMode::is_manual) mode for these sticks.
-pub(crate) fn fly(mode: FlightMode, sticks: &Sticks, inputs: &ModeInputs<'_>, lift: &Lift) -> ModeOutput {
+pub(crate) fn fly(mode: FlightMode, sticks: &Sticks, inputs: &ModeInputs<'_>, lift: &AvailableThrust) -> ModeOutput {
     let centred = |stick: f32| if stick.abs() <= CENTRE { 0.0 } else { stick };
     let (forward, left) = (centred(sticks.pitch), -centred(sticks.roll));
     let (throttle, yaw_rate_rad_s) = (centred(sticks.throttle), -centred(sticks.yaw) * inputs.limits.yaw_rate_rad_s);
@@ -49,7 +49,7 @@ pub(crate) fn fly(mode: FlightMode, sticks: &Sticks, inputs: &ModeInputs<'_>, li
             Shaping::Leaning(LimiterTarget { velocity_m_s, ..aim }, turned(tilt_m_s2(forward), tilt_m_s2(left)))
         }
         FlightMode::Acro => {
-            let Flying { acro_roll_deg_s, acro_pitch_deg_s, acro_yaw_deg_s, .. } = inputs.flying;
+            let FlightModeSettings { acro_roll_deg_s, acro_pitch_deg_s, acro_yaw_deg_s, .. } = inputs.flying;
             // Without the dead band around the centre: the pilot's transmitter may add its own.
             let rates_deg_s =
                 [sticks.roll * acro_roll_deg_s, sticks.pitch * acro_pitch_deg_s, -sticks.yaw * acro_yaw_deg_s];

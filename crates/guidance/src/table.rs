@@ -4,7 +4,7 @@
 use crate::mode::FlightMode;
 use crate::order::OrderRefusal;
 
-/// Action of the safety net, from the weakest to the strongest.
+/// Action of a failsafe, from the weakest to the strongest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FailsafeAction {
     /// No action.
@@ -61,12 +61,12 @@ pub struct TransitionInputs {
     pub targets: bool,
     /// There are fresh sticks of a pilot.
     pub sticks: bool,
-    /// Action that the safety net demands.
+    /// Action that the failsafes demand.
     pub held: FailsafeAction,
 }
 
 impl TransitionInputs {
-    /// Returns the action demanded by flight core and safety net together.
+    /// Returns the action demanded by flight core and failsafes together.
     fn demanded(&self) -> FailsafeAction {
         if self.armed && self.descends { FailsafeAction::Land } else { self.held }
     }

@@ -8,12 +8,12 @@
 
 mod bench;
 mod endings;
+mod failsafe;
 mod fixture;
 mod fuzz;
 mod items;
 mod limiter;
 mod modes;
-mod net;
 mod outages;
 mod resets;
 mod table;

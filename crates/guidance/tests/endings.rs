@@ -25,8 +25,8 @@ fn after_a_flight_it_holds() {
         (fixture.core, fixture.airborne) = (Mode::Disarmed, false);
         let guided = fixture.tick();
         assert_eq!((guided.mode, guided.request), (becomes, None));
-        let reported: &[Notice] =
-            if mode == becomes { &[] } else { &[Notice::Mode(FlightMode::Hold, ModeReason::Disarmed)] };
+        let reported: &[GuidanceNotice] =
+            if mode == becomes { &[] } else { &[GuidanceNotice::Mode(FlightMode::Hold, ModeReason::Disarmed)] };
         assert_eq!(fixture.said, reported, "{mode:?}");
     }
 }
@@ -45,21 +45,22 @@ fn it_asks_to_disarm_on_the_ground() {
         fixture
     };
     let timed = |before: f32, after: f32| {
-        let flying = Flying { disarm_before_s: before, disarm_after_s: after, ..Flying::DEFAULT };
+        let flying =
+            FlightModeSettings { disarm_before_s: before, disarm_after_s: after, ..FlightModeSettings::DEFAULT };
         Settings { flying, ..Settings::DEFAULT }
     };
     let mut fixture = armed(timed(1.0, 0.5));
     let times = asks(&mut fixture, 1400);
     assert!(times.len() == 4 && (998..=1002).contains(times.first().unwrap()), "{times:?}");
     assert!(times.iter().zip(times.iter().skip(1)).all(|(one, next)| (99..=101).contains(&(next - one))), "{times:?}");
-    assert_eq!(fixture.said, [Notice::Disarms]);
+    assert_eq!(fixture.said, [GuidanceNotice::Disarms]);
     // After a flight another time applies, from touchdown on.
     fixture.airborne = true;
     assert_eq!(asks(&mut fixture, 3000), []);
     fixture.airborne = false;
     let times = asks(&mut fixture, 600);
     assert!((498..=502).contains(times.first().unwrap()), "{times:?}");
-    assert_eq!(fixture.said, [Notice::Disarms; 2]);
+    assert_eq!(fixture.said, [GuidanceNotice::Disarms; 2]);
     assert_eq!(asks(&mut armed(timed(0.0, 0.0)), 5000), [], "never");
     // Disarming in between restarts the time.
     let mut fixture = armed(timed(1.0, 0.5));
@@ -85,13 +86,13 @@ fn it_asks_to_disarm_on_the_ground() {
 #[test]
 fn what_bars_arming_has_its_limits() {
     let bars = |change: &dyn Fn(&mut Fixture)| {
-        let net = Net { cells: 3, fence_radius_m: 10.0, ..Net::DEFAULT };
-        let mut fixture = Fixture::new(Settings { net, ..Settings::DEFAULT });
+        let failsafe = FailsafeSettings { cells: 3, fence_radius_m: 10.0, ..FailsafeSettings::DEFAULT };
+        let mut fixture = Fixture::new(Settings { failsafe, ..Settings::DEFAULT });
         fixture.battery = Some(BatteryReading { voltage_v: 11.7, current_a: 0.0, charge: None });
         fixture.run(1100);
         change(&mut fixture);
         fixture.tick();
-        fixture.guidance.against().iter().collect::<Vec<_>>()
+        fixture.guidance.arming_refusals().iter().collect::<Vec<_>>()
     };
     assert_eq!(bars(&|_| ()), []);
     assert_eq!(bars(&|fixture| fixture.state.as_mut().unwrap().position_m.x = 10.9), [], "10 m from home, at x = 1 m");
@@ -111,12 +112,12 @@ fn what_bars_arming_has_its_limits() {
     // A battery without cells is not monitored. With cells, its charge is unknown before the first plausible reading.
     let mut fixture = Fixture::new(Settings::DEFAULT);
     fixture.run(1100);
-    assert!(fixture.guidance.against().is_empty());
-    let net = Net { cells: 3, ..Net::DEFAULT };
-    let mut fixture = Fixture::new(Settings { net, ..Settings::DEFAULT });
+    assert!(fixture.guidance.arming_refusals().is_empty());
+    let failsafe = FailsafeSettings { cells: 3, ..FailsafeSettings::DEFAULT };
+    let mut fixture = Fixture::new(Settings { failsafe, ..Settings::DEFAULT });
     fixture.battery = Some(BatteryReading { voltage_v: NAN, current_a: 0.0, charge: None });
     fixture.run(1100);
-    assert!(fixture.guidance.against().iter().eq([Refusal::BatteryLow]));
+    assert!(fixture.guidance.arming_refusals().iter().eq([Refusal::BatteryLow]));
 }
 
 /// The setpoint restarts at a vehicle farther away than a limit, which is tighter when the mode changes or the state
@@ -195,11 +196,11 @@ fn a_takeoff_without_lift_is_given_up() {
     let (after, mode, said, rests) = takes_off(false, None, 0.0);
     assert!(after.is_some_and(|ticks| (9_990..10_010).contains(&ticks)), "{after:?}");
     assert_eq!((mode, rests), (FlightMode::Hold, true));
-    assert_eq!(said, [Notice::Mode(FlightMode::Hold, ModeReason::NoLift)]);
+    assert_eq!(said, [GuidanceNotice::Mode(FlightMode::Hold, ModeReason::NoLift)]);
     let (after, mode, said, rests) = takes_off(true, exhausted, 0.9 * LEFT_M);
     assert!(after.is_some_and(|ticks| (9_990..10_010).contains(&ticks)), "{after:?}");
     assert_eq!((mode, rests), (FlightMode::Land, false));
-    assert_eq!(said, [Notice::Mode(FlightMode::Land, ModeReason::NoLift)]);
+    assert_eq!(said, [GuidanceNotice::Mode(FlightMode::Land, ModeReason::NoLift)]);
     // With thrust in reserve it counts as flying, unless it does not follow: the setpoint is 1 m away after about a
     // second.
     for given_m_s2 in [Some(1.7 * G), None] {
@@ -269,17 +270,17 @@ fn what_is_reached_is_held() {
     assert_eq!((fixture.guidance.mode(), fixture.place()), (FlightMode::Hold, Vector3::new(1.0, 2.0, 7.0)));
     let end = Vector3::new(6.0, 2.0, 7.0);
     let item = Item::Waypoint { position_m: end, yaw_rad: NAN, hold_s: 0.0, within_m: 1.5, fly_through: true };
-    fixture.orders.leg = Some(Leg { number: 0, upload: 1, item, is_last: true });
+    fixture.orders.leg = Some(RequestedItem { number: 0, upload: 1, item, is_last: true });
     fixture.select(FlightMode::Mission).unwrap();
     fixture.run(12_000);
     assert_eq!((fixture.guidance.mode(), fixture.place()), (FlightMode::Hold, end), "not where it was within 1.5 m");
     // An item that cannot be flown ends the mission at the present place.
-    fixture.orders.leg = Some(Leg { number: 0, upload: 2, item: Item::Speed(NAN), is_last: true });
+    fixture.orders.leg = Some(RequestedItem { number: 0, upload: 2, item: Item::Speed(NAN), is_last: true });
     fixture.said.clear();
     fixture.select(FlightMode::Mission).unwrap();
     fixture.run(3000);
     assert_eq!((fixture.guidance.mode(), fixture.place()), (FlightMode::Hold, end));
-    assert!(fixture.said.contains(&Notice::ItemRefused), "{:?}", fixture.said);
+    assert!(fixture.said.contains(&GuidanceNotice::ItemRefused), "{:?}", fixture.said);
     // On the ground, hold is where the vehicle stands.
     fixture.airborne = false;
     fixture.state = Some(at(3.0, 3.0, 3.0));
@@ -295,14 +296,15 @@ fn a_mission_may_end_in_another_mode() {
     for airborne in [true, false] {
         let mut fixture = Fixture::flying(Settings::DEFAULT);
         fixture.airborne = airborne;
-        fixture.orders.leg = Some(Leg { number: 0, upload: 1, item: Item::Return, is_last: true });
+        fixture.orders.leg = Some(RequestedItem { number: 0, upload: 1, item: Item::Return, is_last: true });
         fixture.said.clear();
         fixture.select(FlightMode::Mission).unwrap();
         assert_eq!(fixture.guidance.mode(), FlightMode::Return);
         let modes = [FlightMode::Mission, FlightMode::Return];
         let reasons = [ModeReason::Ordered, ModeReason::Mission];
-        let expected = modes.into_iter().zip(reasons).map(|(mode, reason)| Notice::Mode(mode, reason));
-        let reported: Vec<_> = fixture.said.iter().filter(|notice| **notice != Notice::Disarms).copied().collect();
+        let expected = modes.into_iter().zip(reasons).map(|(mode, reason)| GuidanceNotice::Mode(mode, reason));
+        let reported: Vec<_> =
+            fixture.said.iter().filter(|notice| **notice != GuidanceNotice::Disarms).copied().collect();
         assert_eq!(reported, expected.collect::<Vec<_>>());
     }
 }
@@ -348,15 +350,15 @@ fn a_mission_that_is_cleared_is_not_flown_on() {
             within_m: 0.0,
             fly_through: false,
         };
-        fixture.orders.leg = Some(Leg { number: 0, upload: 1, item, is_last: true });
+        fixture.orders.leg = Some(RequestedItem { number: 0, upload: 1, item, is_last: true });
         fixture.select(FlightMode::Mission).unwrap();
         fixture.run(3000);
         assert_eq!(fixture.guidance.mode(), FlightMode::Mission);
-        fixture.orders.leg = Some(Leg { number: 0, upload: 2, item: Item::None, is_last: true });
+        fixture.orders.leg = Some(RequestedItem { number: 0, upload: 2, item: Item::None, is_last: true });
         fixture.said.clear();
         fixture.run(5000);
         assert_eq!(fixture.guidance.mode(), FlightMode::Hold);
-        assert_eq!(fixture.said.first(), Some(&Notice::Mode(FlightMode::Hold, ModeReason::Cleared)));
+        assert_eq!(fixture.said.first(), Some(&GuidanceNotice::Mode(FlightMode::Hold, ModeReason::Cleared)));
         assert!(fixture.place().x < 50.0, "{}", fixture.place());
         assert_eq!(fixture.select(FlightMode::Mission), Err(OrderRefusal::NoMission));
         assert_eq!(fixture.would(Order::Resume(0)), Err(OrderRefusal::NoMission));
@@ -367,7 +369,7 @@ fn a_mission_that_is_cleared_is_not_flown_on() {
 #[test]
 fn an_item_is_chosen_of_the_mission_that_there_is() {
     let mut fixture = Fixture::flying(Settings::DEFAULT);
-    let leg = |upload| Some(Leg { number: 2, upload, item: Item::Wait(60.0), is_last: true });
+    let leg = |upload| Some(RequestedItem { number: 2, upload, item: Item::Wait(60.0), is_last: true });
     fixture.orders.leg = leg(1);
     fixture.order(Order::Resume(2)).unwrap();
     fixture.select(FlightMode::Mission).unwrap();

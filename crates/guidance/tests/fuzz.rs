@@ -185,7 +185,7 @@ fn check(
     settings: &Settings,
     sight: &GuidanceInputs<'_>,
     orders: &Orders,
-    guided: &Guided,
+    guided: &GuidanceOutputs,
 ) -> Result<(), TestCaseError> {
     prop_assert_eq!(guided.answer.is_some(), !orders.given.is_empty());
     prop_assert!(guided.notices.iter().all(|notice| notice.to_string().len() <= 50));
@@ -205,7 +205,7 @@ fn check(
     prop_assert!(v.z <= limits.up_m_s * hair && -v.z <= limits.down_m_s * hair, "{:?}", setpoint);
     // While landing, the setpoint may command a thrust well below the weight.
     let lands = matches!(guided.mode, FlightMode::Land | FlightMode::Return);
-    let off = a + Vector3::new(0.0, 0.0, 0.7 * sight.lift.gravity_m_s2);
+    let off = a + Vector3::new(0.0, 0.0, 0.7 * sight.available_thrust.gravity_m_s2);
     let settles = lands && off.xy().norm() <= 5.0 * hair && off.z.abs() <= 5.0 * hair;
     prop_assert!(settles || a.xy().norm() <= limits.acceleration_max_m_s2 * hair, "{:?}", setpoint);
     prop_assert!(settles || a.z.abs() <= limits.vertical_acceleration_m_s2 * hair, "{:?}", setpoint);
@@ -217,7 +217,8 @@ proptest! {
 
     #[test]
     fn nothing_absurd_comes_out(spells in proptest::collection::vec(spell(), 1..40)) {
-        let settings = Settings { net: Net { cells: 3, ..Net::DEFAULT }, ..Settings::DEFAULT };
+        let failsafe = FailsafeSettings { cells: 3, ..FailsafeSettings::DEFAULT };
+        let settings = Settings { failsafe, ..Settings::DEFAULT };
         let mut guidance = Guidance::new(settings).unwrap();
         let mut now_us = 5_000_000_u64;
         for spell in spells {
@@ -229,13 +230,15 @@ proptest! {
                 let mut orders = Orders {
                     target: spell.target.map(|value| Stamped { value, at_us }),
                     sticks: sticks.map(|value| Stamped { value, at_us }),
-                    leg: spell.item.map(|(number, upload, item, is_last)| Leg { number, upload, item, is_last }),
+                    leg: spell
+                        .item
+                        .map(|(number, upload, item, is_last)| RequestedItem { number, upload, item, is_last }),
                     heard_us: Some(at_us),
                     safe_m: spell.target.and_then(|target| match target {
                         OffboardTarget::Motion(motion) => Some(motion.velocity_m_s.xy()),
                         OffboardTarget::Attitude(_) => None,
                     }),
-                    fence: spell.fence.map(|(leaves, outside)| FenceView { leaves, outside }),
+                    fence: spell.fence.map(|(leaves, outside)| FenceStatus { leaves, outside }),
                     given: Queue::new(),
                 };
                 orders.given.extend(given);
@@ -251,7 +254,11 @@ proptest! {
                         .battery
                         .map(|(voltage_v, current_a)| BatteryReading { voltage_v, current_a, charge: None }),
                     sensors: FailedSensors { gnss: !spell.fresh, ..FailedSensors::default() },
-                    lift: Lift { most_m_s2: spell.lift.0, gravity_m_s2: spell.lift.1, given_m_s2: Some(spell.lift.0) },
+                    available_thrust: AvailableThrust {
+                        most_m_s2: spell.lift.0,
+                        gravity_m_s2: spell.lift.1,
+                        given_m_s2: Some(spell.lift.0),
+                    },
                 };
                 let guided = guidance.tick(&sight, &orders);
                 check(&settings, &sight, &orders, &guided)?;

@@ -64,7 +64,7 @@ fn a_circle_ends_after_its_angle() {
     let end = centre.xy() + nalgebra::Vector2::new(-near.y, near.x) * 10.0;
     assert!(took > 7.0 && (bench.state.position_m.xy() - end).norm() < 0.3, "{took} s, {}", bench.state.position_m);
     assert!(
-        bench.said.contains(&Notice::Mode(FlightMode::Hold, ModeReason::Done))
+        bench.said.contains(&GuidanceNotice::Mode(FlightMode::Hold, ModeReason::Done))
             || bench.guidance.mode() == FlightMode::Hold
     );
 }
@@ -94,7 +94,8 @@ fn a_circle_that_cannot_be_flown_is_refused() {
     bench.run(20.0);
     assert!(((bench.state.position_m - here).xy().norm() - 10.0).abs() < 0.5);
     // The fence around home.
-    let fenced = Settings { net: Net { fence_radius_m: 25.0, ..Net::DEFAULT }, ..settings() };
+    let fenced =
+        Settings { failsafe: FailsafeSettings { fence_radius_m: 25.0, ..FailsafeSettings::DEFAULT }, ..settings() };
     let mut bench = Bench::hovering(fenced);
     assert_eq!(bench.order(around(Vector3::new(16.0, 0.0, 5.0))), Err(OrderRefusal::OutsideFence));
     assert_eq!(bench.order(around(Vector3::new(14.0, 0.0, 5.0))), Ok(()));
@@ -219,9 +220,10 @@ fn go(x: f32) -> Order {
 /// A vehicle about to leave the fence stops in every mode that would go on. With a warning only, it flies on.
 #[test]
 fn the_uploaded_fence_stops_what_would_leave_it() {
-    let leaves = Some(FenceView { leaves: true, outside: false });
+    let leaves = Some(FenceStatus { leaves: true, outside: false });
     for (action, stops) in FenceAction::ALL.iter().map(|action| (*action, action.action() >= FailsafeAction::Hold)) {
-        let with = Settings { net: Net { fence_action: action, ..Net::DEFAULT }, ..settings() };
+        let with =
+            Settings { failsafe: FailsafeSettings { fence_action: action, ..FailsafeSettings::DEFAULT }, ..settings() };
         let mut bench = Bench::hovering(with);
         bench.order(go(80.0)).unwrap();
         bench.run(6.0);
@@ -232,10 +234,10 @@ fn the_uploaded_fence_stops_what_would_leave_it() {
         assert_eq!(bench.state.velocity_m_s.x.abs() < 1.0 || x < 45.0, stops, "{action:?}: {x} m");
         if action.action() == FailsafeAction::Hold {
             assert_eq!((mode, bench.state.velocity_m_s.norm() < 0.05), (FlightMode::Hold, true));
-            assert_eq!(bench.said, [Notice::Found(Cause::Fence)]);
+            assert_eq!(bench.said, [GuidanceNotice::Found(FailsafeCause::Fence)]);
             // It may fly back inside.
             bench.order(go(5.0)).unwrap();
-            bench.orders.fence = Some(FenceView::default());
+            bench.orders.fence = Some(FenceStatus::default());
             bench.run(15.0);
             assert!((bench.state.position_m.x - 5.0).abs() < 0.1);
         }
@@ -264,10 +266,10 @@ fn a_return_across_the_fence_lands() {
         bench.run(20.0);
         bench.select(FlightMode::Return).unwrap();
         bench.run(wait_s);
-        bench.orders.fence = Some(FenceView { leaves: true, outside: false });
+        bench.orders.fence = Some(FenceStatus { leaves: true, outside: false });
         bench.run(0.5);
         assert_eq!(bench.guidance.mode() == FlightMode::Land, lands, "{wait_s} s");
-        bench.orders.fence = Some(FenceView::default());
+        bench.orders.fence = Some(FenceStatus::default());
         bench.run(60.0);
         assert_eq!((bench.core, bench.state.position_m.x > 20.0), (Mode::Disarmed, lands));
     }
@@ -276,12 +278,12 @@ fn a_return_across_the_fence_lands() {
 #[test]
 fn outside_the_uploaded_fence_nothing_takes_off() {
     let mut bench = Bench::new(settings());
-    bench.orders.fence = Some(FenceView { leaves: true, outside: true });
+    bench.orders.fence = Some(FenceStatus { leaves: true, outside: true });
     bench.run(1.5);
-    assert!(bench.guidance.against().iter().any(|reason| reason == afbc_flight_core::Refusal::OutsideFence));
-    bench.orders.fence = Some(FenceView { leaves: true, outside: false });
+    assert!(bench.guidance.arming_refusals().iter().any(|reason| reason == afbc_flight_core::Refusal::OutsideFence));
+    bench.orders.fence = Some(FenceStatus { leaves: true, outside: false });
     bench.run(0.1);
-    assert!(bench.guidance.against().iter().count() == 0);
+    assert!(bench.guidance.arming_refusals().iter().count() == 0);
     bench.aim(OffboardTarget::Motion(motion(Vector3::new(1.0, 0.0, 5.0))));
 }
 

@@ -1,7 +1,7 @@
 //! The trajectory limiter keeps its limits, its outputs are consistent, it arrives without overshoot, and a feasible
 //! stream passes unchanged.
 
-use afbc_guidance::{Limiter, LimiterTarget, Limits};
+use afbc_guidance::{Limiter, LimiterTarget, MotionLimits};
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -9,9 +9,9 @@ use proptest::prelude::*;
 const DT_S: f32 = 1e-3;
 
 /// Limits of vehicles from agile to slow.
-fn limits() -> impl Strategy<Value = Limits> {
+fn limits() -> impl Strategy<Value = MotionLimits> {
     (0.5_f32..20.0, 0.3_f32..6.0, 0.2_f32..4.0, 0.5_f32..10.0, 0.5_f32..8.0, 0.3_f32..5.0).prop_map(
-        |(speed_m_s, up_m_s, down_m_s, acceleration_m_s2, vertical_acceleration_m_s2, jerk_s)| Limits {
+        |(speed_m_s, up_m_s, down_m_s, acceleration_m_s2, vertical_acceleration_m_s2, jerk_s)| MotionLimits {
             speed_m_s,
             up_m_s,
             down_m_s,
@@ -20,7 +20,7 @@ fn limits() -> impl Strategy<Value = Limits> {
             vertical_acceleration_m_s2,
             jerk_m_s3: (jerk_s * acceleration_m_s2).max(0.5),
             jerk_max_m_s3: 400.0,
-            ..Limits::DEFAULT
+            ..MotionLimits::DEFAULT
         },
     )
 }
@@ -29,18 +29,18 @@ fn place(most_m: f32) -> impl Strategy<Value = Vector3<f32>> {
     [-most_m..most_m, -most_m..most_m, -most_m..most_m].prop_map(Vector3::from)
 }
 
-fn aim(limits: &Limits) -> LimiterTarget {
+fn aim(limits: &MotionLimits) -> LimiterTarget {
     LimiterTarget::stop(limits.speed_m_s, limits.up_m_s, limits.down_m_s)
 }
 
-fn anchored(limits: Limits, state: &State) -> Limiter {
+fn anchored(limits: MotionLimits, state: &State) -> Limiter {
     let mut limiter = Limiter::new(limits).unwrap();
     limiter.anchor(state);
     limiter
 }
 
 /// Checks a setpoint against the limits, and its derivatives against the setpoint before.
-fn check(limits: &Limits, last: &Setpoint, next: &Setpoint) -> Result<(), TestCaseError> {
+fn check(limits: &MotionLimits, last: &Setpoint, next: &Setpoint) -> Result<(), TestCaseError> {
     let hair = 1.0 + 1e-4;
     let Setpoint { velocity_m_s: v, acceleration_m_s2: a, jerk_m_s3: j, .. } = next;
     prop_assert!(next.is_plausible());
@@ -63,7 +63,7 @@ fn check(limits: &Limits, last: &Setpoint, next: &Setpoint) -> Result<(), TestCa
 }
 
 /// Returns an upper bound of a flight's duration, including settling \[s\].
-fn time_s(limits: &Limits, from_m: &Vector3<f32>, to_m: &Vector3<f32>) -> f32 {
+fn time_s(limits: &MotionLimits, from_m: &Vector3<f32>, to_m: &Vector3<f32>) -> f32 {
     let way_m = to_m - from_m;
     let one = |way_m: f32, speed: f32, acceleration: f32| {
         let settles_s = 40.0 * acceleration / limits.jerk_m_s3 + 2.0;
@@ -143,7 +143,7 @@ proptest! {
         off_m in place(2.0),
         jitter in any::<bool>(),
     ) {
-        let limits = Limits::DEFAULT;
+        let limits = MotionLimits::DEFAULT;
         let most_1_s = (limits.speed_m_s / radius_m).min((limits.acceleration_max_m_s2 / radius_m).sqrt());
         let w = share * most_1_s.min((limits.jerk_max_m_s3 * 0.1 / radius_m).cbrt());
         let climb_m = (1.0_f32 / w).min(3.0) * 0.5;
@@ -196,7 +196,7 @@ proptest! {
 /// A stream that does not fit together does not pass: small misfits add up, and jumps are flown.
 #[test]
 fn a_stream_that_is_no_flight_does_not_pass() {
-    let limits = Limits::DEFAULT;
+    let limits = MotionLimits::DEFAULT;
     let mut limiter = anchored(limits, &State::default());
     for tick in 0..3000_u32 {
         // 1 cm per tick means 10 m/s, but the message says zero velocity.
@@ -216,9 +216,10 @@ fn a_stream_that_is_no_flight_does_not_pass() {
 fn it_arrives_far_from_the_origin() {
     for far_m in [1e3, 3e4, 9e4] {
         let to_m = Vector3::new(far_m, -far_m, 50.0);
-        let mut limiter = anchored(Limits::DEFAULT, &State { position_m: to_m.map(|x| x - 7.0), ..State::default() });
+        let mut limiter =
+            anchored(MotionLimits::DEFAULT, &State { position_m: to_m.map(|x| x - 7.0), ..State::default() });
         for _ in 0..20_000 {
-            limiter.advance(&LimiterTarget { position_m: to_m, ..aim(&Limits::DEFAULT) }, DT_S);
+            limiter.advance(&LimiterTarget { position_m: to_m, ..aim(&MotionLimits::DEFAULT) }, DT_S);
         }
         assert_eq!(limiter.setpoint().unwrap().position_m, to_m);
     }
@@ -228,10 +229,10 @@ fn it_arrives_far_from_the_origin() {
 fn it_turns_the_short_way() {
     for (from, to, turned) in [(3.0_f32, -3.0_f32, 0.283), (-3.0, 3.0, -0.283), (0.0, 2.0, 2.0), (0.5, -1.5, -2.0)] {
         let state = State { attitude_rad: Vector3::new(0.0, 0.0, from), ..State::default() };
-        let mut limiter = anchored(Limits::DEFAULT, &state);
+        let mut limiter = anchored(MotionLimits::DEFAULT, &state);
         let mut sum = 0.0;
         for _ in 0..8000 {
-            limiter.advance(&LimiterTarget { yaw_rad: to, ..aim(&Limits::DEFAULT) }, DT_S);
+            limiter.advance(&LimiterTarget { yaw_rad: to, ..aim(&MotionLimits::DEFAULT) }, DT_S);
             sum += limiter.setpoint().unwrap().yaw_rate_rad_s * DT_S;
         }
         assert!((sum - turned).abs() < 5e-3, "{from} to {to}: {sum}");
@@ -242,9 +243,9 @@ fn it_turns_the_short_way() {
 #[test]
 fn limits_are_validated_by_name() {
     for (limits, name) in [
-        (Limits { speed_m_s: f32::NAN, ..Limits::DEFAULT }, "speed_m_s"),
-        (Limits { acceleration_max_m_s2: 2.0, ..Limits::DEFAULT }, "acceleration_max_m_s2"),
-        (Limits { jerk_max_m_s3: 7.0, ..Limits::DEFAULT }, "jerk_max_m_s3"),
+        (MotionLimits { speed_m_s: f32::NAN, ..MotionLimits::DEFAULT }, "speed_m_s"),
+        (MotionLimits { acceleration_max_m_s2: 2.0, ..MotionLimits::DEFAULT }, "acceleration_max_m_s2"),
+        (MotionLimits { jerk_max_m_s3: 7.0, ..MotionLimits::DEFAULT }, "jerk_max_m_s3"),
     ] {
         assert_eq!(Limiter::new(limits).unwrap_err().range.name, name);
     }

@@ -15,7 +15,7 @@ fn armed_on_the_ground_it_rests_and_is_disarmed() {
     assert!(bench.core.armed());
     bench.run(3.0);
     assert_eq!(bench.core, Mode::Disarmed);
-    assert_eq!(bench.said, [Notice::Disarms]);
+    assert_eq!(bench.said, [GuidanceNotice::Disarms]);
     assert_eq!(bench.highest_m, 0.0);
 }
 
@@ -31,8 +31,10 @@ fn takes_off_to_the_height_and_holds() {
         let expected_m = height_m.unwrap_or(settings().flying.takeoff_height_m);
         assert!((bench.state.position_m.z - expected_m).abs() < 0.05, "{:?}", bench.state);
         assert!(bench.highest_m < expected_m + 0.1);
-        let said =
-            [Notice::Mode(FlightMode::Takeoff, ModeReason::Ordered), Notice::Mode(FlightMode::Hold, ModeReason::Done)];
+        let said = [
+            GuidanceNotice::Mode(FlightMode::Takeoff, ModeReason::Ordered),
+            GuidanceNotice::Mode(FlightMode::Hold, ModeReason::Done),
+        ];
         assert_eq!(bench.said, said);
     }
 }
@@ -179,7 +181,7 @@ fn offboard_takes_off_follows_and_holds_when_targets_end() {
     bench.said.clear();
     bench.run(5.0);
     assert_eq!(bench.guidance.mode(), FlightMode::Hold);
-    assert_eq!(bench.said, [Notice::Mode(FlightMode::Hold, ModeReason::Failsafe(Cause::Targets))]);
+    assert_eq!(bench.said, [GuidanceNotice::Mode(FlightMode::Hold, ModeReason::Failsafe(FailsafeCause::Targets))]);
     assert!(bench.state.velocity_m_s.norm() < 0.01);
 }
 

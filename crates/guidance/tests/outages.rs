@@ -85,7 +85,7 @@ impl Flight {
         answer
     }
 
-    fn tick(&mut self, sees: bool) -> Guided {
+    fn tick(&mut self, sees: bool) -> GuidanceOutputs {
         let bench = &mut self.bench;
         bench.sees = sees;
         (self.age_us, self.steady_us) = if sees { (0, self.steady_us + 1000) } else { (self.age_us + 1000, 0) };
@@ -161,9 +161,9 @@ fn an_outage_is_announced_from_its_beginning_to_its_end() {
     flight.bench.said.clear();
     flight.run(6.0, false).unwrap();
     flight.run(2.0, true).unwrap();
-    let descent = Notice::Mode(FlightMode::Land, ModeReason::Failsafe(Cause::Descent));
-    let back = Notice::Mode(FlightMode::Mission, ModeReason::Back);
-    assert_eq!(flight.bench.said, [descent, Notice::Over(Cause::Descent), back]);
+    let descent = GuidanceNotice::Mode(FlightMode::Land, ModeReason::Failsafe(FailsafeCause::Descent));
+    let back = GuidanceNotice::Mode(FlightMode::Mission, ModeReason::Back);
+    assert_eq!(flight.bench.said, [descent, GuidanceNotice::Over(FailsafeCause::Descent), back]);
 }
 
 /// A landing ordered during the outage, or during the descent after it, is not replaced by the interrupted mode.
@@ -195,12 +195,12 @@ fn what_is_resumed_is_what_it_was() {
     flight.bench.heard = false;
     flight.bench.run(30.0);
     let before = flight.bench.last.unwrap();
-    assert_eq!((before.mode, before.failsafe), (FlightMode::Return, Some(Cause::Station)));
+    assert_eq!((before.mode, before.failsafe), (FlightMode::Return, Some(FailsafeCause::Station)));
     for sees in [false, true] {
         (0..3000).for_each(|_| {
             flight.tick(sees);
         });
     }
     let after = flight.bench.last.unwrap();
-    assert_eq!((after.mode, after.failsafe), (FlightMode::Return, Some(Cause::Station)));
+    assert_eq!((after.mode, after.failsafe), (FlightMode::Return, Some(FailsafeCause::Station)));
 }

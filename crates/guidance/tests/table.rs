@@ -94,12 +94,15 @@ fn a_failure_forces_its_mode_and_nothing_weaker() {
 #[test]
 fn every_text_is_short_and_every_severity_one_of_mavlinks() {
     let reasons = [ModeReason::Ordered, ModeReason::Done, ModeReason::Mission, ModeReason::Cleared, ModeReason::NoLift];
-    let reasons =
-        reasons.into_iter().chain([ModeReason::Disarmed, ModeReason::Back]).chain(Cause::ALL.map(ModeReason::Failsafe));
-    let modes = reasons.flat_map(|reason| FlightMode::ALL.map(|mode| Notice::Mode(mode, reason)));
-    let causes = Cause::ALL.into_iter().flat_map(|cause| [Notice::Found(cause), Notice::Over(cause)]);
+    let reasons = reasons
+        .into_iter()
+        .chain([ModeReason::Disarmed, ModeReason::Back])
+        .chain(FailsafeCause::ALL.map(ModeReason::Failsafe));
+    let modes = reasons.flat_map(|reason| FlightMode::ALL.map(|mode| GuidanceNotice::Mode(mode, reason)));
+    let causes =
+        FailsafeCause::ALL.into_iter().flat_map(|cause| [GuidanceNotice::Found(cause), GuidanceNotice::Over(cause)]);
     let mut texts = BTreeSet::new();
-    for notice in modes.chain(causes).chain([Notice::Disarms, Notice::ItemRefused]) {
+    for notice in modes.chain(causes).chain([GuidanceNotice::Disarms, GuidanceNotice::ItemRefused]) {
         let text = notice.to_string();
         assert!(text.len() <= 50, "{text}");
         assert!((2..=6).contains(&(notice.severity() as u8)));
@@ -184,7 +187,7 @@ fn follow(bench: &mut Bench, asked: Option<Order>) -> Result<(), TestCaseError> 
     let changes: Vec<_> = new
         .iter()
         .filter_map(|notice| match notice {
-            Notice::Mode(mode, reason) => Some((*mode, *reason)),
+            GuidanceNotice::Mode(mode, reason) => Some((*mode, *reason)),
             _ => None,
         })
         .collect();
@@ -242,7 +245,7 @@ proptest! {
     #[test]
     fn random_walks_follow_the_table(steps in steps()) {
         let mut settings = settings();
-        (settings.net.cells, settings.net.fence_radius_m, settings.net.fence_height_m) = (1, 35.0, 25.0);
+        (settings.failsafe.cells, settings.failsafe.fence_radius_m, settings.failsafe.fence_height_m) = (1, 35.0, 25.0);
         let mut bench = Bench::new(settings);
         bench.battery = Some(BatteryReading { voltage_v: 4.0, current_a: 0.0, charge: None });
         bench.run(1.5);
@@ -250,7 +253,7 @@ proptest! {
             let mut asked = None;
             match step {
                 Step::Arm => {
-                    if bench.core == Mode::Disarmed && bench.rested() && bench.guidance.against().is_empty() {
+                    if bench.core == Mode::Disarmed && bench.rested() && bench.guidance.arming_refusals().is_empty() {
                         bench.core = Mode::Flying;
                         bench.landing = afbc_flight_core::landing::LandDetector::new(&bench.state, 9.81);
                     }

@@ -124,13 +124,14 @@ fn selecting_a_hold_again_stops() {
     assert!(fixture.place().x < 25.0, "{:?}", fixture.place());
     assert_eq!(fixture.said, [], "no other mode");
     // A failsafe's return still counts as a failsafe when a return is selected.
-    let net = Net { station_lost_s: 1.0, station_action: StationAction::Return, ..Net::DEFAULT };
-    let mut fixture = Fixture::flying(Settings { net, ..Settings::DEFAULT });
+    let failsafe =
+        FailsafeSettings { station_lost_s: 1.0, station_action: StationAction::Return, ..FailsafeSettings::DEFAULT };
+    let mut fixture = Fixture::flying(Settings { failsafe, ..Settings::DEFAULT });
     fixture.orders.heard_us = Some(fixture.now_us);
     let guided = fixture.run(1100);
-    assert_eq!((guided.mode, guided.failsafe), (FlightMode::Return, Some(Cause::Station)));
+    assert_eq!((guided.mode, guided.failsafe), (FlightMode::Return, Some(FailsafeCause::Station)));
     assert_eq!(fixture.select(FlightMode::Return), Ok(()));
-    assert_eq!(fixture.tick().failsafe, Some(Cause::Station));
+    assert_eq!(fixture.tick().failsafe, Some(FailsafeCause::Station));
     assert_eq!(fixture.select(FlightMode::Land), Ok(()));
     assert_eq!(fixture.tick().failsafe, None, "ordered");
 }
@@ -166,7 +167,7 @@ fn home_is_where_it_rests_and_is_armed() {
 #[test]
 fn strange_time_steps_are_replaced() {
     let asks_after = |dt_s: f32| {
-        let flying = Flying { disarm_before_s: 1.0, ..Flying::DEFAULT };
+        let flying = FlightModeSettings { disarm_before_s: 1.0, ..FlightModeSettings::DEFAULT };
         let mut fixture = Fixture { dt_s, ..Fixture::new(Settings { flying, ..Settings::DEFAULT }) };
         fixture.core = Mode::Flying;
         (1..20_000_i32).find(|_| fixture.tick().request == Some(Request::Disarm)).unwrap()

@@ -4,10 +4,10 @@ use super::{Autopilot, Error, MessagePeriods, ReceivedMessages, Station};
 use afbc::Profile;
 use afbc_control::{Action, Trace};
 use afbc_files::read::FileError;
-use afbc_mavlink::{Answer, Command};
+use afbc_mavlink::{CommandResult, VehicleCommand};
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::{Contender, ControllerKind};
-use afbc_sim::flight::{Lost, Pilot, Sample, View, World, lockstep};
+use afbc_sim::flight::{FlightSoftware, Lost, Sample, World, WorldView, lockstep};
 use afbc_types::{Inputs, Parameters, Rotor, RotorForces, Setpoint};
 use core::ops::ControlFlow;
 use nalgebra::Vector3;
@@ -124,7 +124,7 @@ struct Line<'a, A> {
     shift_m: Vector3<f32>,
 }
 
-impl<A: Autopilot> Pilot for Line<'_, A> {
+impl<A: Autopilot> FlightSoftware for Line<'_, A> {
     type Error = Error;
 
     /// Runs one step. The first step is the tick that arms the vehicle.
@@ -143,7 +143,7 @@ impl<A: Autopilot> Pilot for Line<'_, A> {
 
 impl<A: Autopilot> Line<'_, A> {
     /// Runs one millisecond: sends the messages that are due, and receives.
-    fn turn(&mut self, world: &mut World) -> Result<View, Error> {
+    fn turn(&mut self, world: &mut World) -> Result<WorldView, Error> {
         let Line { station, autopilot, pace, now_ms, silent_ms, has_armed, is_placed, shift_m, .. } = self;
         let view = world.look();
         if let Some(readings) = world.readings() {
@@ -180,14 +180,14 @@ impl<A: Autopilot> Line<'_, A> {
     /// Repeats `command` until it is `done` or `within_ms` have passed. Returns the view of the world when it was done.
     fn ask(
         &mut self,
-        command: Command,
+        command: VehicleCommand,
         world: &mut World,
         within_ms: u64,
         done: fn(&ReceivedMessages) -> bool,
-    ) -> Result<Option<View>, Error> {
+    ) -> Result<Option<WorldView>, Error> {
         for waited_ms in 0..within_ms {
             if waited_ms.is_multiple_of(ASK_EVERY_MS) {
-                if command == Command::Arm {
+                if command == VehicleCommand::Arm {
                     // The vehicle must follow setpoints as soon as it is armed.
                     self.station.follow();
                 }
@@ -202,14 +202,14 @@ impl<A: Autopilot> Line<'_, A> {
     }
 
     /// Arms the vehicle while it is held. First disarms it, if a previous run has left it armed.
-    fn arm(&mut self, world: &mut World) -> Result<View, Error> {
+    fn arm(&mut self, world: &mut World) -> Result<WorldView, Error> {
         let is_silent = self.disarm(world)?;
         while world.stands() {
             self.turn(world)?;
         }
         // Own sensors leave 5 ms: their time does not advance from t = 0 until the vehicle flies.
         let within_ms = if world.readings().is_some() { 5 } else { ARM_WITHIN_MS };
-        if is_silent && let Some(view) = self.ask(Command::Arm, world, within_ms, |heard| heard.armed)? {
+        if is_silent && let Some(view) = self.ask(VehicleCommand::Arm, world, within_ms, |heard| heard.armed)? {
             self.has_armed = true;
             return Ok(view);
         }
@@ -219,8 +219,8 @@ impl<A: Autopilot> Line<'_, A> {
 
     /// Disarms the vehicle. Returns true if the vehicle confirms it.
     fn disarm(&mut self, world: &mut World) -> Result<bool, Error> {
-        let done = |heard: &ReceivedMessages| heard.answer == Some(Answer::Accepted) && !heard.armed;
+        let done = |heard: &ReceivedMessages| heard.answer == Some(CommandResult::Accepted) && !heard.armed;
         // Uses the kill command, since a plain disarm is refused in the air.
-        Ok(self.ask(Command::Kill, world, DISARM_WITHIN_MS, done)?.is_some())
+        Ok(self.ask(VehicleCommand::Kill, world, DISARM_WITHIN_MS, done)?.is_some())
     }
 }

@@ -9,7 +9,7 @@ use crate::stored_logs::StoredLogs;
 use afbc::AdaptiveEstimate;
 use afbc_comms::services::signing::{Signing, SigningRecord};
 use afbc_comms::{Calibrator, Comms, EscReports, EscsHeard, RadioControl, Setup, Transfers};
-use afbc_estimator::Origin;
+use afbc_estimator::GeodeticOrigin;
 use afbc_files::Flash;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_log::exact::Recorder;
@@ -68,7 +68,7 @@ pub struct Host {
     log: Option<ExactLog>,
     black_box: Option<HostBlackBox>,
     /// Geographic origin of the GNSS fixes, for logs.
-    origin: Option<Origin>,
+    origin: Option<GeodeticOrigin>,
     /// File transfers and the served files, if files are served.
     files: Option<Box<(Transfers<OpenFile>, ServedFiles)>>,
     /// Names of vehicle and law.
@@ -277,14 +277,14 @@ impl Host {
 
     /// Starts a black box ([`afbc_log::ulog`]). Call it before the first tick. `write` gets the log's bytes. `origin`
     /// is the geographic origin of GNSS fixes, if it is known.
-    pub fn log(&mut self, origin: Option<Origin>, write: impl FnMut(&[u8]) + 'static) {
+    pub fn log(&mut self, origin: Option<GeodeticOrigin>, write: impl FnMut(&[u8]) + 'static) {
         self.origin = origin;
         self.black_box = Some(new_black_box(&self.table, &self.names, origin, Some(Box::new(write))));
     }
 
     /// Starts to serve files to stations: the metadata, these logs, and a black box streamed as it is written. `origin`
     /// is as for [`log`](Self::log).
-    pub fn serve_files(&mut self, origin: Option<Origin>, logs: Option<StoredLogs>) {
+    pub fn serve_files(&mut self, origin: Option<GeodeticOrigin>, logs: Option<StoredLogs>) {
         self.origin = origin;
         let MetadataFiles { files, general } = self.metadata();
         self.files = Some(Box::new((Transfers::new(Some(general)), ServedFiles::new(logs, files))));
@@ -426,7 +426,7 @@ fn received(
 fn new_black_box(
     table: &ParameterTable,
     [vehicle, law]: &[String; 2],
-    origin: Option<Origin>,
+    origin: Option<GeodeticOrigin>,
     write: Option<Sink>,
 ) -> HostBlackBox {
     let log = BlackBox::new(&LogStart { vehicle, law, hardware: HARDWARE, ..LogStart::default() }, table);

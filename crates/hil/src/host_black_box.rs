@@ -1,6 +1,6 @@
 //! The black box of a host. Its ring is emptied after every tick, or by the stream to a station.
 
-use afbc_estimator::Origin;
+use afbc_estimator::GeodeticOrigin;
 use afbc_log::ulog::{BesideTick, BlackBox, LogRing};
 use afbc_mavlink::{Address, Decoder, Downlink};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
@@ -21,13 +21,13 @@ pub(crate) struct HostBlackBox {
     /// Receiver of the bytes; none if they stay in the ring.
     write: Option<Sink>,
     /// Geographic origin of the GNSS fixes.
-    origin: Option<Origin>,
+    origin: Option<GeodeticOrigin>,
     /// Decodes the texts that the vehicle sends.
     decoder: Decoder<Downlink>,
 }
 
 impl HostBlackBox {
-    pub(crate) fn new(log: BlackBox, origin: Option<Origin>, write: Option<Sink>) -> Self {
+    pub(crate) fn new(log: BlackBox, origin: Option<GeodeticOrigin>, write: Option<Sink>) -> Self {
         HostBlackBox { log, ring: Box::default(), write, origin, decoder: Decoder::new(LISTENER) }
     }
 

@@ -69,18 +69,19 @@ fn least_baud() -> u32 {
 #[allow(clippy::unwrap_used, reason = "a test")]
 mod tests {
     use super::*;
-    use afbc_mavlink::{Address, Command, FRAME_MAX, MavCmd, Sender, Uplink};
+    use afbc_mavlink::{Address, Encoder, FRAME_MAX, MavCmd, Uplink, VehicleCommand};
     use afbc_types::{PoseSigmas, Setpoint, State};
 
     #[test]
     fn frames_are_as_long_as_said() {
-        let length = |message: Uplink| Sender::new(Address::default()).send(&message, &mut [0; FRAME_MAX]).len() as u64;
+        let length =
+            |message: Uplink| Encoder::new(Address::default()).send(&message, &mut [0; FRAME_MAX]).len() as u64;
         assert_eq!(
             length(Uplink::State { sent_us: 0, state: State::default(), sigmas: PoseSigmas::UNKNOWN }),
             STATE_BYTES
         );
         assert!(length(Uplink::Setpoint(Setpoint::default())) <= SETPOINT_BYTES);
-        assert!(length(Uplink::Command(Command::Other(MavCmd::MAV_CMD_USER_5 as u16))) <= PING_BYTES);
+        assert!(length(Uplink::Command(VehicleCommand::Other(MavCmd::MAV_CMD_USER_5 as u16))) <= PING_BYTES);
     }
 
     #[test]

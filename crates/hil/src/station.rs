@@ -6,13 +6,13 @@ use afbc_comms::{BUSY, CALIBRATES};
 use afbc_flight_core::Refusal;
 use afbc_ground::{Client, PING, Patience};
 use afbc_guidance::FlightMode;
-use afbc_mavlink::{Answer, Command, Counters, Downlink, HealthArray, Uplink};
+use afbc_mavlink::{CommandResult, Counters, Downlink, HealthArray, Uplink, VehicleCommand};
 use afbc_types::{PoseSigmas, ROTORS_MAX, RotorSpeeds, Setpoint, State};
 use nalgebra::Vector3;
 use std::time::Instant;
 
 /// Requests HIL_ACTUATOR_CONTROLS at an interval of one tick.
-const ROTORS: Command = Command::SetInterval { message: 93, interval_us: 1_000 };
+const ROTORS: VehicleCommand = VehicleCommand::SetInterval { message: 93, interval_us: 1_000 };
 
 /// Tracker, commander and ground station.
 pub struct Station {
@@ -39,7 +39,7 @@ pub struct ReceivedMessages {
     /// Largest age of the state that the vehicle has reported while armed \[us\].
     pub state_age_max_us: f32,
     /// Answer to the last request to arm or disarm.
-    pub answer: Option<Answer>,
+    pub answer: Option<CommandResult>,
 }
 
 impl Default for Station {
@@ -89,11 +89,11 @@ impl Station {
 
     /// Queues the switch to offboard mode, in which the vehicle follows setpoints.
     pub fn follow(&mut self) {
-        self.say(&Uplink::Command(Command::SelectMode(modes::custom(FlightMode::Offboard))));
+        self.say(&Uplink::Command(VehicleCommand::SelectMode(modes::custom(FlightMode::Offboard))));
     }
 
     /// Queues a command, and forgets the previous answer.
-    pub fn command(&mut self, command: Command) {
+    pub fn command(&mut self, command: VehicleCommand) {
         self.heard.answer = None;
         self.client.command(command, Patience::ONCE);
     }
@@ -118,7 +118,7 @@ impl Station {
                 (heard.armed, heard.speeds) = (*armed, *speeds);
                 heard.rotor_commands += 1;
             }
-            Downlink::Answer { command, .. } if *command == PING.id() => {
+            Downlink::CommandAck { command, .. } if *command == PING.id() => {
                 if let Some(pinged) = pinged.take() {
                     round_trip_ms.add(pinged.elapsed().as_secs_f64() * 1e3);
                 }
@@ -133,7 +133,7 @@ impl Station {
             // Heartbeats and attitudes are not used.
             _ => {}
         });
-        heard.answer = client.answer(Command::Arm);
+        heard.answer = client.answer(VehicleCommand::Arm);
         // The texts of a long flight would fill memory, and nobody reads them here.
         drop(client.take_texts());
     }
@@ -162,7 +162,7 @@ impl Station {
 impl ReceivedMessages {
     /// Returns the reason why the vehicle refused to arm.
     pub fn refusal(&self) -> Option<&'static str> {
-        let Some(Answer::Refused(number)) = self.answer else { return None };
+        let Some(CommandResult::Refused(number)) = self.answer else { return None };
         let known = Refusal::ALL.into_iter().find(|refusal| *refusal as i32 == number).map(Refusal::reason);
         let others = [(BUSY, "refused: too many requests are queued"), (CALIBRATES, "arming refused: calibrating")];
         let other = others.into_iter().find(|(known, _)| *known == number).map(|(_, reason)| reason);

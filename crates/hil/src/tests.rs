@@ -7,7 +7,7 @@ use afbc_scenario::trajectory::Trajectory;
 use afbc_scenario::{Scenario, built_in};
 use afbc_sim::columns::MOTION;
 use afbc_sim::metrics::{Accumulator, Metrics};
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use core::ops::ControlFlow;
 use nalgebra::Vector3;
 
@@ -29,7 +29,7 @@ fn the_link_hardly_changes_the_metrics() {
     let scenario = scenario("paper", 60.0);
     let (end, looped) = fly_host(&scenario);
     assert_eq!(end, LoopEnd { lost: None, interrupted: false, disarmed: true });
-    let plain = Run::fly(&scenario, &firmware(&scenario).unwrap(), u64::MAX).unwrap().metrics;
+    let plain = FlightResult::fly(&scenario, &firmware(&scenario).unwrap(), u64::MAX).unwrap().metrics;
     // The link rounds the attitude to an f32 quaternion, and has no yaw acceleration.
     assert!((looped.rmse - plain.rmse).amax() < 1e-3, "{} {}", looped.rmse, plain.rmse);
     assert!((looped.max_abs - plain.max_abs).amax() < 5e-3, "{} {}", looped.max_abs, plain.max_abs);

@@ -13,7 +13,7 @@ mod flier;
 use afbc_comms::AuxSensors;
 use afbc_comms::services::{health::sensor, status::SensorBits};
 use afbc_guidance::FlightMode;
-use afbc_mavlink::{ChannelsOverride, Command, ExternalTarget, ManualControl, Uplink};
+use afbc_mavlink::{ChannelsOverride, ExternalTarget, ManualControl, Uplink, VehicleCommand};
 use afbc_rc::{Channels, CrsfFrame, SbusFrame};
 use flier::{ARM, Flier, KILL, MODE, PITCH, ROLL, Receiver, THROTTLE, crsf};
 use rand_xoshiro::rand_core::Rng;
@@ -174,7 +174,7 @@ fn the_pilots_sticks_go_first() {
     for ms in 0..3_000 {
         if ms == 100 {
             // MAV_STANDARD_MODE_POSITION_HOLD.
-            flier.tick(Some(&Uplink::Command(Command::SelectStandardMode(1))));
+            flier.tick(Some(&Uplink::Command(VehicleCommand::SelectStandardMode(1))));
         }
         flier.tick(Some(&Uplink::Target(ExternalTarget::Sticks(sticks))));
     }

@@ -5,9 +5,9 @@
 use afbc::Profile;
 use afbc_drivers::nmea::NmeaDecoder;
 use afbc_drivers::ublox::DELAY_US;
-use afbc_estimator::{Measurement, Origin};
+use afbc_estimator::{GeodeticOrigin, Measurement};
 use afbc_hil::Host;
-use afbc_mavlink::{Address, Command, Datum, FRAME_MAX, Height, Sender, Uplink};
+use afbc_mavlink::{Address, Datum, Encoder, FRAME_MAX, Height, Uplink, VehicleCommand};
 use afbc_onboard::sensors::FixFrame;
 use afbc_onboard::{Aged, Readings};
 use afbc_scenario::{Scenario, load};
@@ -46,8 +46,11 @@ struct NmeaReceiver {
 impl NmeaReceiver {
     fn new() -> Self {
         let [latitude, longitude, altitude] = PLACE;
-        let step_m =
-            Origin::new(latitude, longitude, altitude).unwrap().local(latitude + 1e-3, longitude + 1e-3, altitude);
+        let step_m = GeodeticOrigin::new(latitude, longitude, altitude).unwrap().local(
+            latitude + 1e-3,
+            longitude + 1e-3,
+            altitude,
+        );
         let scale = [1e-3 / f64::from(step_m.x), 1e-3 / -f64::from(step_m.y)];
         let (decoder, frame) = (NmeaDecoder::new(), FixFrame::NEW);
         NmeaReceiver { newest: None, wire: VecDeque::new(), began_ms: 0, decoder, frame, scale }
@@ -114,7 +117,7 @@ struct Landing {
 /// Takes off, hovers for ten seconds and lands.
 fn land(scenario: &Scenario, mut host: Host, mut receiver: Option<NmeaReceiver>) -> Landing {
     let mut world = World::released(scenario, 1e-3).unwrap();
-    let (mut sender, mut buffer) = (Sender::new(STATION), [0; FRAME_MAX]);
+    let (mut sender, mut buffer) = (Encoder::new(STATION), [0; FRAME_MAX]);
     let mut speeds = RotorSpeeds::<ROTORS_MAX>::default();
     let mut landing = Landing::default();
     let (mut armed_ms, mut land_ms) = (None, u64::MAX);
@@ -128,13 +131,13 @@ fn land(scenario: &Scenario, mut host: Host, mut receiver: Option<NmeaReceiver>)
         }
         host.sense(&readings);
         let command = match armed_ms {
-            None if now_ms > 4_000 && now_ms % 500 == 0 => Some(Command::Arm),
+            None if now_ms > 4_000 && now_ms % 500 == 0 => Some(VehicleCommand::Arm),
             Some(armed_ms)
                 if now_ms < armed_ms + 4_000 && (now_ms - armed_ms) % 1000 == 500 && motion.position_m.z < 0.5 =>
             {
-                Some(Command::TakeOff(Height { metres: 3.0, above: Datum::Here }))
+                Some(VehicleCommand::TakeOff(Height { metres: 3.0, above: Datum::Here }))
             }
-            Some(_) if now_ms >= land_ms && (now_ms - land_ms) % 2_000 == 0 => Some(Command::Land),
+            Some(_) if now_ms >= land_ms && (now_ms - land_ms) % 2_000 == 0 => Some(VehicleCommand::Land),
             _ => None,
         };
         let message = command.map(Uplink::Command).or((now_ms % 1_000 == 0).then_some(Uplink::Heartbeat));

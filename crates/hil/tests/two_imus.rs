@@ -10,7 +10,7 @@
 use afbc::Profile;
 use afbc_estimator::Measurement;
 use afbc_hil::Host;
-use afbc_mavlink::{Address, Command, Datum, ExternalTarget, FRAME_MAX, Height, ManualControl, Sender, Uplink};
+use afbc_mavlink::{Address, Datum, Encoder, ExternalTarget, FRAME_MAX, Height, ManualControl, Uplink, VehicleCommand};
 use afbc_onboard::{Aged, ImuSelector};
 use afbc_scenario::{Scenario, load};
 use afbc_sim::flight::World;
@@ -81,7 +81,7 @@ fn fly(
 ) -> Flown {
     let mut world = World::released(scenario, 1e-3).unwrap();
     let mut random = Xoshiro256PlusPlus::seed_from_u64(scenario.seed);
-    let (mut sender, mut buffer) = (Sender::new(STATION), [0; FRAME_MAX]);
+    let (mut sender, mut buffer) = (Encoder::new(STATION), [0; FRAME_MAX]);
     let mut speeds = RotorSpeeds::<ROTORS_MAX>::default();
     let (mut flown, mut selector) = (Flown::default(), ImuSelector::NEW);
     let mut draw = |sigma: f32| Vector3::from_fn(|_, _| sigma * normal(&mut random));
@@ -119,15 +119,15 @@ fn fly(
         }
         host.sense(&readings);
         let command = match armed_ms {
-            None if now_ms > 4_000 && now_ms % 500 == 0 => Some(Command::Arm),
+            None if now_ms > 4_000 && now_ms % 500 == 0 => Some(VehicleCommand::Arm),
             Some(armed_ms) if (now_ms - armed_ms) % 1000 == 500 && motion.position_m.z < 0.5 && now_ms < HOVERS_MS => {
-                Some(Command::TakeOff(Height { metres: 5.0, above: Datum::Here }))
+                Some(VehicleCommand::TakeOff(Height { metres: 5.0, above: Datum::Here }))
             }
             _ => None,
         };
         let message = match fault {
             // MAV_STANDARD_MODE_POSITION_HOLD, once the sticks are received.
-            Fault::None if now_ms == at_ms + 100 => Some(Uplink::Command(Command::SelectStandardMode(1))),
+            Fault::None if now_ms == at_ms + 100 => Some(Uplink::Command(VehicleCommand::SelectStandardMode(1))),
             Fault::None if now_ms > at_ms && now_ms % 1_000 > 0 => {
                 Some(Uplink::Target(ExternalTarget::Sticks(jerky(now_ms))))
             }

@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Nominal vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Body<const N: usize> {
+pub(crate) struct NominalVehicle<const N: usize> {
     pub(crate) mixer: Mixer<N>,
     smoother: Smoother,
     pub(crate) mass_kg: f32,
@@ -35,7 +35,7 @@ pub(crate) struct Demand {
     pub(crate) errors: [Vector3<f32>; 4],
 }
 
-impl<const N: usize> Body<N> {
+impl<const N: usize> NominalVehicle<N> {
     /// Creates the vehicle with these parameters and filters on its inputs.
     pub(crate) fn new(vehicle: &Airframe<N>, settings: &Settings, smoothing: &Smoothing) -> Result<Self, OutOfRange> {
         settings.validate()?;
@@ -43,7 +43,7 @@ impl<const N: usize> Body<N> {
         let smoother = Smoother::new(smoothing, settings.dt_s)?;
         let vehicle = &vehicle.parameters;
         let (inertia_kg_m2, effectiveness) = (vehicle.inertia_kg_m2, vehicle.effectiveness());
-        Ok(Body { mixer, smoother, mass_kg: vehicle.mass_kg, inertia_kg_m2, effectiveness })
+        Ok(NominalVehicle { mixer, smoother, mass_kg: vehicle.mass_kg, inertia_kg_m2, effectiveness })
     }
 
     /// Returns d Omega/dt that the rotors cause with `inputs` \[rad/s2\].

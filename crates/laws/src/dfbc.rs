@@ -27,12 +27,12 @@
 //! * **Rotor knowledge**: the time constant [`Gains::rotor_time_constant_s`], like INDI.
 
 use crate::attitude::{r_earth_body, unit};
-use crate::body::{Body, Demand};
-use crate::flat_attitude::{Attitude, FlatAttitude, Inner, dragged};
-use crate::increment::Reaction;
-use crate::limits::Limits;
+use crate::body::{Demand, NominalVehicle};
+use crate::flat_attitude::{AttitudeDemand, AttitudeGains, FlatAttitude, dragged};
+use crate::increment::IncrementMemory;
+use crate::limits::SpecificForceLimits;
 use crate::loops::{TrackingLoop, xy_and_z};
-use crate::rotor_model::{RotorModel, Spin};
+use crate::rotor_model::{RotorModel, RotorModelMemory};
 use afbc_control::drag::KnownDrag;
 use afbc_control::{Action, FlightController, Mixer, Settings, Smoothed, Smoothing, Trace};
 use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
@@ -132,7 +132,7 @@ impl Gains {
 /// DFBC controller with its constants. Everything that changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dfbc<const N: usize = 4> {
-    body: Body<N>,
+    body: NominalVehicle<N>,
     dt_s: f32,
     drag: KnownDrag,
     position: TrackingLoop,
@@ -145,8 +145,8 @@ pub struct Dfbc<const N: usize = 4> {
 pub struct Memory<const N: usize = 4> {
     /// sat(k_i int (p_d - p)), earth frame \[m/s2\].
     pub position_integral: Vector3<f32>,
-    rotors: Spin<N>,
-    reaction: Reaction,
+    rotors: RotorModelMemory<N>,
+    reaction: IncrementMemory,
     smoothed: Option<Smoothed>,
     /// Trace of the last step.
     trace: Trace,
@@ -159,10 +159,10 @@ impl<const N: usize> Dfbc<N> {
     /// Returns the first parameter, setting or gain that is out of range.
     pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let vehicle = vehicle.into();
-        let body = Body::new(&vehicle, &settings, &gains.smoothing)?;
+        let body = NominalVehicle::new(&vehicle, &settings, &gains.smoothing)?;
         let (vehicle, thrust_max_n) = (vehicle.parameters, body.mixer.thrust_max_n());
         gains.validate()?;
-        let inner = Inner {
+        let inner = AttitudeGains {
             tilt: [gains.tilt_p_1_s2, gains.tilt_d_1_s],
             yaw: [gains.yaw_p_1_s2, gains.yaw_d_1_s],
             filter_rad_s: gains.attitude_filter_rad_s,
@@ -176,7 +176,7 @@ impl<const N: usize> Dfbc<N> {
                 position_d: xy_and_z(gains.position_d_1_s, gains.height_d_1_s),
                 position_i: xy_and_z(gains.position_i_1_s3, gains.height_i_1_s3),
                 integral_max_m_s2: gains.position_integral_max_m_s2,
-                limits: Limits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
+                limits: SpecificForceLimits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
                 dt_s: settings.dt_s,
             },
             rotors: RotorModel::new(&body, vehicle.weight_n(), gains.rotor_time_constant_s, settings.dt_s),
@@ -223,7 +223,7 @@ impl<const N: usize> FlightController<N> for Dfbc<N> {
         let limits = &self.position.limits;
         // Within the limits it points up, as `flat` requires: in a free fall the thrust would have no direction.
         let flying = limits.apply(&(setpoint.acceleration_m_s2 + limits.gravity()));
-        let Attitude { desired, rates_rad_s, angular_acceleration_rad_s2, attitude_error, rate_error } =
+        let AttitudeDemand { desired, rates_rad_s, angular_acceleration_rad_s2, attitude_error, rate_error } =
             self.attitude.output(&memory.reaction, &r, state, [&specific_force, &flying], setpoint);
 
         let demand = Demand {

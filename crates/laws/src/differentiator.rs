@@ -15,11 +15,11 @@ pub struct Differentiator(CommandFilter);
 
 /// State of the filter. It starts at the first sample with zero derivative.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Smooth {
+pub struct DifferentiatorMemory {
     axes: Option<[Filtered; 3]>,
 }
 
-impl Smooth {
+impl DifferentiatorMemory {
     /// Returns the filtered signal, in its unit; 0 before the first sample.
     #[inline]
     pub fn value(&self) -> Vector3<f32> {
@@ -44,7 +44,7 @@ impl Differentiator {
 
     /// Filters the sample of this step.
     #[inline]
-    pub fn advance(&self, smooth: &mut Smooth, sample: &Vector3<f32>) {
+    pub fn advance(&self, smooth: &mut DifferentiatorMemory, sample: &Vector3<f32>) {
         let start = |angle| Filtered { angle, rate: 0.0 };
         let [x, y, z] = smooth.axes.unwrap_or([start(sample.x), start(sample.y), start(sample.z)]);
         smooth.axes = Some([self.0.advance(&x, sample.x), self.0.advance(&y, sample.y), self.0.advance(&z, sample.z)]);
@@ -52,7 +52,7 @@ impl Differentiator {
 
     /// Returns the second derivative with the input `sample`, per second squared; 0 before the first sample.
     #[inline]
-    pub fn second_derivative(&self, smooth: &Smooth, sample: &Vector3<f32>) -> Vector3<f32> {
+    pub fn second_derivative(&self, smooth: &DifferentiatorMemory, sample: &Vector3<f32>) -> Vector3<f32> {
         smooth.axes.map_or(Vector3::zeros(), |[x, y, z]| {
             Vector3::new(
                 self.0.acceleration(&x, sample.x),

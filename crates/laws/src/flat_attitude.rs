@@ -4,14 +4,14 @@
 use crate::attitude::{facing, tilt_and_yaw_error};
 use crate::differentiator::Differentiator;
 use crate::flatness::flat;
-use crate::increment::{Increment, Reaction};
+use crate::increment::{Increment, IncrementMemory};
 use crate::loops::xy_and_z;
 use afbc_control::drag::KnownDrag;
 use afbc_types::{OutOfRange, Setpoint, State};
 use nalgebra::{Matrix3, Vector3};
 
 /// Gains k_R and k_Omega \[1/s2, 1/s\] of tilt and yaw, and bandwidth of the filter \[rad/s\].
-pub(crate) struct Inner {
+pub(crate) struct AttitudeGains {
     pub(crate) tilt: [f32; 2],
     pub(crate) yaw: [f32; 2],
     pub(crate) filter_rad_s: f32,
@@ -26,7 +26,7 @@ pub(crate) struct FlatAttitude {
 }
 
 /// Output of the attitude loop.
-pub(crate) struct Attitude {
+pub(crate) struct AttitudeDemand {
     pub(crate) desired: Matrix3<f32>,
     /// Rates of the reference, in the reference's frame.
     pub(crate) rates_rad_s: Vector3<f32>,
@@ -40,7 +40,7 @@ impl FlatAttitude {
     ///
     /// # Errors
     /// Returns an error if the filter's bandwidth is out of range.
-    pub(crate) fn new(gains: &Inner, dt_s: f32) -> Result<Self, OutOfRange> {
+    pub(crate) fn new(gains: &AttitudeGains, dt_s: f32) -> Result<Self, OutOfRange> {
         let ([tilt_p, tilt_d], [yaw_p, yaw_d]) = (gains.tilt, gains.yaw);
         Ok(FlatAttitude {
             increment: Increment(Differentiator::new(gains.filter_rad_s, dt_s)?),
@@ -51,7 +51,12 @@ impl FlatAttitude {
 
     /// Filters inputs and rates, see [`Increment::measure`].
     #[inline]
-    pub(crate) fn measure(&self, reaction: &mut Reaction, given_rad_s2: &Vector3<f32>, rates_rad_s: &Vector3<f32>) {
+    pub(crate) fn measure(
+        &self,
+        reaction: &mut IncrementMemory,
+        given_rad_s2: &Vector3<f32>,
+        rates_rad_s: &Vector3<f32>,
+    ) {
         self.increment.measure(reaction, given_rad_s2, rates_rad_s);
     }
 
@@ -60,12 +65,12 @@ impl FlatAttitude {
     #[inline]
     pub(crate) fn output(
         &self,
-        reaction: &Reaction,
+        reaction: &IncrementMemory,
         r: &Matrix3<f32>,
         state: &State,
         [along, reference]: [&Vector3<f32>; 2],
         setpoint: &Setpoint,
-    ) -> Attitude {
+    ) -> AttitudeDemand {
         let omega = state.rates_rad_s;
         let desired = facing(along, setpoint.yaw_rad);
         let reference = flat([*reference, setpoint.jerk_m_s3, setpoint.snap_m_s4], setpoint);
@@ -77,7 +82,7 @@ impl FlatAttitude {
             + self.k_omega.component_mul(&rate_error)
             + to_body * reference.rates_dot_rad_s2
             - omega.cross(&omega_r);
-        Attitude {
+        AttitudeDemand {
             desired,
             rates_rad_s: reference.rates_rad_s,
             angular_acceleration_rad_s2: self.increment.invert(reaction, &nu),

@@ -20,7 +20,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Desired attitude R_d with Omega_d and dOmega_d/dt in the desired frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Desired {
+pub struct AttitudeReference {
     /// R_d: desired frame to earth.
     pub r_earth_desired: Matrix3<f32>,
     /// Omega_d \[rad/s\].
@@ -30,7 +30,7 @@ pub struct Desired {
 }
 
 /// Desired attitude and its heading.
-pub(crate) struct Frame {
+pub(crate) struct DesiredFrame {
     pub(crate) r: Matrix3<f32>,
     /// x_C
     along: Vector3<f32>,
@@ -40,12 +40,12 @@ pub(crate) struct Frame {
     per_length: f32,
 }
 
-impl Frame {
+impl DesiredFrame {
     /// Creates the attitude along a specific force that points up.
     #[inline]
     pub(crate) fn new(specific_force: &Vector3<f32>, yaw_rad: f32) -> Self {
         let [along, left] = heading(yaw_rad);
-        Frame { r: facing(specific_force, yaw_rad), along, left, per_length: 1.0 / length(specific_force) }
+        DesiredFrame { r: facing(specific_force, yaw_rad), along, left, per_length: 1.0 / length(specific_force) }
     }
 
     /// Returns Omega_d for ds/dt and the heading's rate. With d2s/dt2 and the heading's acceleration it returns
@@ -63,9 +63,9 @@ impl Frame {
 /// The specific force must point up.
 // Always inlined: a result returned in memory would be read back while its stores are still pending.
 #[inline(always)]
-pub fn flat(specific_force: [Vector3<f32>; 3], setpoint: &Setpoint) -> Desired {
+pub fn flat(specific_force: [Vector3<f32>; 3], setpoint: &Setpoint) -> AttitudeReference {
     let [s, s_dot, s_ddot] = specific_force;
-    let frame = Frame::new(&s, setpoint.yaw_rad);
+    let frame = DesiredFrame::new(&s, setpoint.yaw_rad);
     let (b2, b3) = (frame.r.column(1), frame.r.column(2));
     let yaw_dot = setpoint.yaw_rate_rad_s;
     let rates = frame.turn(&s_dot, yaw_dot);
@@ -80,5 +80,5 @@ pub fn flat(specific_force: [Vector3<f32>; 3], setpoint: &Setpoint) -> Desired {
         -p * r - stretch * q,
         (turning - (stretch * q + 2.0 * p * r) * lean) / upright - p * q,
     );
-    Desired { r_earth_desired: frame.r, rates_rad_s: rates, rates_dot_rad_s2: linear + products }
+    AttitudeReference { r_earth_desired: frame.r, rates_rad_s: rates, rates_dot_rad_s2: linear + products }
 }

@@ -25,18 +25,19 @@
 //!   rad/s2, while k_R e_R is tens. The setpoint's jerk and snap are not used.
 //! * **Heading**: b1 is perpendicular to y_C, so that the yaw of R_d is exactly psi_d. The paper projects a freely
 //!   chosen direction; this is one such choice.
-//! * **Limits**: the paper assumes that s never vanishes and that rotor forces are unlimited; here [`Limits`] bounds s.
+//! * **Limits**: the paper assumes that s never vanishes and that rotor forces are unlimited; here
+//!   [`SpecificForceLimits`] bounds s.
 //! * **Integrals**: the position integral is of e_x alone. The source adds the integral of e_v, which is e_x and thus
 //!   part of k_x. In the attitude integral, c = k_R / k_Omega. The integrals are bounded by
 //!   +-[`Gains::position_integral_max_m_s2`] and +-20 rad/s2. Anti-windup stops them where limits or rotors are
 //!   saturated.
 
 use crate::attitude::{geometric_error, r_earth_body, unit};
-use crate::body::{Body, Demand};
-use crate::differentiator::{Differentiator, Smooth};
-use crate::flatness::{Desired, Frame};
+use crate::body::{Demand, NominalVehicle};
+use crate::differentiator::{Differentiator, DifferentiatorMemory};
+use crate::flatness::{AttitudeReference, DesiredFrame};
 use crate::integral::{RATE_INTEGRAL_MAX_RAD_S2, away_from, integrate};
-use crate::limits::Limits;
+use crate::limits::SpecificForceLimits;
 use crate::loops::{TrackingLoop, TrackingOutput, xy_and_z};
 use afbc_control::{Action, FlightController, Mixer, Settings, Smoothed, Smoothing, Trace};
 use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
@@ -139,7 +140,7 @@ impl Gains {
 /// Geometric controller with its constants. Everything that changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometric<const N: usize = 4> {
-    pub(crate) body: Body<N>,
+    pub(crate) body: NominalVehicle<N>,
     position: TrackingLoop,
     filter: Differentiator,
     dt_s: f32,
@@ -160,14 +161,14 @@ pub struct Memory {
     pub attitude_integral: Vector3<f32>,
     /// Unallocated part of U1..U3 in the last step \[N\].
     unallocated: Vector3<f32>,
-    specific_force: Smooth,
+    specific_force: DifferentiatorMemory,
     pub(crate) smoothed: Option<Smoothed>,
     /// Trace of the last step.
     pub(crate) trace: Trace,
 }
 
 /// Errors that the integrals learn from in a step.
-pub(crate) struct Lesson {
+pub(crate) struct IntegralErrors {
     position: TrackingOutput,
     /// -(e_Omega + c e_R) \[rad/s\]
     attitude: Vector3<f32>,
@@ -176,10 +177,10 @@ pub(crate) struct Lesson {
 /// Returns the attitude along a specific force with two derivatives \[m/s2, m/s3, m/s4\], at the setpoint's heading,
 /// neglecting products of rates. The specific force must point up.
 #[inline]
-pub fn desired(specific_force: [Vector3<f32>; 3], setpoint: &Setpoint) -> Desired {
+pub fn desired(specific_force: [Vector3<f32>; 3], setpoint: &Setpoint) -> AttitudeReference {
     let [s, s_dot, s_ddot] = specific_force;
-    let frame = Frame::new(&s, setpoint.yaw_rad);
-    Desired {
+    let frame = DesiredFrame::new(&s, setpoint.yaw_rad);
+    AttitudeReference {
         r_earth_desired: frame.r,
         rates_rad_s: frame.turn(&s_dot, setpoint.yaw_rate_rad_s),
         rates_dot_rad_s2: frame.turn(&s_ddot, setpoint.yaw_acceleration_rad_s2),
@@ -193,7 +194,7 @@ impl<const N: usize> Geometric<N> {
     /// Returns the first parameter, setting or gain that is out of range.
     pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let vehicle = vehicle.into();
-        let body = Body::new(&vehicle, &settings, &gains.smoothing)?;
+        let body = NominalVehicle::new(&vehicle, &settings, &gains.smoothing)?;
         let (vehicle, thrust_max_n) = (vehicle.parameters, body.mixer.thrust_max_n());
         gains.validate()?;
         let (k_r, k_omega) =
@@ -205,7 +206,7 @@ impl<const N: usize> Geometric<N> {
                 position_d: xy_and_z(gains.position_d_1_s, gains.height_d_1_s),
                 position_i: xy_and_z(gains.position_i_1_s3, gains.height_i_1_s3),
                 integral_max_m_s2: gains.position_integral_max_m_s2,
-                limits: Limits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
+                limits: SpecificForceLimits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
                 dt_s: settings.dt_s,
             },
             filter: Differentiator::new(gains.filter_rad_s, settings.dt_s)?,
@@ -220,7 +221,7 @@ impl<const N: usize> Geometric<N> {
 
     /// Computes the demand of one step and the errors for the integrals.
     #[inline]
-    pub(crate) fn demand(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint) -> (Demand, Lesson) {
+    pub(crate) fn demand(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint) -> (Demand, IntegralErrors) {
         let position = self.position.output(state, setpoint, &memory.position_integral);
         let specific_force = position.specific_force_m_s2;
 
@@ -229,7 +230,7 @@ impl<const N: usize> Geometric<N> {
         self.filter.advance(&mut memory.specific_force, &specific_force);
         let filtered = &memory.specific_force;
         let second = self.filter.second_derivative(filtered, &specific_force);
-        let Desired { r_earth_desired, rates_rad_s, rates_dot_rad_s2 } =
+        let AttitudeReference { r_earth_desired, rates_rad_s, rates_dot_rad_s2 } =
             desired([filtered.value(), filtered.derivative(), second], setpoint);
 
         // Attitude.
@@ -253,13 +254,13 @@ impl<const N: usize> Geometric<N> {
             desired_rates_rad_s: rates_rad_s,
             errors: [position.position_error_m, position.velocity_error_m_s, attitude_error, rate_error],
         };
-        (demand, Lesson { position, attitude: rate_error + self.c.component_mul(&attitude_error) })
+        (demand, IntegralErrors { position, attitude: rate_error + self.c.component_mul(&attitude_error) })
     }
 
     /// Advances the integrals if the state was `fresh`. `unallocated` is the part of U1..U3 that the rotors could not
     /// give.
     #[inline]
-    pub(crate) fn learn(&self, memory: &mut Memory, lesson: &Lesson, fresh: bool, unallocated: Vector3<f32>) {
+    pub(crate) fn learn(&self, memory: &mut Memory, lesson: &IntegralErrors, fresh: bool, unallocated: Vector3<f32>) {
         if fresh {
             self.position.learn(&mut memory.position_integral, &lesson.position);
             let allowed = lesson.attitude.zip_map(&memory.unallocated, away_from);

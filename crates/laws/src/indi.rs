@@ -40,13 +40,13 @@
 //!   off or the setpoint lies below it. Do not step while disarmed.
 
 use crate::attitude::{r_earth_body, unit};
-use crate::body::{Body, Demand};
-use crate::differentiator::{Differentiator, Smooth};
-use crate::flatness::{Desired, flat};
-use crate::increment::{Increment, Reaction};
-use crate::limits::Limits;
+use crate::body::{Demand, NominalVehicle};
+use crate::differentiator::{Differentiator, DifferentiatorMemory};
+use crate::flatness::{AttitudeReference, flat};
+use crate::increment::{Increment, IncrementMemory};
+use crate::limits::SpecificForceLimits;
 use crate::loops::{AttitudeLoop, AttitudeOutput, PositionLoop, PositionOutput, xy_and_z};
-use crate::rotor_model::{RotorModel, Spin};
+use crate::rotor_model::{RotorModel, RotorModelMemory};
 use afbc_control::{Action, FlightController, Mixer, Settings, Smoothed, Smoothing, Trace};
 use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
 use nalgebra::Vector3;
@@ -137,9 +137,9 @@ impl Gains {
 /// INDI controller with its constants. Everything that changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Indi<const N: usize = 4> {
-    body: Body<N>,
+    body: NominalVehicle<N>,
     dt_s: f32,
-    limits: Limits,
+    limits: SpecificForceLimits,
     position_filter: Differentiator,
     increment: Increment,
     rotors: RotorModel<N>,
@@ -151,10 +151,10 @@ pub struct Indi<const N: usize = 4> {
 /// State of the controller between steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Memory<const N: usize = 4> {
-    rotors: Spin<N>,
-    velocity: Smooth,
-    specific_force: Smooth,
-    reaction: Reaction,
+    rotors: RotorModelMemory<N>,
+    velocity: DifferentiatorMemory,
+    specific_force: DifferentiatorMemory,
+    reaction: IncrementMemory,
     smoothed: Option<Smoothed>,
     /// Trace of the last step.
     trace: Trace,
@@ -167,13 +167,13 @@ impl<const N: usize> Indi<N> {
     /// Returns the first parameter, setting or gain that is out of range.
     pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let vehicle = vehicle.into();
-        let body = Body::new(&vehicle, &settings, &gains.smoothing)?;
+        let body = NominalVehicle::new(&vehicle, &settings, &gains.smoothing)?;
         let (vehicle, thrust_max_n) = (vehicle.parameters, body.mixer.thrust_max_n());
         gains.validate()?;
         Ok(Indi {
             body,
             dt_s: settings.dt_s,
-            limits: Limits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
+            limits: SpecificForceLimits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
             position_filter: Differentiator::new(gains.position_filter_rad_s, settings.dt_s)?,
             increment: Increment(Differentiator::new(gains.attitude_filter_rad_s, settings.dt_s)?),
             rotors: RotorModel::new(&body, vehicle.weight_n(), gains.rotor_time_constant_s, settings.dt_s),
@@ -227,7 +227,7 @@ impl<const N: usize> FlightController<N> for Indi<N> {
         let specific_force = self.limits.apply(&(memory.specific_force.value() + increment));
 
         // Attitude.
-        let Desired { r_earth_desired: desired, rates_rad_s: omega_d, rates_dot_rad_s2 } =
+        let AttitudeReference { r_earth_desired: desired, rates_rad_s: omega_d, rates_dot_rad_s2 } =
             flat([specific_force, setpoint.jerk_m_s3, setpoint.snap_m_s4], setpoint);
         let to_body = r.transpose() * desired;
         let omega_d = to_body * omega_d;

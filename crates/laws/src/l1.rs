@@ -29,9 +29,9 @@
 //! * **On the ground**, the ground's force counts as uncertainty: see [`crate::indi`].
 
 use crate::attitude::{r_earth_body, unit};
-use crate::differentiator::{Differentiator, Smooth};
+use crate::differentiator::{Differentiator, DifferentiatorMemory};
 use crate::geometric::{self, Geometric};
-use crate::rotor_model::{RotorModel, Spin};
+use crate::rotor_model::{RotorModel, RotorModelMemory};
 use afbc_control::{Action, FlightController, Mixer, Settings, Smoothing, Trace, math};
 use afbc_types::{Airframe, Declared, Inputs, OutOfRange, Setpoint, State, parameters};
 use nalgebra::Vector3;
@@ -136,7 +136,7 @@ pub struct L1<const N: usize = 4> {
 
 /// Predicted velocity and body rates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Prediction {
+struct StatePrediction {
     velocity_m_s: Vector3<f32>,
     rates_rad_s: Vector3<f32>,
 }
@@ -151,12 +151,12 @@ pub struct Memory<const N: usize = 4> {
     /// s_Omega: estimated angular acceleration that the model lacks, body frame \[rad/s2\].
     pub moment_rad_s2: Vector3<f32>,
     /// v^ and Omega^, `None` before the first measurement.
-    prediction: Option<Prediction>,
+    prediction: Option<StatePrediction>,
     /// C_1 (s_v . R e_z) \[m/s2\]
     thrust: f32,
     /// C_2 s_Omega
-    moment: Smooth,
-    rotors: Spin<N>,
+    moment: DifferentiatorMemory,
+    rotors: RotorModelMemory<N>,
 }
 
 impl<const N: usize> L1<N> {
@@ -196,15 +196,15 @@ impl<const N: usize> L1<N> {
 
     /// Returns the prediction for the next step, with the rotors giving `now`.
     #[inline]
-    fn predict(&self, memory: &Memory<N>, state: &State, body_z: &Vector3<f32>, now: &Inputs) -> Prediction {
+    fn predict(&self, memory: &Memory<N>, state: &State, body_z: &Vector3<f32>, now: &Inputs) -> StatePrediction {
         let State { velocity_m_s, rates_rad_s, .. } = *state;
-        let Prediction { velocity_m_s: v, rates_rad_s: omega } =
-            memory.prediction.unwrap_or(Prediction { velocity_m_s, rates_rad_s });
+        let StatePrediction { velocity_m_s: v, rates_rad_s: omega } =
+            memory.prediction.unwrap_or(StatePrediction { velocity_m_s, rates_rad_s });
         let body = &self.geometric.body;
         let gravity = Vector3::new(0.0, 0.0, self.gravity_m_s2);
         let acceleration = body_z * (now.thrust_n / body.mass_kg) - gravity + memory.force_m_s2;
         let angular = body.angular_acceleration(now) + body.coupling(&rates_rad_s) + memory.moment_rad_s2;
-        Prediction {
+        StatePrediction {
             velocity_m_s: v + (acceleration - (v - velocity_m_s) * self.decay_1_s) * self.dt_s,
             rates_rad_s: omega + (angular - (omega - rates_rad_s) * self.decay_1_s) * self.dt_s,
         }

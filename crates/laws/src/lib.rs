@@ -23,7 +23,7 @@
 //!   state.
 //! * Nominal mass and inertia scale everything, so gains are in 1/s and 1/s2 and suit vehicles of any size with the
 //!   same rotor lag.
-//! * [`limits::Limits`]: thrust within what the rotors give, and tilt below a maximum.
+//! * [`limits::SpecificForceLimits`]: thrust within what the rotors give, and tilt below a maximum.
 //! * All mathematics is from [`afbc_control::math`], bit-identical on host and target. Its sine is off by up to 1.7e-4,
 //!   so a tilt of 0.1 rad becomes 0.0998. Without an integral this causes a steady-state error of at most 0.002 m/s2,
 //!   with an integral none.

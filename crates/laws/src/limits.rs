@@ -13,7 +13,7 @@ const VERTICAL_MAX: f32 = 0.9;
 
 /// Bounds of the specific force, the thrust vector per mass in the earth frame \[m/s2\].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
+pub struct SpecificForceLimits {
     gravity_m_s2: f32,
     vertical_min_m_s2: f32,
     vertical_max_m_s2: f32,
@@ -21,14 +21,14 @@ pub struct Limits {
     tan_tilt: f32,
 }
 
-impl Limits {
+impl SpecificForceLimits {
     /// Creates the bounds for a vehicle whose rotors give `thrust_max_n` together. Parameters and largest tilt must be
     /// valid.
     pub fn new(vehicle: &Parameters, thrust_max_n: f32, tilt_max_rad: f32) -> Self {
         let vertical_min_m_s2 = VERTICAL_MIN * vehicle.gravity_m_s2;
         // Even a vehicle whose rotors cannot lift it must have valid bounds.
         let max_m_s2 = (thrust_max_n / vehicle.mass_kg).max(2.0 * vertical_min_m_s2);
-        Limits {
+        SpecificForceLimits {
             gravity_m_s2: vehicle.gravity_m_s2,
             vertical_min_m_s2,
             vertical_max_m_s2: VERTICAL_MAX * max_m_s2,

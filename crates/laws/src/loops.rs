@@ -3,7 +3,7 @@
 
 use crate::attitude::tilt_prioritised_error;
 use crate::integral::{away_from, integrate};
-use crate::limits::{Limits, cylinder};
+use crate::limits::{SpecificForceLimits, cylinder};
 use afbc_types::{Setpoint, State};
 use nalgebra::{Matrix3, Vector3};
 
@@ -55,7 +55,7 @@ pub(crate) struct TrackingLoop {
     pub(crate) position_i: Vector3<f32>,
     /// Largest integral, per coordinate \[m/s2\].
     pub(crate) integral_max_m_s2: f32,
-    pub(crate) limits: Limits,
+    pub(crate) limits: SpecificForceLimits,
     pub(crate) dt_s: f32,
 }
 

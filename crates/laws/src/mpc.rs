@@ -25,20 +25,20 @@
 //! * **Unbounded optimum**: u = -K x with input weight 1 is the solution, and is flown, if no planned step reaches a
 //!   bound. Otherwise [`ITERATIONS`] iterations per step continue from the last step's.
 //! * **Bounds** use the present reference, because the future one is unknown. Height comes before sideways acceleration
-//!   ([`Limits::apply`]), which couples the axes.
+//!   ([`SpecificForceLimits::apply`]), which couples the axes.
 //! * **Lag** applies to the feedback only: the reference's own turning is fed forward, as in [`crate::dfbc`]. a comes
 //!   from the model: fed back as measured, it causes a fall with weak rotors and a large inertia.
 //! * **Drag** stated in the vehicle file is used as in [`crate::dfbc`]; other disturbances are observed.
 //! * **Rotor knowledge**: the time constant [`Gains::rotor_time_constant_s`], like INDI.
 
 use crate::attitude::{r_earth_body, unit};
-use crate::body::{Body, Demand};
-use crate::differentiator::{Differentiator, Smooth};
-use crate::flat_attitude::{Attitude, FlatAttitude, Inner, dragged};
-use crate::increment::Reaction;
-use crate::limits::Limits;
+use crate::body::{Demand, NominalVehicle};
+use crate::differentiator::{Differentiator, DifferentiatorMemory};
+use crate::flat_attitude::{AttitudeDemand, AttitudeGains, FlatAttitude, dragged};
+use crate::increment::IncrementMemory;
+use crate::limits::SpecificForceLimits;
 use crate::loops::xy_and_z;
-use crate::rotor_model::{RotorModel, Spin};
+use crate::rotor_model::{RotorModel, RotorModelMemory};
 use afbc_control::drag::KnownDrag;
 use afbc_control::{Action, FlightController, Mixer, Settings, Smoothed, Smoothing, Trace, math};
 use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
@@ -142,7 +142,7 @@ impl Gains {
 
 /// Cached solution of the Riccati equation for one axis and one input weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Solution {
+struct RiccatiSolution {
     /// K
     gain: Vector3<f32>,
     /// (A - B K)'
@@ -153,14 +153,14 @@ struct Solution {
 
 /// Planner of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Axis {
+struct AxisPlanner {
     a: Matrix3<f32>,
     b: Vector3<f32>,
-    unbounded: Solution,
-    penalised: Solution,
+    unbounded: RiccatiSolution,
+    penalised: RiccatiSolution,
 }
 
-impl Axis {
+impl AxisPlanner {
     /// Creates the planner for weights of position and velocity, lag `tau` and step `h`.
     fn new(weights: [f32; 2], tau: f32, h: f32) -> Self {
         let kept = math::exp(-h / tau);
@@ -170,12 +170,12 @@ impl Axis {
         let b = Vector3::new(0.5 * h * h - tau * late, late, 1.0 - kept);
         let [position, velocity] = weights;
         let q = Vector3::new(position, velocity, 0.0);
-        let solution = |weight| Solution::new(&a, &b, &q, weight);
-        Axis { a, b, unbounded: solution(1.0), penalised: solution(1.0 + RHO) }
+        let solution = |weight| RiccatiSolution::new(&a, &b, &q, weight);
+        AxisPlanner { a, b, unbounded: solution(1.0), penalised: solution(1.0 + RHO) }
     }
 }
 
-impl Solution {
+impl RiccatiSolution {
     /// Solves the Riccati equation by value iteration.
     fn new(a: &Matrix3<f32>, b: &Vector3<f32>, q: &Vector3<f32>, weight: f32) -> Self {
         let q = Matrix3::from_diagonal(q);
@@ -193,33 +193,33 @@ impl Solution {
             p = (next + next.transpose()) * 0.5;
         }
         let (gain, inverse, closed) = step(&p);
-        Solution { gain, closed: closed.transpose(), inverse }
+        RiccatiSolution { gain, closed: closed.transpose(), inverse }
     }
 }
 
 /// MPC controller with its constants. Everything that changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mpc<const N: usize = 4> {
-    body: Body<N>,
+    body: NominalVehicle<N>,
     dt_s: f32,
     weight_n: f32,
     drag: KnownDrag,
-    limits: Limits,
+    limits: SpecificForceLimits,
     position_filter: Differentiator,
     rotors: RotorModel<N>,
     /// Planner of x and y, and planner of z.
-    axes: [Axis; 2],
+    axes: [AxisPlanner; 2],
     /// 1 - exp(-dt / tau)
     follows: Vector3<f32>,
     attitude: FlatAttitude,
 }
 
 /// Vectors x, or p of ADMM, one per axis.
-type Errors = [Vector3<f32>; 3];
+type AxisErrors = [Vector3<f32>; 3];
 
 /// Variables z and y of ADMM.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Split {
+struct AdmmVariables {
     z: Vector3<f32>,
     y: Vector3<f32>,
 }
@@ -227,11 +227,11 @@ struct Split {
 /// State of the controller between steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Memory<const N: usize = 4> {
-    rotors: Spin<N>,
-    velocity: Smooth,
-    specific_force: Smooth,
-    reaction: Reaction,
-    plan: [Split; HORIZON],
+    rotors: RotorModelMemory<N>,
+    velocity: DifferentiatorMemory,
+    specific_force: DifferentiatorMemory,
+    reaction: IncrementMemory,
+    plan: [AdmmVariables; HORIZON],
     /// a - a_d by the model \[m/s2\].
     lagging: Vector3<f32>,
     smoothed: Option<Smoothed>,
@@ -246,12 +246,12 @@ impl<const N: usize> Mpc<N> {
     /// Returns the first parameter, setting or gain that is out of range.
     pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let vehicle = vehicle.into();
-        let body = Body::new(&vehicle, &settings, &gains.smoothing)?;
+        let body = NominalVehicle::new(&vehicle, &settings, &gains.smoothing)?;
         let (vehicle, thrust_max_n) = (vehicle.parameters, body.mixer.thrust_max_n());
         gains.validate()?;
         let weights = [gains.position_weight_1_s4, gains.velocity_weight_1_s2];
         let upright = [gains.height_weight_1_s4, gains.climb_weight_1_s2];
-        let inner = Inner {
+        let inner = AttitudeGains {
             tilt: [gains.tilt_p_1_s2, gains.tilt_d_1_s],
             yaw: [gains.yaw_p_1_s2, gains.yaw_d_1_s],
             filter_rad_s: gains.attitude_filter_rad_s,
@@ -261,12 +261,12 @@ impl<const N: usize> Mpc<N> {
             dt_s: settings.dt_s,
             weight_n: vehicle.weight_n(),
             drag: settings.drag,
-            limits: Limits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
+            limits: SpecificForceLimits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
             position_filter: Differentiator::new(gains.position_filter_rad_s, settings.dt_s)?,
             rotors: RotorModel::new(&body, vehicle.weight_n(), gains.rotor_time_constant_s, settings.dt_s),
             axes: [
-                Axis::new(weights, gains.tilt_lag_s, gains.plan_step_s),
-                Axis::new(upright, gains.lift_lag_s, gains.plan_step_s),
+                AxisPlanner::new(weights, gains.tilt_lag_s, gains.plan_step_s),
+                AxisPlanner::new(upright, gains.lift_lag_s, gains.plan_step_s),
             ],
             follows: xy_and_z(gains.tilt_lag_s, gains.lift_lag_s).map(|tau| 1.0 - math::exp(-settings.dt_s / tau)),
             attitude: FlatAttitude::new(&inner, settings.dt_s)?,
@@ -277,8 +277,8 @@ impl<const N: usize> Mpc<N> {
     #[inline]
     fn planned(
         &self,
-        plan: &mut [Split; HORIZON],
-        x: &Errors,
+        plan: &mut [AdmmVariables; HORIZON],
+        x: &AxisErrors,
         allowed: impl Fn(&Vector3<f32>) -> Vector3<f32>,
     ) -> Vector3<f32> {
         // Flies the unbounded optimum if it is within all bounds.
@@ -291,7 +291,7 @@ impl<const N: usize> Mpc<N> {
                 break;
             }
             // ADMM starts from these values when a bound is reached.
-            *split = Split { z: u, y: Vector3::zeros() };
+            *split = AdmmVariables { z: u, y: Vector3::zeros() };
             self.roll_out(&mut ahead, &u);
         }
         if free {
@@ -302,7 +302,7 @@ impl<const N: usize> Mpc<N> {
         // Continues from the last plan without shifting it: a planned step is much longer than a control step.
         for _ in 0..ITERATIONS {
             let mut forced = [Vector3::zeros(); HORIZON];
-            let mut p = Errors::default();
+            let mut p = AxisErrors::default();
             for (split, forced) in plan.iter().zip(&mut forced).rev() {
                 *forced = self.pulled_back(&mut p, &((split.y - split.z) * RHO));
             }
@@ -319,14 +319,14 @@ impl<const N: usize> Mpc<N> {
         flown
     }
 
-    fn axes(&self) -> [&Axis; 3] {
+    fn axes(&self) -> [&AxisPlanner; 3] {
         let [xy, z] = &self.axes;
         [xy, xy, z]
     }
 
     /// Returns -K x.
     #[inline]
-    fn fed_back(&self, x: &Errors, pick: fn(&Axis) -> &Solution) -> Vector3<f32> {
+    fn fed_back(&self, x: &AxisErrors, pick: fn(&AxisPlanner) -> &RiccatiSolution) -> Vector3<f32> {
         let ([x, y, z], [of_x, of_y, of_z]) = (x, self.axes());
         let of = |axis, x: &Vector3<f32>| -pick(axis).gain.dot(x);
         Vector3::new(of(of_x, x), of(of_y, y), of(of_z, z))
@@ -334,7 +334,7 @@ impl<const N: usize> Mpc<N> {
 
     /// Advances x by one planned step with input u.
     #[inline]
-    fn roll_out(&self, x: &mut Errors, u: &Vector3<f32>) {
+    fn roll_out(&self, x: &mut AxisErrors, u: &Vector3<f32>) {
         for ((axis, x), u) in self.axes().into_iter().zip(x).zip(u.iter()) {
             *x = axis.a * *x + axis.b * *u;
         }
@@ -342,10 +342,10 @@ impl<const N: usize> Mpc<N> {
 
     /// Propagates p back by one planned step with r, and returns e.
     #[inline]
-    fn pulled_back(&self, p: &mut Errors, r: &Vector3<f32>) -> Vector3<f32> {
+    fn pulled_back(&self, p: &mut AxisErrors, r: &Vector3<f32>) -> Vector3<f32> {
         let mut forced = Vector3::zeros();
         for (((axis, p), r), forced) in self.axes().into_iter().zip(p).zip(r.iter()).zip(forced.iter_mut()) {
-            let Solution { gain, closed, inverse } = &axis.penalised;
+            let RiccatiSolution { gain, closed, inverse } = &axis.penalised;
             *forced = (axis.b.dot(p) + r) * *inverse;
             *p = closed * *p - gain * *r;
         }
@@ -402,7 +402,7 @@ impl<const N: usize> FlightController<N> for Mpc<N> {
         let thrust_m_s2 = specific_force.dot(&up);
         let thrust = [thrust_m_s2 / self.limits.gravity().z, thrust_m_s2];
         let flying = self.limits.apply(&(setpoint.acceleration_m_s2 - disturbance + self.limits.gravity()));
-        let Attitude { desired, rates_rad_s, angular_acceleration_rad_s2, attitude_error, rate_error } =
+        let AttitudeDemand { desired, rates_rad_s, angular_acceleration_rad_s2, attitude_error, rate_error } =
             self.attitude.output(
                 &memory.reaction,
                 &r,

@@ -30,18 +30,18 @@
 //!
 //! * Gains of the rate loop are in 1/s, because the inertia scales the moment.
 //! * Thrust is in newtons, so h is relative to the nominal weight.
-//! * [`Limits`] keep no margin for horizontal thrust.
+//! * [`SpecificForceLimits`] keep no margin for horizontal thrust.
 //! * Tracking anti-windup also covers height. Along x and y it compares with the effect of the tilt, not of tilt and
 //!   thrust together.
 //! * Derivatives are those of [`crate::differentiator`].
 //! * The rate integrator is not slowed down at large errors.
 
 use crate::attitude::{facing, length, r_earth_body};
-use crate::body::{Body, Demand};
-use crate::differentiator::{Differentiator, Smooth};
+use crate::body::{Demand, NominalVehicle};
+use crate::differentiator::{Differentiator, DifferentiatorMemory};
 use crate::hover_thrust::{HoverThrust, HoverThrustEstimator};
 use crate::integral::{RATE_INTEGRAL_MAX_RAD_S2, away_from, integrate};
-use crate::limits::Limits;
+use crate::limits::SpecificForceLimits;
 use crate::loops::{AttitudeLoop, AttitudeOutput, PositionLoop, PositionOutput, xy_and_z};
 use afbc_control::{Action, FlightController, Mixer, Settings, Smoothed, Smoothing, Trace};
 use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
@@ -161,8 +161,8 @@ impl Gains {
 /// PID controller with its constants. Everything that changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pid<const N: usize = 4> {
-    body: Body<N>,
-    limits: Limits,
+    body: NominalVehicle<N>,
+    limits: SpecificForceLimits,
     differentiator: Differentiator,
     dt_s: f32,
     position: PositionLoop,
@@ -193,9 +193,9 @@ pub struct Memory {
     /// a_sp_z of the last step \[m/s2\].
     climb_m_s2: f32,
     /// t: vertical thrust divided by the nominal weight, delayed like `velocity`; x and y are 0.
-    thrust_share: Smooth,
-    velocity: Smooth,
-    rates: Smooth,
+    thrust_share: DifferentiatorMemory,
+    velocity: DifferentiatorMemory,
+    rates: DifferentiatorMemory,
     smoothed: Option<Smoothed>,
     /// Trace of the last step.
     trace: Trace,
@@ -208,13 +208,13 @@ impl<const N: usize> Pid<N> {
     /// Returns the first parameter, setting or gain that is out of range.
     pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let vehicle = vehicle.into();
-        let body = Body::new(&vehicle, &settings, &gains.smoothing)?;
+        let body = NominalVehicle::new(&vehicle, &settings, &gains.smoothing)?;
         let (vehicle, thrust_max_n) = (vehicle.parameters, body.mixer.thrust_max_n());
         gains.validate()?;
         let velocity_p = xy_and_z(gains.velocity_p_1_s, gains.climb_p_1_s);
         Ok(Pid {
             body,
-            limits: Limits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
+            limits: SpecificForceLimits::new(&vehicle, thrust_max_n, gains.tilt_max_rad),
             differentiator: Differentiator::new(gains.filter_rad_s, settings.dt_s)?,
             dt_s: settings.dt_s,
             position: PositionLoop {

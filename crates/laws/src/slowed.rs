@@ -1,6 +1,6 @@
 //! Scales gains for rotors with more lag than those for which the gains were tuned.
 
-use afbc_types::{Declaration, Declared, ValueMut};
+use afbc_types::{Declaration, Declared, DeclaredValueMut};
 use core::convert::Infallible;
 
 /// Returns the exponent of time in a unit.
@@ -23,10 +23,10 @@ const ROTOR_LAG: &str = "ROT_LAG";
 /// rotor model gets the lag `lag_s`. Limits in m/s, m/s2 and rad stay.
 #[must_use]
 pub fn slowed<G: Declared>(mut gains: G, slowness: f32, lag_s: f32) -> G {
-    let scale = |Declaration { id, unit, range, .. }: &Declaration, value: ValueMut<'_>| {
+    let scale = |Declaration { id, unit, range, .. }: &Declaration, value: DeclaredValueMut<'_>| {
         let factor = (0..time_power(unit).abs()).fold(1.0, |factor, _| factor * slowness);
         let factor = if time_power(unit) < 0 { 1.0 / factor } else { factor };
-        if let ValueMut::Single(numbers) = value {
+        if let DeclaredValueMut::Single(numbers) = value {
             let within = |number: f32| number.max(range.min as f32).min(range.max as f32);
             if *id == ROTOR_LAG {
                 numbers.iter_mut().for_each(|number| *number = within(lag_s));

@@ -5,7 +5,7 @@ use crate::harness::{Random, vehicle};
 use afbc_control::{Action, Trace};
 use afbc_laws::attitude::{facing, tilt_and_yaw_error, tilt_prioritised_error};
 use afbc_laws::flatness::flat;
-use afbc_laws::limits::Limits;
+use afbc_laws::limits::SpecificForceLimits;
 use afbc_laws::{dfbc, indi};
 use afbc_types::{Setpoint, State};
 use nalgebra::{Rotation3, Vector3};
@@ -178,7 +178,7 @@ fn the_height_of_pid_does_not_tilt_it_and_its_tilt_costs_no_height() {
 #[test]
 fn demanded_accelerations_are_those_of_the_formulas() {
     let effectiveness = Vector3::new(65.789_47, 65.789_47, 1.425_1);
-    let limits = Limits::new(&vehicle(), 12.0, 1.0);
+    let limits = SpecificForceLimits::new(&vehicle(), 12.0, 1.0);
     let mut random = Random(5);
     for _ in 0..500 {
         let attitude = Rotation3::from_scaled_axis(vector(&mut random, 0.3));

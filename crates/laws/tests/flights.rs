@@ -7,7 +7,7 @@ use crate::harness::{
 };
 use afbc_control::FlightController;
 use afbc_laws::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
-use afbc_plant::{Environment, Gust, GustKind, Motion, ParameterChange, PlantParameter};
+use afbc_plant::{Environment, Gust, GustKind, Motion, PlantParameter, PlantParameterChange};
 use afbc_types::{Axis, Parameters, Setpoint};
 use core::f64::consts::FRAC_PI_2;
 use nalgebra::{Vector3, Vector4};
@@ -173,8 +173,10 @@ fn the_hover_thrust_takes_over_from_the_integral() {
         let (strength, mass) = (0.65 + 0.75 * random.uniform(), 0.8 + 0.4 * random.uniform());
         let push = 5.0 * (random.uniform() - 0.5);
         let environment = || {
-            let changes = [(PlantParameter::ThrustFactor, strength), (PlantParameter::Mass, mass)]
-                .map(|(quantity, factor)| ParameterChange { quantity, factor, start_s: 2.0, end_s: f64::INFINITY });
+            let changes =
+                [(PlantParameter::ThrustFactor, strength), (PlantParameter::Mass, mass)].map(|(quantity, factor)| {
+                    PlantParameterChange { quantity, factor, start_s: 2.0, end_s: f64::INFINITY }
+                });
             let gust =
                 Gust { axis: Axis::X, kind: GustKind::Acceleration, size: push, start_s: 0.0, end_s: f64::INFINITY };
             Environment::new(Parameters::PAPER, changes.to_vec(), vec![gust]).unwrap()
@@ -291,7 +293,7 @@ impl Stranger {
     }
 
     fn environment(&self) -> Environment {
-        let always = |(quantity, factor)| ParameterChange { quantity, factor, start_s: 0.0, end_s: f64::INFINITY };
+        let always = |(quantity, factor)| PlantParameterChange { quantity, factor, start_s: 0.0, end_s: f64::INFINITY };
         let axes = [Axis::X, Axis::Y, Axis::Z, Axis::Roll, Axis::Pitch, Axis::Yaw];
         let gust = |(axis, size)| Gust { axis, kind: GustKind::Acceleration, size, start_s: 1.0, end_s: f64::INFINITY };
         let gusts = axes.into_iter().zip(self.push).map(gust).collect();

@@ -2,7 +2,7 @@
 
 use crate::harness::{SETTINGS, vehicle};
 use afbc_laws::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
-use afbc_types::{Declaration, Declared, OutOfRange, Range, Value, ValueMut};
+use afbc_types::{Declaration, Declared, DeclaredValue, DeclaredValueMut, OutOfRange, Range};
 use core::convert::Infallible;
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 fn gains_of_one_key_are_declared_alike() {
     let mut declared: BTreeMap<&str, Declaration> = BTreeMap::new();
     let mut shared = 0;
-    let mut visit = |declaration: &Declaration, _: Value<'_>| {
+    let mut visit = |declaration: &Declaration, _: DeclaredValue<'_>| {
         if let Some(before) = declared.insert(declaration.range.name, *declaration) {
             let same = |d: Declaration| (d.id, d.range, d.unit, d.tuned);
             assert_eq!(same(before), same(*declaration));
@@ -37,7 +37,7 @@ fn gains_out_of_range_are_refused_by_name() {
             for index in 0..count {
                 let (mut gains, mut at, mut name) = (gains, 0, "");
                 let Ok(()) = gains.visit_mut(&mut |declaration, value| {
-                    if let (true, ValueMut::Single([gain])) = (at == index, value) {
+                    if let (true, DeclaredValueMut::Single([gain])) = (at == index, value) {
                         (*gain, name) = (bad(&declaration.range), declaration.range.name);
                     }
                     at += 1;

@@ -3,7 +3,7 @@
 use crate::harness::{SETTINGS, vehicle};
 use afbc_control::{FlightController, Settings, Validated};
 use afbc_laws::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
-use afbc_types::{Declared, Range, Setpoint, State, ValueMut};
+use afbc_types::{Declared, DeclaredValueMut, Range, Setpoint, State};
 use core::convert::Infallible;
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -48,7 +48,7 @@ fn motion() -> impl Strategy<Value = (State, Setpoint)> {
 fn anywhere(gains: &mut impl Declared, shares: &[f64]) {
     let mut shares = shares.iter();
     let Ok(()) = gains.visit_mut(&mut |declaration, value| {
-        let (ValueMut::Single([gain]), Some(share)) = (value, shares.next()) else { panic!("{declaration:?}") };
+        let (DeclaredValueMut::Single([gain]), Some(share)) = (value, shares.next()) else { panic!("{declaration:?}") };
         let Range { min, max, .. } = declaration.range;
         *gain = (min + share * (max - min)) as f32;
         Ok::<(), Infallible>(())

@@ -4,10 +4,10 @@
 #[allow(dead_code, reason = "other tests need the rest")]
 mod strict;
 
-use afbc_estimator::{Aid, Estimate, Measurement, Origin, Validity};
+use afbc_estimator::{AidSource, Estimate, GeodeticOrigin, Measurement, Validity};
 use afbc_flight_core::{Mode, Stamped};
 use afbc_guidance::FlightMode;
-use afbc_guidance::notice::Cause;
+use afbc_guidance::notice::FailsafeCause;
 use afbc_log::ulog::{BesideTick, BlackBox, LogRing, LogStart};
 use afbc_onboard::parameters::ParameterTable;
 use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Report, TickDetails, TickInputs, TickRecord};
@@ -23,7 +23,7 @@ const NOW_US: u64 = 5_000_000;
 struct Tick {
     report: Report,
     details: TickDetails,
-    origin: Option<Origin>,
+    origin: Option<GeodeticOrigin>,
 }
 
 impl Tick {
@@ -112,8 +112,8 @@ fn estimate(change: impl FnOnce(&mut Estimate)) -> Estimate {
 }
 
 /// Returns the receiver's geographic origin, and the local frame's origin in the receiver's frame \[m\].
-fn place() -> (Origin, Vector3<f32>) {
-    (Origin::new(47.0, 8.5, 400.0).unwrap(), Vector3::new(100.0, 200.0, 10.0))
+fn place() -> (GeodeticOrigin, Vector3<f32>) {
+    (GeodeticOrigin::new(47.0, 8.5, 400.0).unwrap(), Vector3::new(100.0, 200.0, 10.0))
 }
 
 /// The estimate, its variances and its geographic position are logged.
@@ -123,16 +123,16 @@ fn an_estimate_is_told() {
     let log = told(|tick| {
         (tick.origin, tick.details.origin_m) = (Some(origin), Some(origin_m));
         tick.details.estimate = Some(estimate(|it| it.validity = valid([true; 5])));
-        for (number, aid) in (1_u8..).zip(Aid::ALL) {
+        for (number, aid) in (1_u8..).zip(AidSource::ALL) {
             let aids = &mut tick.details.aids;
             let record = match aid {
-                Aid::TrackerPosition => &mut aids.tracker_position,
-                Aid::TrackerAttitude => &mut aids.tracker_attitude,
-                Aid::GnssPosition => &mut aids.gnss_position,
-                Aid::GnssHeight => &mut aids.gnss_height,
-                Aid::GnssVelocity => &mut aids.gnss_velocity,
-                Aid::Height => &mut aids.height,
-                Aid::Heading => &mut aids.heading,
+                AidSource::TrackerPosition => &mut aids.tracker_position,
+                AidSource::TrackerAttitude => &mut aids.tracker_attitude,
+                AidSource::GnssPosition => &mut aids.gnss_position,
+                AidSource::GnssHeight => &mut aids.gnss_height,
+                AidSource::GnssVelocity => &mut aids.gnss_velocity,
+                AidSource::Height => &mut aids.height,
+                AidSource::Heading => &mut aids.heading,
             };
             (record.nis, record.scalars) = (f32::from(number) + 0.5, number);
             (record.accepted, record.rejected) = (10 + u32::from(number), 20 + u32::from(number));
@@ -354,7 +354,7 @@ fn modes_have_px4s_numbers() {
             FlightMode::Land => 18.0,
         };
         for core in [Mode::Disarmed, Mode::Flying, Mode::Coasting, Mode::Descending] {
-            for failsafe in [None, Some(Cause::Station)] {
+            for failsafe in [None, Some(FailsafeCause::Station)] {
                 let log = told(|tick| {
                     (tick.report.mode, tick.report.guided.mode) = (core, mode);
                     tick.report.guided.failsafe = failsafe;

@@ -1,12 +1,12 @@
 //! Uses the link alone: encodes a heartbeat, then decodes it from a stream that begins with noise. Run it with `cargo
 //! run -p afbc-mavlink --example link_alone`.
 
-use afbc_mavlink::{Address, Decoder, FRAME_MAX, Sender, Uplink};
+use afbc_mavlink::{Address, Decoder, Encoder, FRAME_MAX, Uplink};
 
 fn main() {
     let (station, vehicle) = (Address { system: 255, component: 190 }, Address { system: 1, component: 1 });
     let mut buffer = [0; FRAME_MAX];
-    let frame = Sender::new(station).send(&Uplink::Heartbeat, &mut buffer);
+    let frame = Encoder::new(station).send(&Uplink::Heartbeat, &mut buffer);
     println!("a heartbeat: {frame:02x?}");
 
     let mut stream = b"noise".to_vec();

@@ -3,7 +3,7 @@
 
 use crate::address::Address;
 use crate::message::{MessageFormat, PAYLOAD_MAX};
-use crate::wire::Layout;
+use crate::wire::MessageLayout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{RC_CHANNELS_DATA, RC_CHANNELS_OVERRIDE_DATA};
 
@@ -23,7 +23,8 @@ pub struct ChannelsOverride {
 }
 
 /// Fields: channels 1 to 8, receiver, channels 9 to 18.
-const OVERRIDE: Layout<RC_CHANNELS_OVERRIDE_DATA, ([u16; FIRST], Address, [u16; RADIO_CHANNELS - FIRST])> = Layout::NEW;
+const OVERRIDE: MessageLayout<RC_CHANNELS_OVERRIDE_DATA, ([u16; FIRST], Address, [u16; RADIO_CHANNELS - FIRST])> =
+    MessageLayout::NEW;
 
 impl ChannelsOverride {
     /// Creates the message that overrides each channel with a pulse \[us\]; 0 releases the channel.
@@ -76,7 +77,7 @@ pub struct RadioChannels {
 }
 
 /// Fields: time, channels, number of channels, signal strength.
-const CHANNELS: Layout<RC_CHANNELS_DATA, (u32, [u16; RADIO_CHANNELS], u8, u8)> = Layout::NEW;
+const CHANNELS: MessageLayout<RC_CHANNELS_DATA, (u32, [u16; RADIO_CHANNELS], u8, u8)> = MessageLayout::NEW;
 
 /// Format of RC_CHANNELS.
 pub(crate) fn format(id: u32) -> Option<MessageFormat> {

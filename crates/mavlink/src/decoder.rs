@@ -1,8 +1,8 @@
 //! Decoding of a byte stream into messages.
 
 use crate::address::Address;
-use crate::framing::{HEADER, Header, SIGNED, SIGNED_FRAME_MAX, START, checksum};
-use crate::message::{Fault, Message};
+use crate::framing::{FrameHeader, HEADER, SIGNED, SIGNED_FRAME_MAX, START, checksum};
+use crate::message::{FrameFault, MessageSet};
 use crate::signature::ReceivedFrame;
 use core::marker::PhantomData;
 use mavlink::Message as _;
@@ -13,17 +13,17 @@ use mavlink::dialects::common::MavMessage;
 pub struct Counters {
     /// Messages delivered.
     pub received: u32,
-    /// Frames dropped for [`Fault::BadChecksum`].
+    /// Frames dropped for [`FrameFault::BadChecksum`].
     pub bad_checksum: u32,
-    /// Frames dropped for [`Fault::Unknown`], or bytes that looked like the start of such a frame.
+    /// Frames dropped for [`FrameFault::Unknown`], or bytes that looked like the start of such a frame.
     pub unknown: u32,
-    /// Frames dropped for [`Fault::Malformed`].
+    /// Frames dropped for [`FrameFault::Malformed`].
     pub malformed: u32,
-    /// Frames dropped for [`Fault::Implausible`].
+    /// Frames dropped for [`FrameFault::Implausible`].
     pub implausible: u32,
-    /// Frames dropped for [`Fault::Unsupported`].
+    /// Frames dropped for [`FrameFault::Unsupported`].
     pub unsupported: u32,
-    /// Frames dropped for [`Fault::Elsewhere`].
+    /// Frames dropped for [`FrameFault::Elsewhere`].
     pub elsewhere: u32,
     /// Bytes outside all frames with a correct checksum.
     pub skipped_bytes: u32,
@@ -65,14 +65,14 @@ impl Counters {
         *self = Self::from_array(counts);
     }
 
-    fn count(&mut self, fault: Fault) {
+    fn count(&mut self, fault: FrameFault) {
         let counter = match fault {
-            Fault::BadChecksum => &mut self.bad_checksum,
-            Fault::Unknown => &mut self.unknown,
-            Fault::Malformed => &mut self.malformed,
-            Fault::Implausible => &mut self.implausible,
-            Fault::Unsupported => &mut self.unsupported,
-            Fault::Elsewhere => &mut self.elsewhere,
+            FrameFault::BadChecksum => &mut self.bad_checksum,
+            FrameFault::Unknown => &mut self.unknown,
+            FrameFault::Malformed => &mut self.malformed,
+            FrameFault::Implausible => &mut self.implausible,
+            FrameFault::Unsupported => &mut self.unsupported,
+            FrameFault::Elsewhere => &mut self.elsewhere,
         };
         add(counter, 1);
     }
@@ -139,15 +139,15 @@ pub struct Decoder<M> {
 const HELD_MAX: usize = SIGNED_FRAME_MAX + 1;
 
 /// Content at the front of the buffer.
-enum Front<M> {
+enum FrameScan<M> {
     /// Undecided until this number of bytes is in the buffer.
     Incomplete(usize),
     /// Not a frame, or a frame to be skipped with this fault.
-    Garbage(Option<Fault>),
+    Garbage(Option<FrameFault>),
     /// A frame of `length` bytes that is damaged or cannot be verified, followed by a start byte.
-    Opaque { length: usize, fault: Fault },
+    Opaque { length: usize, fault: FrameFault },
     /// A frame with a correct checksum, which begins after `skipped` bytes.
-    Intact { skipped: usize, header: Header, message: Result<M, Fault> },
+    Intact { skipped: usize, header: FrameHeader, message: Result<M, FrameFault> },
 }
 
 /// Handler of the frames that a [`Decoder`] finds in its stream.
@@ -171,7 +171,7 @@ impl<M, A: FnMut(&ReceivedFrame<'_>) -> bool, H: FnMut(Address, M, &[u8])> Frame
     }
 }
 
-impl<M: Message> Decoder<M> {
+impl<M: MessageSet> Decoder<M> {
     /// Creates a decoder of messages to `receiver`.
     pub fn new(receiver: Address) -> Self {
         Decoder {
@@ -205,7 +205,7 @@ impl<M: Message> Decoder<M> {
     }
 
     /// Takes bytes like [`feed`](Self::feed), but delivers the frames that `accept` accepts. `accept` is called once
-    /// for each valid frame that the direction carries; refused ones count as [`Fault::Unsupported`].
+    /// for each valid frame that the direction carries; refused ones count as [`FrameFault::Unsupported`].
     pub fn feed_accepted(
         &mut self,
         bytes: &[u8],
@@ -239,26 +239,26 @@ impl<M: Message> Decoder<M> {
     fn advance(&mut self, handler: &mut impl FrameHandler<M>) {
         loop {
             match self.front() {
-                Front::Incomplete(needed) => {
+                FrameScan::Incomplete(needed) => {
                     self.needed = needed;
                     return;
                 }
-                Front::Garbage(fault) => {
+                FrameScan::Garbage(fault) => {
                     fault.into_iter().for_each(|fault| self.counters.count(fault));
                     self.skip_to_start();
                 }
-                Front::Opaque { length, fault } => {
+                FrameScan::Opaque { length, fault } => {
                     self.counters.count(fault);
                     self.sealed = length;
                     self.skip_to_start();
                 }
-                Front::Intact { skipped, header, message } => {
+                FrameScan::Intact { skipped, header, message } => {
                     add(&mut self.counters.skipped_bytes, skipped as u32);
                     // `accepts` may check the signature, which costs a hash, so it is called only for valid messages.
                     let message = message.and_then(|message| {
                         let frame = self.buffer.get(skipped..skipped + header.frame_length()).unwrap_or_default();
                         let frame = ReceivedFrame::new(header.from, header.id, frame, header.unsigned_length());
-                        if handler.accepts(&frame) { Ok(message) } else { Err(Fault::Unsupported) }
+                        if handler.accepts(&frame) { Ok(message) } else { Err(FrameFault::Unsupported) }
                     });
                     self.count_lost(&header);
                     match message {
@@ -276,52 +276,52 @@ impl<M: Message> Decoder<M> {
         }
     }
 
-    fn front(&self) -> Front<M> {
+    fn front(&self) -> FrameScan<M> {
         let held = self.buffer.get(..self.length).unwrap_or_default();
         match held.first() {
-            None => return Front::Incomplete(1),
+            None => return FrameScan::Incomplete(1),
             Some(&START) => {}
-            Some(_) => return Front::Garbage(None),
+            Some(_) => return FrameScan::Garbage(None),
         }
-        let Some(header) = held.first_chunk().map(Header::read) else { return Front::Incomplete(HEADER) };
+        let Some(header) = held.first_chunk().map(FrameHeader::read) else { return FrameScan::Incomplete(HEADER) };
         let length = header.frame_length();
         // The frame would lie completely within a skipped frame, from which nothing is delivered.
         if length <= self.sealed {
-            return Front::Garbage(None);
+            return FrameScan::Garbage(None);
         }
         let Some(frame) = held.get(..length) else { return self.behind_sealed(held, length) };
         if let Some(message) = self.read(frame, &header) {
-            return Front::Intact { skipped: 0, header, message };
+            return FrameScan::Intact { skipped: 0, header, message };
         }
         // Content of a skipped frame that is not a frame is no fault.
         if self.sealed > 0 {
-            return Front::Garbage(None);
+            return FrameScan::Garbage(None);
         }
-        let fault = if M::format(header.id).is_some() { Fault::BadChecksum } else { Fault::Unknown };
+        let fault = if M::format(header.id).is_some() { FrameFault::BadChecksum } else { FrameFault::Unknown };
         // The byte after the frame decides: without a verified checksum, only a following start byte makes it a frame.
         match held.get(length) {
-            None => Front::Incomplete(length + 1),
-            Some(&START) => Front::Opaque { length, fault },
-            Some(_) => Front::Garbage(Some(fault)),
+            None => FrameScan::Incomplete(length + 1),
+            Some(&START) => FrameScan::Opaque { length, fault },
+            Some(_) => FrameScan::Garbage(Some(fault)),
         }
     }
 
     /// Decides about an incomplete frame of `length` bytes at the front of the buffer. Within a skipped frame, it may
     /// extend beyond that frame, or be mere content. If the frame after the skipped bytes is complete and intact, it is
     /// mere content.
-    fn behind_sealed(&self, held: &[u8], length: usize) -> Front<M> {
+    fn behind_sealed(&self, held: &[u8], length: usize) -> FrameScan<M> {
         if self.sealed == 0 {
-            return Front::Incomplete(length);
+            return FrameScan::Incomplete(length);
         }
         let behind = held.get(self.sealed..).unwrap_or_default();
-        let header = behind.first_chunk().map(Header::read).filter(|header| header.frame_length() == behind.len());
+        let header = behind.first_chunk().map(FrameHeader::read).filter(|header| header.frame_length() == behind.len());
         let read = header.and_then(|header| Some((header, self.read(behind, &header)?)));
-        let incomplete = Front::Incomplete(held.len() + 1);
-        read.map_or(incomplete, |(header, message)| Front::Intact { skipped: self.sealed, header, message })
+        let incomplete = FrameScan::Incomplete(held.len() + 1);
+        read.map_or(incomplete, |(header, message)| FrameScan::Intact { skipped: self.sealed, header, message })
     }
 
     /// Returns the message in `frame` if the frame's checksum can be verified and is correct.
-    fn read(&self, frame: &[u8], header: &Header) -> Option<Result<M, Fault>> {
+    fn read(&self, frame: &[u8], header: &FrameHeader) -> Option<Result<M, FrameFault>> {
         let end = HEADER + usize::from(header.length);
         let (summed, payload) = (frame.get(1..end)?, frame.get(HEADER..end)?);
         let sent = frame.get(end..)?.first_chunk().copied().map(u16::from_le_bytes)?;
@@ -329,8 +329,8 @@ impl<M: Message> Decoder<M> {
         let extra_crc = format.map(|format| format.extra_crc).or_else(|| dialect_extra_crc(header.id))?;
         // The checksum is verified first, so that the content of an unsupported frame is not searched for frames.
         (checksum(summed, extra_crc) == sent).then(|| match format {
-            None => Err(Fault::Unknown),
-            Some(_) if header.incompatible & !SIGNED != 0 => Err(Fault::Unsupported),
+            None => Err(FrameFault::Unknown),
+            Some(_) if header.incompatible & !SIGNED != 0 => Err(FrameFault::Unsupported),
             // Cuts off fields that a newer dialect has appended.
             Some(format) => M::read(header.id, payload.get(..format.length_max).unwrap_or(payload), self.receiver),
         })
@@ -355,7 +355,7 @@ impl<M: Message> Decoder<M> {
     }
 
     /// Counts the gap in the sequence numbers before a frame. Out-of-order and duplicate frames leave no gap.
-    fn count_lost(&mut self, header: &Header) {
+    fn count_lost(&mut self, header: &FrameHeader) {
         let gap = match self.last {
             Some((from, sequence)) if from == header.from => header.sequence.wrapping_sub(sequence).wrapping_sub(1),
             _ => 0,

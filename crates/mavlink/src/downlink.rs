@@ -1,19 +1,19 @@
 //! Messages from the vehicle.
 
 use crate::address::Address;
-use crate::answer::{self, Answer};
-use crate::clocks::Clock;
+use crate::command_result::{self, CommandResult};
 use crate::frames::flip;
 use crate::health::{self, HealthArray};
-use crate::interval::{DataStream, Interval};
-use crate::message::{Fault, Message, MessageFormat, PAYLOAD_MAX, parse, put};
-use crate::mission::Mission;
+use crate::interval::{DataStream, MessageInterval};
+use crate::message::{FrameFault, MessageFormat, MessageSet, PAYLOAD_MAX, parse, put};
+use crate::mission::MissionMessage;
 use crate::modes::{AvailableMode, CurrentMode};
 use crate::operator::{ANSWER_ID, ControlAnswer};
 use crate::parameter::{ParameterError, ParameterValue};
-use crate::question::QuestionRefusal;
+use crate::service::ServiceRefusal;
 use crate::target::{PositionTarget, followed_format, read_followed, write_followed};
 use crate::telemetry::Telemetry;
+use crate::time::TimeMessage;
 use afbc_types::{ROTORS_MAX, RotorSpeeds};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
@@ -26,7 +26,7 @@ use mavlink::types::CharArray;
 use nalgebra::{SVector, Vector3};
 
 /// Text of up to 50 bytes.
-pub type Text = CharArray<50>;
+pub type StatusText = CharArray<50>;
 
 /// A message from the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,11 +70,11 @@ pub enum Downlink {
         velocity_m_s: Vector3<f32>,
     },
     /// COMMAND_ACK (77).
-    Answer {
+    CommandAck {
         /// Number of the answered command.
         command: u16,
         /// The answer.
-        answer: Answer,
+        answer: CommandResult,
         /// Sender of the command.
         to: Address,
     },
@@ -83,25 +83,25 @@ pub enum Downlink {
         /// Severity.
         severity: MavSeverity,
         /// Text.
-        text: Text,
+        text: StatusText,
     },
     /// DEBUG_FLOAT_ARRAY (350) named "health".
     Health(HealthArray),
     /// Telemetry for display by ground stations.
     Telemetry(Telemetry),
     /// POSITION_TARGET_LOCAL_NED (85): time since power-up \[ms\] and the target that the vehicle follows.
-    Followed(u32, PositionTarget),
+    PositionTarget(u32, PositionTarget),
     /// MISSION_* message to a ground station.
     Mission {
         /// The message.
-        message: Mission,
+        message: MissionMessage,
         /// Receiver.
         to: Address,
     },
     /// TIMESYNC, PING, SYSTEM_TIME.
-    Clock(Clock),
+    Time(TimeMessage),
     /// MESSAGE_INTERVAL (244).
-    Interval(Interval),
+    Interval(MessageInterval),
     /// AVAILABLE_MODES (435).
     AvailableMode(AvailableMode),
     /// CURRENT_MODE (436).
@@ -122,7 +122,7 @@ pub enum Downlink {
     /// Refusal of a request for a service that the vehicle does not have.
     Refusal {
         /// The refusal.
-        refusal: QuestionRefusal,
+        refusal: ServiceRefusal,
         /// Address of the requester, if the message names it.
         to: Address,
     },
@@ -133,18 +133,18 @@ impl Downlink {
     pub const SPEED_FULL_SCALE_RAD_S: f32 = 32_768.0;
 }
 
-impl Message for Downlink {
+impl MessageSet for Downlink {
     fn format(id: u32) -> Option<MessageFormat> {
         match id {
             HEARTBEAT_DATA::ID => Some(MessageFormat::of::<HEARTBEAT_DATA>(0)),
             HIL_ACTUATOR_CONTROLS_DATA::ID => Some(MessageFormat::of::<HIL_ACTUATOR_CONTROLS_DATA>(0)),
             ATTITUDE_DATA::ID => Some(MessageFormat::of::<ATTITUDE_DATA>(0)),
             LOCAL_POSITION_NED_DATA::ID => Some(MessageFormat::of::<LOCAL_POSITION_NED_DATA>(0)),
-            COMMAND_ACK_DATA::ID => Some(answer::format()),
+            COMMAND_ACK_DATA::ID => Some(command_result::format()),
             STATUSTEXT_DATA::ID => Some(MessageFormat::of::<STATUSTEXT_DATA>(TEXT_EXTENSION)),
             DEBUG_FLOAT_ARRAY_DATA::ID => Some(health::format()),
             POSITION_TARGET_LOCAL_NED_DATA::ID => Some(followed_format()),
-            MESSAGE_INTERVAL_DATA::ID => Some(Interval::format()),
+            MESSAGE_INTERVAL_DATA::ID => Some(MessageInterval::format()),
             AVAILABLE_MODES_DATA::ID => Some(AvailableMode::format()),
             CURRENT_MODE_DATA::ID => Some(CurrentMode::format()),
             PARAM_VALUE_DATA::ID => Some(ParameterValue::format()),
@@ -152,20 +152,20 @@ impl Message for Downlink {
             DATA_STREAM_DATA::ID => Some(DataStream::answer_format()),
             PARAM_ERROR_DATA::ID => Some(ParameterError::format()),
             _ => Telemetry::format(id)
-                .or_else(|| Mission::format(id))
-                .or_else(|| Clock::format(id))
-                .or_else(|| QuestionRefusal::format(id)),
+                .or_else(|| MissionMessage::format(id))
+                .or_else(|| TimeMessage::format(id))
+                .or_else(|| ServiceRefusal::format(id)),
         }
     }
 
-    fn read(id: u32, payload: &[u8], _: Address) -> Result<Self, Fault> {
+    fn read(id: u32, payload: &[u8], _: Address) -> Result<Self, FrameFault> {
         match id {
             HEARTBEAT_DATA::ID => parse(payload).map(read_heartbeat),
             HIL_ACTUATOR_CONTROLS_DATA::ID => read_rotors(&parse(payload)?),
             ATTITUDE_DATA::ID => parse(payload).map(read_attitude),
             LOCAL_POSITION_NED_DATA::ID => parse(payload).map(read_position),
             COMMAND_ACK_DATA::ID => {
-                answer::read(payload).map(|(command, answer, to)| Downlink::Answer { command, answer, to })
+                command_result::read(payload).map(|(command, answer, to)| Downlink::CommandAck { command, answer, to })
             }
             STATUSTEXT_DATA::ID => {
                 let STATUSTEXT_DATA { severity, text } = parse(payload)?;
@@ -173,9 +173,9 @@ impl Message for Downlink {
             }
             DEBUG_FLOAT_ARRAY_DATA::ID => health::read(payload).map(Downlink::Health),
             POSITION_TARGET_LOCAL_NED_DATA::ID => {
-                read_followed(payload).map(|(time_ms, motion)| Downlink::Followed(time_ms, motion))
+                read_followed(payload).map(|(time_ms, motion)| Downlink::PositionTarget(time_ms, motion))
             }
-            MESSAGE_INTERVAL_DATA::ID => Ok(Downlink::Interval(Interval::read(payload))),
+            MESSAGE_INTERVAL_DATA::ID => Ok(Downlink::Interval(MessageInterval::read(payload))),
             AVAILABLE_MODES_DATA::ID => Ok(Downlink::AvailableMode(AvailableMode::read(payload))),
             CURRENT_MODE_DATA::ID => Ok(Downlink::CurrentMode(CurrentMode::read(payload))),
             PARAM_VALUE_DATA::ID => Ok(Downlink::Parameter(ParameterValue::read(payload))),
@@ -185,13 +185,13 @@ impl Message for Downlink {
                 let (error, to) = ParameterError::read(payload);
                 Ok(Downlink::ParameterError { error, to })
             }
-            _ if QuestionRefusal::format(id).is_some() => {
-                QuestionRefusal::read(id, payload).map(|(refusal, to)| Downlink::Refusal { refusal, to })
+            _ if ServiceRefusal::format(id).is_some() => {
+                ServiceRefusal::read(id, payload).map(|(refusal, to)| Downlink::Refusal { refusal, to })
             }
-            _ if Mission::format(id).is_some() => {
-                Mission::read(id, payload).map(|(message, to)| Downlink::Mission { message, to })
+            _ if MissionMessage::format(id).is_some() => {
+                MissionMessage::read(id, payload).map(|(message, to)| Downlink::Mission { message, to })
             }
-            _ if Clock::format(id).is_some() => Clock::read(id, payload).map(Downlink::Clock),
+            _ if TimeMessage::format(id).is_some() => TimeMessage::read(id, payload).map(Downlink::Time),
             _ => Telemetry::read(id, payload).map(Downlink::Telemetry),
         }
     }
@@ -211,13 +211,13 @@ impl Message for Downlink {
                 let [vx, vy, vz] = flip(*velocity_m_s).into();
                 put(&LOCAL_POSITION_NED_DATA { time_boot_ms: *time_ms, x, y, z, vx, vy, vz }, payload)
             }
-            Downlink::Answer { command, answer, to } => answer::write(*command, *answer, *to, payload),
+            Downlink::CommandAck { command, answer, to } => command_result::write(*command, *answer, *to, payload),
             Downlink::Text { severity, text } => put(&STATUSTEXT_DATA { severity: *severity, text: *text }, payload),
             Downlink::Health(health) => health.write(payload),
             Downlink::Telemetry(telemetry) => telemetry.write(payload),
-            Downlink::Followed(time_ms, motion) => write_followed(*time_ms, motion, payload),
+            Downlink::PositionTarget(time_ms, motion) => write_followed(*time_ms, motion, payload),
             Downlink::Mission { message, to } => message.write(*to, payload),
-            Downlink::Clock(clock) => clock.write(payload),
+            Downlink::Time(clock) => clock.write(payload),
             Downlink::Interval(interval) => interval.write(payload),
             Downlink::AvailableMode(mode) => mode.write(payload),
             Downlink::CurrentMode(mode) => mode.write(payload),
@@ -258,11 +258,11 @@ fn write_heartbeat(armed: bool, failsafe: bool, mode: u32) -> HEARTBEAT_DATA {
     }
 }
 
-fn read_rotors(data: &HIL_ACTUATOR_CONTROLS_DATA) -> Result<Downlink, Fault> {
+fn read_rotors(data: &HIL_ACTUATOR_CONTROLS_DATA) -> Result<Downlink, FrameFault> {
     let [a, b, c, d, e, f, g, h, ..] = data.controls;
     let controls = SVector::from([a, b, c, d, e, f, g, h]);
     if !controls.iter().all(|control| (0.0..=1.0).contains(control)) {
-        return Err(Fault::Implausible);
+        return Err(FrameFault::Implausible);
     }
     Ok(Downlink::Rotors {
         time_us: data.time_usec,

@@ -9,8 +9,8 @@
 //! signature are not supported.
 
 use crate::address::Address;
-use crate::message::{Message, PAYLOAD_MAX};
-use crate::signature::{Key, SIGNATURE, Stamp};
+use crate::message::{MessageSet, PAYLOAD_MAX};
+use crate::signature::{SIGNATURE, SigningKey, Stamp};
 
 /// First byte of a frame.
 pub(crate) const START: u8 = 0xFD;
@@ -27,7 +27,7 @@ pub const SIGNED_FRAME_MAX: usize = FRAME_MAX + SIGNATURE;
 
 /// A frame's header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Header {
+pub(crate) struct FrameHeader {
     pub(crate) length: u8,
     pub(crate) incompatible: u8,
     pub(crate) sequence: u8,
@@ -35,11 +35,11 @@ pub(crate) struct Header {
     pub(crate) id: u32,
 }
 
-impl Header {
+impl FrameHeader {
     pub(crate) fn read(bytes: &[u8; HEADER]) -> Self {
         let [_, length, incompatible, _, sequence, system, component, id0, id1, id2] = *bytes;
         let id = u32::from_le_bytes([id0, id1, id2, 0]);
-        Header { length, incompatible, sequence, from: Address { system, component }, id }
+        FrameHeader { length, incompatible, sequence, from: Address { system, component }, id }
     }
 
     /// Returns the number of bytes of the frame without a signature.
@@ -71,20 +71,20 @@ pub(crate) fn checksum(bytes: &[u8], extra_crc: u8) -> u16 {
 
 /// Encoder of messages as numbered frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Sender {
+pub struct Encoder {
     from: Address,
     sequence: u8,
 }
 
-impl Sender {
+impl Encoder {
     /// Creates a sender with address `from`, beginning with sequence number 0.
     pub const fn new(from: Address) -> Self {
-        Sender { from, sequence: 0 }
+        Encoder { from, sequence: 0 }
     }
 
     /// Encodes `message` at the beginning of `buffer` and returns the frame.
     #[must_use = "the bytes are yet to be sent"]
-    pub fn send<'a>(&mut self, message: &impl Message, buffer: &'a mut [u8; FRAME_MAX]) -> &'a [u8] {
+    pub fn send<'a>(&mut self, message: &impl MessageSet, buffer: &'a mut [u8; FRAME_MAX]) -> &'a [u8] {
         let length = self.write(message, 0, buffer);
         buffer.get(..length).unwrap_or_default()
     }
@@ -93,8 +93,8 @@ impl Sender {
     #[must_use = "the bytes are yet to be sent"]
     pub fn send_signed<'a>(
         &mut self,
-        message: &impl Message,
-        signer: Option<(&Key, Stamp)>,
+        message: &impl MessageSet,
+        signer: Option<(&SigningKey, Stamp)>,
         buffer: &'a mut [u8; SIGNED_FRAME_MAX],
     ) -> &'a [u8] {
         let Some((frame, _)) = buffer.split_first_chunk_mut() else { return &[] };
@@ -111,11 +111,11 @@ impl Sender {
     }
 
     /// Writes an unsigned frame with these incompatibility flags; returns its length.
-    fn write(&mut self, message: &impl Message, incompatible: u8, buffer: &mut [u8; FRAME_MAX]) -> usize {
+    fn write(&mut self, message: &impl MessageSet, incompatible: u8, buffer: &mut [u8; FRAME_MAX]) -> usize {
         let (head, rest) = buffer.split_at_mut(HEADER);
         let Some((payload, _)) = rest.split_first_chunk_mut::<PAYLOAD_MAX>() else { return 0 };
         let (id, length) = message.write(payload);
-        let header = Header { length, incompatible, sequence: self.sequence, from: self.from, id };
+        let header = FrameHeader { length, incompatible, sequence: self.sequence, from: self.from, id };
         self.sequence = self.sequence.wrapping_add(1);
         head.copy_from_slice(&header.write());
 

@@ -1,7 +1,7 @@
 //! Health of the flight core and the link: DEBUG_FLOAT_ARRAY named "health".
 
 use crate::decoder::Counters;
-use crate::message::{Fault, MessageFormat, PAYLOAD_MAX, extension, parse, put_extended};
+use crate::message::{FrameFault, MessageFormat, PAYLOAD_MAX, extension, parse, put_extended};
 use afbc_types::{Axis, PerAxis};
 use mavlink::dialects::common::DEBUG_FLOAT_ARRAY_DATA;
 
@@ -56,12 +56,12 @@ pub(crate) fn format() -> MessageFormat {
     MessageFormat::of::<DEBUG_FLOAT_ARRAY_DATA>(4 * ELEMENTS)
 }
 
-pub(crate) fn read(payload: &[u8]) -> Result<HealthArray, Fault> {
+pub(crate) fn read(payload: &[u8]) -> Result<HealthArray, FrameFault> {
     let (data, extension): (_, [u8; 4 * ELEMENTS]) = (parse(payload)?, extension::<DEBUG_FLOAT_ARRAY_DATA, _>(payload));
     let DEBUG_FLOAT_ARRAY_DATA { time_usec: time_us, name, .. } = data;
 
     if name.to_str() != Ok(NAME) {
-        return Err(Fault::Unsupported);
+        return Err(FrameFault::Unsupported);
     }
     let (elements, _) = extension.as_chunks();
     let mut elements = elements.iter().map(|bytes| f32::from_le_bytes(*bytes));

@@ -2,8 +2,8 @@
 
 use crate::address::Address;
 use crate::frames::flip;
-use crate::message::{Fault, Message, MessageFormat, PAYLOAD_MAX};
-use crate::wire::Layout;
+use crate::message::{FrameFault, MessageFormat, MessageSet, PAYLOAD_MAX};
+use crate::wire::MessageLayout;
 use mavlink::MessageData;
 use mavlink::dialects::common::HIGHRES_IMU_DATA;
 use nalgebra::Vector3;
@@ -23,25 +23,25 @@ pub struct InertialSample {
 }
 
 /// Fields: time; force, rates, field; pressures and altitude; temperature; flags of updated fields.
-const SAMPLE: Layout<HIGHRES_IMU_DATA, (u64, [[f32; 3]; 3], [f32; 3], f32, u16)> = Layout::NEW;
+const SAMPLE: MessageLayout<HIGHRES_IMU_DATA, (u64, [[f32; 3]; 3], [f32; 3], f32, u16)> = MessageLayout::NEW;
 /// HIGHRES_IMU_UPDATED_FLAGS, three axes each.
 const INERTIAL: u16 = 0o77;
 const FIELD: u16 = 0o700;
 /// Microtesla per gauss, the message's unit.
 const UT_PER_GAUSS: f32 = 100.0;
 
-impl Message for InertialSample {
+impl MessageSet for InertialSample {
     fn format(id: u32) -> Option<MessageFormat> {
         (id == HIGHRES_IMU_DATA::ID).then(|| SAMPLE.format())
     }
 
-    fn read(_: u32, payload: &[u8], _: Address) -> Result<Self, Fault> {
+    fn read(_: u32, payload: &[u8], _: Address) -> Result<Self, FrameFault> {
         let (time_us, [force, rates, field], .., updated) = SAMPLE.read(payload);
         if !force.iter().chain(&rates).chain(&field).all(|number| number.is_finite()) {
-            return Err(Fault::Implausible);
+            return Err(FrameFault::Implausible);
         }
         if updated & INERTIAL != INERTIAL {
-            return Err(Fault::Unsupported);
+            return Err(FrameFault::Unsupported);
         }
         Ok(InertialSample {
             time_us,

@@ -2,12 +2,12 @@
 
 use crate::address::Address;
 use crate::message::{MessageFormat, PAYLOAD_MAX};
-use crate::wire::Layout;
+use crate::wire::MessageLayout;
 use mavlink::dialects::common::{DATA_STREAM_DATA, MESSAGE_INTERVAL_DATA, REQUEST_DATA_STREAM_DATA};
 
 /// MESSAGE_INTERVAL (244).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Interval {
+pub struct MessageInterval {
     /// Id of the message.
     pub message: u32,
     /// Interval; -1: never, 0: not available \[us\].
@@ -23,21 +23,21 @@ pub struct DataStream {
     pub rate_hz: u16,
 }
 
-const INTERVAL: Layout<MESSAGE_INTERVAL_DATA, (i32, u16)> = Layout::NEW;
+const INTERVAL: MessageLayout<MESSAGE_INTERVAL_DATA, (i32, u16)> = MessageLayout::NEW;
 /// Fields: rate, receiver, group, start.
-const STREAM: Layout<REQUEST_DATA_STREAM_DATA, (u16, Address, u8, u8)> = Layout::NEW;
+const STREAM: MessageLayout<REQUEST_DATA_STREAM_DATA, (u16, Address, u8, u8)> = MessageLayout::NEW;
 
 /// Fields: rate, group, on.
-const GROUP: Layout<DATA_STREAM_DATA, (u16, u8, u8)> = Layout::NEW;
+const GROUP: MessageLayout<DATA_STREAM_DATA, (u16, u8, u8)> = MessageLayout::NEW;
 
-impl Interval {
+impl MessageInterval {
     pub(crate) fn format() -> MessageFormat {
         INTERVAL.format()
     }
 
     pub(crate) fn read(payload: &[u8]) -> Self {
         let (interval_us, message) = INTERVAL.read(payload);
-        Interval { message: message.into(), interval_us }
+        MessageInterval { message: message.into(), interval_us }
     }
 
     pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {

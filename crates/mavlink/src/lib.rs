@@ -5,11 +5,11 @@
 //! 1. [`frames`]: conversion between the wire's frames (z down) and the workspace's (z up).
 //! 2. [`Uplink`]: messages to the vehicle. [`Downlink`]: messages from the vehicle. Both can be read and written, since
 //!    the simulator is the other end. [`Transfer`]: files and logs of vehicles with storage.
-//! 3. [`Sender`]: encodes messages. [`Decoder`]: decodes bytes in pieces of any size, with anything between the frames,
-//!    and counts dropped frames in [`Counters`].
+//! 3. [`Encoder`]: encodes messages. [`Decoder`]: decodes bytes in pieces of any size, with anything between the
+//!    frames, and counts dropped frames in [`Counters`].
 //!
 //! Layouts, checksum seeds and enumerations come from the `mavlink` crate's `common` dialect. The firmware contains
-//! only the messages named here. Signatures use SHA-256 of the `hmac-sha256` crate: [`Key`], [`ReceivedFrame`].
+//! only the messages named here. Signatures use SHA-256 of the `hmac-sha256` crate: [`SigningKey`], [`ReceivedFrame`].
 //!
 //! No input makes the crate panic or block. Its memory is one frame.
 //!
@@ -30,14 +30,14 @@
 #![allow(clippy::type_complexity, reason = "a message's layout is the tuple of its fields")]
 
 mod address;
-mod answer;
 mod channels;
-mod clocks;
 mod command;
+mod command_result;
 mod decoder;
 mod downlink;
 pub mod frames;
 mod framing;
+mod global_position;
 mod health;
 mod inertial;
 mod interval;
@@ -46,42 +46,42 @@ mod mission;
 mod modes;
 mod operator;
 mod parameter;
-mod place;
-mod question;
+mod service;
 mod signature;
 mod target;
 pub mod telemetry;
 mod texts;
+mod time;
 mod transfer;
 mod uplink;
 mod wire;
 
 pub use address::Address;
-pub use answer::Answer;
 pub use channels::{ChannelsOverride, RADIO_CHANNELS, RadioChannels};
-pub use clocks::Clock;
-pub use command::{CalibrationRequest, Command, Reboot, Storage};
+pub use command::{CalibrationRequest, Reboot, Storage, VehicleCommand};
+pub use command_result::CommandResult;
 pub use decoder::{Counters, Decoder, FrameHandler};
-pub use downlink::{Downlink, Text};
-pub use framing::{FRAME_MAX, SIGNED_FRAME_MAX, Sender};
+pub use downlink::{Downlink, StatusText};
+pub use framing::{Encoder, FRAME_MAX, SIGNED_FRAME_MAX};
+pub use global_position::{Datum, GlobalPosition, Height};
 pub use health::{HealthArray, StatesRefused};
 pub use inertial::InertialSample;
-pub use interval::{DataStream, Interval};
+pub use interval::{DataStream, MessageInterval};
 pub use mavlink::dialects::common::{MavCmd, MavSeverity};
-pub use message::{Fault, Message, MessageFormat};
-pub use mission::{Mission, MissionCurrent, MissionItem, MissionResult, Part, Plan};
+pub use message::{FrameFault, MessageFormat, MessageSet};
+pub use mission::{MissionCurrent, MissionItem, MissionMessage, MissionRange, MissionResult, MissionType};
 pub use modes::{AvailableMode, CurrentMode};
 pub use operator::{ControlAnswer, ControlRequest};
 pub use parameter::{ParameterError, ParameterName, ParameterRequest, ParameterValue};
-pub use place::{Datum, Height, Place};
-pub use question::{
+pub use service::{
     EventError, EventRequest, ExtendedAnswer, ExtendedName, ExtendedRequest, FileOperation, FileRefusal, FtpError,
-    LogAnswer, LogRequest, Question, QuestionRefusal, Serial, Terrain, UnansweredWish,
+    LogAnswer, LogRequest, SerialControl, ServiceRefusal, ServiceRequest, Terrain, UnansweredRequest,
 };
-pub use signature::{Key, ReceivedFrame, SetupSigning, Stamp, TIME_MAX};
-pub use target::{AttitudeAndThrust, Axes, ExternalTarget, ManualControl, PositionTarget};
+pub use signature::{ReceivedFrame, SetupSigning, SigningKey, Stamp, TIME_MAX};
+pub use target::{AttitudeAndThrust, ExternalTarget, ManualControl, PositionTarget, TargetFrame};
 pub use telemetry::Telemetry;
 pub use texts::sent_texts;
+pub use time::TimeMessage;
 pub use transfer::{
     ComponentMetadata, FILE_DATA_MAX, FileOpcode, FilePacket, LOG_DATA_MAX, LogData, LogEntry, LogMessage,
     STREAM_DATA_MAX, StreamedLog, Transfer,

@@ -29,7 +29,7 @@ impl MessageFormat {
 /// Reason for dropping a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
-pub enum Fault {
+pub enum FrameFault {
     /// Wrong checksum: the frame was corrupted, or was truncated and completed by later bytes.
     BadChecksum,
     /// The direction does not carry this message.
@@ -45,7 +45,7 @@ pub enum Fault {
 }
 
 /// All messages of one direction.
-pub trait Message: Sized {
+pub trait MessageSet: Sized {
     /// Returns the format of the message numbered `id`, if this direction carries it.
     fn format(id: u32) -> Option<MessageFormat>;
 
@@ -53,20 +53,20 @@ pub trait Message: Sized {
     ///
     /// # Errors
     /// The reason for dropping the message.
-    fn read(id: u32, payload: &[u8], receiver: Address) -> Result<Self, Fault>;
+    fn read(id: u32, payload: &[u8], receiver: Address) -> Result<Self, FrameFault>;
 
     /// Writes the payload; returns the message id and the payload's length.
     fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8);
 }
 
 /// Returns the checksum's seed of a message that this direction carries.
-pub(crate) fn extra_crc<M: Message>(_: &M, id: u32) -> u8 {
+pub(crate) fn extra_crc<M: MessageSet>(_: &M, id: u32) -> u8 {
     M::format(id).map_or(0, |format| format.extra_crc)
 }
 
 /// Reads a payload as the message `D`.
-pub(crate) fn parse<D: MessageData>(payload: &[u8]) -> Result<D, Fault> {
-    D::deser(MavlinkVersion::V2, payload).map_err(|_| Fault::Malformed)
+pub(crate) fn parse<D: MessageData>(payload: &[u8]) -> Result<D, FrameFault> {
+    D::deser(MavlinkVersion::V2, payload).map_err(|_| FrameFault::Malformed)
 }
 
 /// Returns the first `N` bytes of the extension fields of the message `D`, padded with zeros.

@@ -1,9 +1,9 @@
 //! Missions, fences and rally points: the messages of MAVLink's mission protocol, in both directions.
 
 use crate::address::Address;
-use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
-use crate::place::Place;
-use crate::wire::Layout;
+use crate::global_position::GlobalPosition;
+use crate::message::{FrameFault, MessageFormat, PAYLOAD_MAX};
+use crate::wire::MessageLayout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     MISSION_ACK_DATA, MISSION_CLEAR_ALL_DATA, MISSION_COUNT_DATA, MISSION_CURRENT_DATA, MISSION_ITEM_DATA,
@@ -14,17 +14,17 @@ use mavlink::dialects::common::{
 
 /// Kind of a list of items: `MAV_MISSION_TYPE`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Plan(pub u8);
+pub struct MissionType(pub u8);
 
-impl Plan {
+impl MissionType {
     /// A mission.
-    pub const MISSION: Plan = Plan(0);
+    pub const MISSION: MissionType = MissionType(0);
     /// A geofence.
-    pub const FENCE: Plan = Plan(1);
+    pub const FENCE: MissionType = MissionType(1);
     /// Rally points.
-    pub const RALLY: Plan = Plan(2);
+    pub const RALLY: MissionType = MissionType(2);
     /// All of these; only for clearing.
-    pub const ALL: Plan = Plan(255);
+    pub const ALL: MissionType = MissionType(255);
 }
 
 /// An item as sent: MISSION_ITEM_INT (73) without its receiver, or MISSION_ITEM (39) converted to the same units.
@@ -52,21 +52,21 @@ pub struct MissionItem {
 
 /// A message of the mission protocol.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Mission {
+pub enum MissionMessage {
     /// MISSION_COUNT (44): number of items that follow or can be requested.
-    Count(u16, Plan),
+    Count(u16, MissionType),
     /// MISSION_REQUEST_LIST (43): requests the number of items.
-    List(Plan),
+    List(MissionType),
     /// MISSION_REQUEST_INT (51), or the equivalent MISSION_REQUEST (40): requests an item.
-    Request(u16, Plan),
+    Request(u16, MissionType),
     /// MISSION_ITEM_INT (73), or the equivalent MISSION_ITEM (39).
-    Item(MissionItem, Plan),
+    Item(MissionItem, MissionType),
     /// MISSION_REQUEST_PARTIAL_LIST (37) or MISSION_WRITE_PARTIAL_LIST (38): a range of items.
-    Part(Part, Plan),
+    PartialList(MissionRange, MissionType),
     /// MISSION_ACK (47) with a `MAV_MISSION_RESULT`.
-    Ack(MissionResult, Plan),
+    Ack(MissionResult, MissionType),
     /// MISSION_CLEAR_ALL (45).
-    Clear(Plan),
+    Clear(MissionType),
     /// MISSION_SET_CURRENT (41).
     SetCurrent(u16),
     /// MISSION_CURRENT (42), to everyone.
@@ -77,7 +77,7 @@ pub enum Mission {
 
 /// A range of a list of items.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Part {
+pub struct MissionRange {
     /// True to write the range, false to read it.
     pub writes: bool,
     /// Numbers of the first and the last item.
@@ -128,26 +128,28 @@ impl MissionResult {
     pub const CANCELLED: Self = MissionResult(15);
 }
 
-type ToAddress<D, W> = Layout<D, (W, Address, u8)>;
+type ToAddress<D, W> = MessageLayout<D, (W, Address, u8)>;
 
 // Some messages end with ids of the plan, which are not used.
-const COUNT: Layout<MISSION_COUNT_DATA, (u16, Address, u8, u32)> = Layout::NEW;
-const READ_PART: ToAddress<MISSION_REQUEST_PARTIAL_LIST_DATA, [i16; 2]> = Layout::NEW;
-const WRITE_PART: ToAddress<MISSION_WRITE_PARTIAL_LIST_DATA, [i16; 2]> = Layout::NEW;
-const LIST: Layout<MISSION_REQUEST_LIST_DATA, (Address, u8)> = Layout::NEW;
-const REQUEST_INT: ToAddress<MISSION_REQUEST_INT_DATA, u16> = Layout::NEW;
-const REQUEST: ToAddress<MISSION_REQUEST_DATA, u16> = Layout::NEW;
-const ACK: Layout<MISSION_ACK_DATA, (Address, u8, u8, u32)> = Layout::NEW;
-const CLEAR: Layout<MISSION_CLEAR_ALL_DATA, (Address, u8)> = Layout::NEW;
-const SET_CURRENT: Layout<MISSION_SET_CURRENT_DATA, (u16, Address)> = Layout::NEW;
-const CURRENT: Layout<MISSION_CURRENT_DATA, (u16, u16, u8, u8, [u32; 3])> = Layout::NEW;
-const REACHED: Layout<MISSION_ITEM_REACHED_DATA, (u16,)> = Layout::NEW;
+const COUNT: MessageLayout<MISSION_COUNT_DATA, (u16, Address, u8, u32)> = MessageLayout::NEW;
+const READ_PART: ToAddress<MISSION_REQUEST_PARTIAL_LIST_DATA, [i16; 2]> = MessageLayout::NEW;
+const WRITE_PART: ToAddress<MISSION_WRITE_PARTIAL_LIST_DATA, [i16; 2]> = MessageLayout::NEW;
+const LIST: MessageLayout<MISSION_REQUEST_LIST_DATA, (Address, u8)> = MessageLayout::NEW;
+const REQUEST_INT: ToAddress<MISSION_REQUEST_INT_DATA, u16> = MessageLayout::NEW;
+const REQUEST: ToAddress<MISSION_REQUEST_DATA, u16> = MessageLayout::NEW;
+const ACK: MessageLayout<MISSION_ACK_DATA, (Address, u8, u8, u32)> = MessageLayout::NEW;
+const CLEAR: MessageLayout<MISSION_CLEAR_ALL_DATA, (Address, u8)> = MessageLayout::NEW;
+const SET_CURRENT: MessageLayout<MISSION_SET_CURRENT_DATA, (u16, Address)> = MessageLayout::NEW;
+const CURRENT: MessageLayout<MISSION_CURRENT_DATA, (u16, u16, u8, u8, [u32; 3])> = MessageLayout::NEW;
+const REACHED: MessageLayout<MISSION_ITEM_REACHED_DATA, (u16,)> = MessageLayout::NEW;
 /// Fields: parameters, x, y, z; number, command, receiver; frame, current, autocontinue, kind of list.
-const ITEM: Layout<MISSION_ITEM_INT_DATA, ([f32; 4], [i32; 2], f32, u16, u16, Address, [u8; 3], u8)> = Layout::NEW;
+const ITEM: MessageLayout<MISSION_ITEM_INT_DATA, ([f32; 4], [i32; 2], f32, u16, u16, Address, [u8; 3], u8)> =
+    MessageLayout::NEW;
 /// The fields of [`ITEM`], with x and y as floats.
-const FLOAT_ITEM: Layout<MISSION_ITEM_DATA, ([f32; 4], [f32; 2], f32, u16, u16, Address, [u8; 3], u8)> = Layout::NEW;
+const FLOAT_ITEM: MessageLayout<MISSION_ITEM_DATA, ([f32; 4], [f32; 2], f32, u16, u16, Address, [u8; 3], u8)> =
+    MessageLayout::NEW;
 
-impl Mission {
+impl MissionMessage {
     pub(crate) fn format(id: u32) -> Option<MessageFormat> {
         Some(match id {
             MISSION_COUNT_DATA::ID => COUNT.format(),
@@ -168,26 +170,26 @@ impl Mission {
     }
 
     /// Returns the message and its receiver.
-    pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Self, Address), Fault> {
+    pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Self, Address), FrameFault> {
         Ok(match id {
             MISSION_COUNT_DATA::ID => {
                 let (count, to, plan, _) = COUNT.read(payload);
-                (Mission::Count(count, Plan(plan)), to)
+                (MissionMessage::Count(count, MissionType(plan)), to)
             }
             MISSION_REQUEST_LIST_DATA::ID => {
                 let (to, plan) = LIST.read(payload);
-                (Mission::List(Plan(plan)), to)
+                (MissionMessage::List(MissionType(plan)), to)
             }
             // MISSION_REQUEST has the same fields and is answered the same, by MISSION_ITEM_INT.
             MISSION_REQUEST_INT_DATA::ID | MISSION_REQUEST_DATA::ID => {
                 let (number, to, plan) = REQUEST_INT.read(payload);
-                (Mission::Request(number, Plan(plan)), to)
+                (MissionMessage::Request(number, MissionType(plan)), to)
             }
             MISSION_ITEM_INT_DATA::ID => {
                 let (parameters, [x, y], z, number, command, to, [frame, current, goes_on], plan) = ITEM.read(payload);
                 let (is_current, goes_on) = (current != 0, goes_on != 0);
                 let item = MissionItem { number, command, frame, is_current, goes_on, parameters, x, y, z };
-                (Mission::Item(item, Plan(plan)), to)
+                (MissionMessage::Item(item, MissionType(plan)), to)
             }
             MISSION_ITEM_DATA::ID => {
                 let (parameters, place, z, number, command, to, [frame, current, goes_on], plan) =
@@ -195,57 +197,61 @@ impl Mission {
                 let (is_current, goes_on) = (current != 0, goes_on != 0);
                 let [x, y] = place.map(|number| in_units(number, frame));
                 let item = MissionItem { number, command, frame, is_current, goes_on, parameters, x, y, z };
-                (Mission::Item(item, Plan(plan)), to)
+                (MissionMessage::Item(item, MissionType(plan)), to)
             }
             MISSION_REQUEST_PARTIAL_LIST_DATA::ID => {
                 let (numbers, to, plan) = READ_PART.read(payload);
-                (Mission::Part(Part { writes: false, numbers }, Plan(plan)), to)
+                (MissionMessage::PartialList(MissionRange { writes: false, numbers }, MissionType(plan)), to)
             }
             MISSION_WRITE_PARTIAL_LIST_DATA::ID => {
                 let (numbers, to, plan) = WRITE_PART.read(payload);
-                (Mission::Part(Part { writes: true, numbers }, Plan(plan)), to)
+                (MissionMessage::PartialList(MissionRange { writes: true, numbers }, MissionType(plan)), to)
             }
             MISSION_ACK_DATA::ID => {
                 let (to, result, plan, _) = ACK.read(payload);
-                (Mission::Ack(MissionResult(result), Plan(plan)), to)
+                (MissionMessage::Ack(MissionResult(result), MissionType(plan)), to)
             }
             MISSION_CLEAR_ALL_DATA::ID => {
                 let (to, plan) = CLEAR.read(payload);
-                (Mission::Clear(Plan(plan)), to)
+                (MissionMessage::Clear(MissionType(plan)), to)
             }
             MISSION_SET_CURRENT_DATA::ID => {
                 let (number, to) = SET_CURRENT.read(payload);
-                (Mission::SetCurrent(number), to)
+                (MissionMessage::SetCurrent(number), to)
             }
             MISSION_CURRENT_DATA::ID => {
                 let (number, total, state, mode, _) = CURRENT.read(payload);
-                (Mission::Current(MissionCurrent { number, total, state, mode }), Address::default())
+                (MissionMessage::Current(MissionCurrent { number, total, state, mode }), Address::default())
             }
-            MISSION_ITEM_REACHED_DATA::ID => (Mission::Reached(REACHED.read(payload).0), Address::default()),
-            _ => return Err(Fault::Unknown),
+            MISSION_ITEM_REACHED_DATA::ID => (MissionMessage::Reached(REACHED.read(payload).0), Address::default()),
+            _ => return Err(FrameFault::Unknown),
         })
     }
 
     /// Writes the message to the receiver `to`, if the message names one.
     pub(crate) fn write(&self, to: Address, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         match *self {
-            Mission::Count(count, plan) => COUNT.write(&(count, to, plan.0, 0), payload),
-            Mission::List(plan) => LIST.write(&(to, plan.0), payload),
-            Mission::Request(number, plan) => REQUEST_INT.write(&(number, to, plan.0), payload),
-            Mission::Item(item, plan) => {
+            MissionMessage::Count(count, plan) => COUNT.write(&(count, to, plan.0, 0), payload),
+            MissionMessage::List(plan) => LIST.write(&(to, plan.0), payload),
+            MissionMessage::Request(number, plan) => REQUEST_INT.write(&(number, to, plan.0), payload),
+            MissionMessage::Item(item, plan) => {
                 let MissionItem { number, command, frame, is_current, goes_on, parameters, x, y, z } = item;
                 let flags = [frame, u8::from(is_current), u8::from(goes_on)];
                 ITEM.write(&(parameters, [x, y], z, number, command, to, flags, plan.0), payload)
             }
-            Mission::Part(Part { writes: true, numbers }, plan) => WRITE_PART.write(&(numbers, to, plan.0), payload),
-            Mission::Part(Part { numbers, .. }, plan) => READ_PART.write(&(numbers, to, plan.0), payload),
-            Mission::Ack(result, plan) => ACK.write(&(to, result.0, plan.0, 0), payload),
-            Mission::Clear(plan) => CLEAR.write(&(to, plan.0), payload),
-            Mission::SetCurrent(number) => SET_CURRENT.write(&(number, to), payload),
-            Mission::Current(MissionCurrent { number, total, state, mode }) => {
+            MissionMessage::PartialList(MissionRange { writes: true, numbers }, plan) => {
+                WRITE_PART.write(&(numbers, to, plan.0), payload)
+            }
+            MissionMessage::PartialList(MissionRange { numbers, .. }, plan) => {
+                READ_PART.write(&(numbers, to, plan.0), payload)
+            }
+            MissionMessage::Ack(result, plan) => ACK.write(&(to, result.0, plan.0, 0), payload),
+            MissionMessage::Clear(plan) => CLEAR.write(&(to, plan.0), payload),
+            MissionMessage::SetCurrent(number) => SET_CURRENT.write(&(number, to), payload),
+            MissionMessage::Current(MissionCurrent { number, total, state, mode }) => {
                 CURRENT.write(&(number, total, state, mode, [0; 3]), payload)
             }
-            Mission::Reached(number) => REACHED.write(&(number,), payload),
+            MissionMessage::Reached(number) => REACHED.write(&(number,), payload),
         }
     }
 }
@@ -255,7 +261,7 @@ fn in_units(number: f32, frame: u8) -> i32 {
     let units = if LOCAL_FRAMES.contains(&frame) { 1e4 } else { 1e7 };
     // Not given, which is not the same as 0.
     if number.is_nan() {
-        return Place::AS_IT_IS;
+        return GlobalPosition::AS_IT_IS;
     }
     // Clamped to beyond any position, but below the value for "not given".
     let scaled = (f64::from(number) * units).clamp(-2e9, 2e9);

@@ -1,7 +1,7 @@
 //! The vehicle's available and current modes: AVAILABLE_MODES and CURRENT_MODE.
 
 use crate::message::{MessageFormat, PAYLOAD_MAX};
-use crate::wire::Layout;
+use crate::wire::MessageLayout;
 use mavlink::dialects::common::{AVAILABLE_MODES_DATA, CURRENT_MODE_DATA};
 
 /// AVAILABLE_MODES (435): one of the available modes.
@@ -10,7 +10,7 @@ pub struct AvailableMode {
     /// Number of available modes.
     pub count: u8,
     /// Index of this mode, from 1.
-    pub place: u8,
+    pub index: u8,
     /// `MAV_STANDARD_MODE`; 0 if it is none of them.
     pub standard: u8,
     /// `custom_mode` in HEARTBEAT.
@@ -32,8 +32,8 @@ pub struct CurrentMode {
     pub intended: u32,
 }
 
-const AVAILABLE: Layout<AVAILABLE_MODES_DATA, ([u32; 2], [u8; 3], [u8; 35])> = Layout::NEW;
-const CURRENT: Layout<CURRENT_MODE_DATA, ([u32; 2], u8)> = Layout::NEW;
+const AVAILABLE: MessageLayout<AVAILABLE_MODES_DATA, ([u32; 2], [u8; 3], [u8; 35])> = MessageLayout::NEW;
+const CURRENT: MessageLayout<CURRENT_MODE_DATA, ([u32; 2], u8)> = MessageLayout::NEW;
 
 impl AvailableMode {
     pub(crate) fn format() -> MessageFormat {
@@ -42,11 +42,11 @@ impl AvailableMode {
 
     pub(crate) fn read(payload: &[u8]) -> Self {
         let ([custom, properties], [count, place, standard], name) = AVAILABLE.read(payload);
-        AvailableMode { count, place, standard, custom, properties, name }
+        AvailableMode { count, index: place, standard, custom, properties, name }
     }
 
     pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
-        let AvailableMode { count, place, standard, custom, properties, name } = *self;
+        let AvailableMode { count, index: place, standard, custom, properties, name } = *self;
         AVAILABLE.write(&([custom, properties], [count, place, standard], name), payload)
     }
 }

@@ -1,7 +1,7 @@
 //! Control of the vehicle: CHANGE_OPERATOR_CONTROL and its answer.
 
-use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
-use crate::wire::Layout;
+use crate::message::{FrameFault, MessageFormat, PAYLOAD_MAX};
+use crate::wire::MessageLayout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{CHANGE_OPERATOR_CONTROL_ACK_DATA, CHANGE_OPERATOR_CONTROL_DATA};
 
@@ -26,8 +26,8 @@ pub struct ControlAnswer {
 }
 
 /// Fields: system, request, version, passkey.
-const CHANGE: Layout<CHANGE_OPERATOR_CONTROL_DATA, (u8, u8, u8, [u8; 25])> = Layout::NEW;
-const ANSWER: Layout<CHANGE_OPERATOR_CONTROL_ACK_DATA, (u8, u8, u8)> = Layout::NEW;
+const CHANGE: MessageLayout<CHANGE_OPERATOR_CONTROL_DATA, (u8, u8, u8, [u8; 25])> = MessageLayout::NEW;
+const ANSWER: MessageLayout<CHANGE_OPERATOR_CONTROL_ACK_DATA, (u8, u8, u8)> = MessageLayout::NEW;
 /// Answer "already under control".
 const REFUSED: u8 = 3;
 
@@ -37,7 +37,7 @@ impl ControlRequest {
     }
 
     /// Returns the request and the id of its target system.
-    pub(crate) fn read(payload: &[u8]) -> Result<(Self, u8), Fault> {
+    pub(crate) fn read(payload: &[u8]) -> Result<(Self, u8), FrameFault> {
         let (system, control, ..) = CHANGE.read(payload);
         Ok((Self::of(control)?, system))
     }
@@ -46,11 +46,11 @@ impl ControlRequest {
         CHANGE.write(&(0, self as u8, 0, [0; 25]), payload)
     }
 
-    fn of(control: u8) -> Result<Self, Fault> {
+    fn of(control: u8) -> Result<Self, FrameFault> {
         match control {
             0 => Ok(ControlRequest::Take),
             1 => Ok(ControlRequest::Release),
-            _ => Err(Fault::Malformed),
+            _ => Err(FrameFault::Malformed),
         }
     }
 }
@@ -60,7 +60,7 @@ impl ControlAnswer {
         ANSWER.format()
     }
 
-    pub(crate) fn read(payload: &[u8]) -> Result<Self, Fault> {
+    pub(crate) fn read(payload: &[u8]) -> Result<Self, FrameFault> {
         let (station, control, answer) = ANSWER.read(payload);
         Ok(ControlAnswer { station, control: ControlRequest::of(control)?, granted: answer == 0 })
     }

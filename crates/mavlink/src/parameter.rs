@@ -1,8 +1,8 @@
 //! Parameter protocol, in both directions.
 
 use crate::address::Address;
-use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
-use crate::wire::Layout;
+use crate::message::{FrameFault, MessageFormat, PAYLOAD_MAX};
+use crate::wire::MessageLayout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     MavParamType, PARAM_ERROR_DATA, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
@@ -17,7 +17,7 @@ pub enum ParameterRequest {
     /// PARAM_REQUEST_LIST (21).
     List,
     /// PARAM_REQUEST_READ (20) by index.
-    ReadPlace(u16),
+    ReadIndex(u16),
     /// PARAM_REQUEST_READ (20) by name.
     ReadName(ParameterName),
     /// PARAM_SET (23).
@@ -43,7 +43,7 @@ pub struct ParameterValue {
     /// Number of parameters.
     pub count: u16,
     /// Index in the list; `u16::MAX` for none.
-    pub place: u16,
+    pub index: u16,
 }
 
 /// PARAM_ERROR (345).
@@ -52,16 +52,16 @@ pub struct ParameterError {
     /// Requested name, or zeros.
     pub name: ParameterName,
     /// Requested index; -1 for none.
-    pub place: i16,
+    pub index: i16,
     /// `MAV_PARAM_ERROR`.
     pub error: u8,
 }
 
-const ERROR: Layout<PARAM_ERROR_DATA, (i16, Address, ParameterName, u8)> = Layout::NEW;
-const LIST: Layout<PARAM_REQUEST_LIST_DATA, (Address,)> = Layout::NEW;
-const READ: Layout<PARAM_REQUEST_READ_DATA, (i16, Address, ParameterName)> = Layout::NEW;
-const SET: Layout<PARAM_SET_DATA, ([u8; 4], Address, ParameterName, u8)> = Layout::NEW;
-const VALUE: Layout<PARAM_VALUE_DATA, ([u8; 4], u16, u16, ParameterName, u8)> = Layout::NEW;
+const ERROR: MessageLayout<PARAM_ERROR_DATA, (i16, Address, ParameterName, u8)> = MessageLayout::NEW;
+const LIST: MessageLayout<PARAM_REQUEST_LIST_DATA, (Address,)> = MessageLayout::NEW;
+const READ: MessageLayout<PARAM_REQUEST_READ_DATA, (i16, Address, ParameterName)> = MessageLayout::NEW;
+const SET: MessageLayout<PARAM_SET_DATA, ([u8; 4], Address, ParameterName, u8)> = MessageLayout::NEW;
+const VALUE: MessageLayout<PARAM_VALUE_DATA, ([u8; 4], u16, u16, ParameterName, u8)> = MessageLayout::NEW;
 
 impl ParameterRequest {
     /// Sets a parameter, of whose name at most 16 letters count, to a number, which is understood for whole ones, too.
@@ -82,20 +82,20 @@ impl ParameterRequest {
     }
 
     /// Returns the message and its receiver.
-    pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Self, Address), Fault> {
+    pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Self, Address), FrameFault> {
         Ok(match id {
             PARAM_REQUEST_LIST_DATA::ID => (ParameterRequest::List, LIST.read(payload).0),
             PARAM_REQUEST_READ_DATA::ID => {
                 let (place, to, name) = READ.read(payload);
                 // -1 means that the name counts.
-                let place = u16::try_from(place).map(ParameterRequest::ReadPlace);
+                let place = u16::try_from(place).map(ParameterRequest::ReadIndex);
                 (place.unwrap_or(ParameterRequest::ReadName(name)), to)
             }
             PARAM_SET_DATA::ID => {
                 let (value, to, name, kind) = SET.read(payload);
                 (ParameterRequest::Set { name, value, kind }, to)
             }
-            _ => return Err(Fault::Unknown),
+            _ => return Err(FrameFault::Unknown),
         })
     }
 
@@ -103,7 +103,7 @@ impl ParameterRequest {
         let to = Address::default();
         match *self {
             ParameterRequest::List => LIST.write(&(to,), payload),
-            ParameterRequest::ReadPlace(place) => {
+            ParameterRequest::ReadIndex(place) => {
                 READ.write(&(i16::try_from(place).unwrap_or(i16::MAX), to, [0; 16]), payload)
             }
             ParameterRequest::ReadName(name) => READ.write(&(-1, to, name), payload),
@@ -123,11 +123,11 @@ impl ParameterError {
     /// Returns the message and its receiver.
     pub(crate) fn read(payload: &[u8]) -> (Self, Address) {
         let (place, to, name, error) = ERROR.read(payload);
-        (ParameterError { name, place, error }, to)
+        (ParameterError { name, index: place, error }, to)
     }
 
     pub(crate) fn write(&self, to: Address, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
-        let ParameterError { name, place, error } = *self;
+        let ParameterError { name, index: place, error } = *self;
         ERROR.write(&(place, to, name, error), payload)
     }
 }
@@ -139,11 +139,11 @@ impl ParameterValue {
 
     pub(crate) fn read(payload: &[u8]) -> Self {
         let (value, count, place, name, kind) = VALUE.read(payload);
-        ParameterValue { name, value, kind, count, place }
+        ParameterValue { name, value, kind, count, index: place }
     }
 
     pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
-        let ParameterValue { name, value, kind, count, place } = *self;
+        let ParameterValue { name, value, kind, count, index: place } = *self;
         VALUE.write(&(value, count, place, name, kind), payload)
     }
 }

@@ -5,7 +5,7 @@
 
 use crate::address::Address;
 use crate::message::{MessageFormat, PAYLOAD_MAX};
-use crate::wire::Layout;
+use crate::wire::MessageLayout;
 use core::fmt;
 use hmac_sha256::Hash;
 use mavlink::MessageData;
@@ -20,15 +20,15 @@ pub const TIME_MAX: u64 = (1 << 48) - 1;
 
 /// A secret key, which `Debug` does not print.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub struct Key(pub [u8; 32]);
+pub struct SigningKey(pub [u8; 32]);
 
-impl fmt::Debug for Key {
+impl fmt::Debug for SigningKey {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("Key")
+        f.write_str("SigningKey")
     }
 }
 
-impl Key {
+impl SigningKey {
     /// Returns the first bytes of the SHA-256 of the key alone. They are stored with the key to detect damage.
     pub fn check(&self) -> [u8; 4] {
         first(&Hash::hash(&self.0))
@@ -105,7 +105,7 @@ impl<'a> ReceivedFrame<'a> {
     }
 
     /// True if the frame has a signature made with this key.
-    pub fn is_signed_by(&self, key: &Key) -> bool {
+    pub fn is_signed_by(&self, key: &SigningKey) -> bool {
         let Some((stamp, sent)) = self.signature.map(|signature| signature.split_at(STAMP)) else { return false };
         let code = key.code(self.bytes, stamp);
         // Compares all bytes, so that the time taken does not reveal the first difference.
@@ -117,13 +117,13 @@ impl<'a> ReceivedFrame<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SetupSigning {
     /// New key; none to stop signing, sent as zeros.
-    pub key: Option<Key>,
+    pub key: Option<SigningKey>,
     /// Timestamp of the sender ([`Stamp::time_10us`]).
     pub time_10us: u64,
 }
 
 /// Fields: time, system, component, key.
-const SETUP: Layout<SETUP_SIGNING_DATA, (u64, Address, [u8; 32])> = Layout::NEW;
+const SETUP: MessageLayout<SETUP_SIGNING_DATA, (u64, Address, [u8; 32])> = MessageLayout::NEW;
 
 impl SetupSigning {
     /// Message id.
@@ -136,7 +136,7 @@ impl SetupSigning {
     /// Returns the message and its receiver.
     pub(crate) fn read(payload: &[u8]) -> (Self, Address) {
         let (time_10us, to, key) = SETUP.read(payload);
-        (SetupSigning { key: (key != [0; 32]).then_some(Key(key)), time_10us: time_10us.min(TIME_MAX) }, to)
+        (SetupSigning { key: (key != [0; 32]).then_some(SigningKey(key)), time_10us: time_10us.min(TIME_MAX) }, to)
     }
 
     pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {

@@ -3,9 +3,9 @@
 use crate::address::Address;
 use crate::channels::ChannelsOverride;
 use crate::frames::{flip, flip_turn};
-use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
-use crate::place::{Height, Place, datum, frame};
-use crate::wire::Layout;
+use crate::global_position::{GlobalPosition, Height, datum, frame};
+use crate::message::{FrameFault, MessageFormat, PAYLOAD_MAX};
+use crate::wire::MessageLayout;
 use afbc_types::Setpoint;
 use mavlink::MessageData;
 use mavlink::dialects::common::{
@@ -17,7 +17,7 @@ use nalgebra::Vector3;
 /// Reference of a target's coordinates, from `MAV_FRAME`. The vehicle's axes are horizontal and vertical: forward,
 /// left, up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Axes {
+pub enum TargetFrame {
     /// MAV_FRAME_LOCAL_NED: position and axes of the local frame.
     #[default]
     Local,
@@ -34,7 +34,7 @@ pub enum Axes {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PositionTarget {
     /// Reference of the coordinates.
-    pub axes: Axes,
+    pub axes: TargetFrame,
     /// Position \[m\].
     pub position_m: Vector3<f32>,
     /// Velocity \[m/s\].
@@ -50,7 +50,7 @@ pub struct PositionTarget {
 impl From<&Setpoint> for PositionTarget {
     fn from(setpoint: &Setpoint) -> Self {
         PositionTarget {
-            axes: Axes::Local,
+            axes: TargetFrame::Local,
             position_m: setpoint.position_m,
             velocity_m_s: setpoint.velocity_m_s,
             acceleration_m_s2: setpoint.acceleration_m_s2,
@@ -66,7 +66,14 @@ impl PositionTarget {
         let none = Vector3::new(f32::NAN, f32::NAN, f32::NAN);
         let (position_m, velocity_m_s, acceleration_m_s2) = (none, none, none);
         let (yaw_rad, yaw_rate_rad_s) = (f32::NAN, f32::NAN);
-        PositionTarget { axes: Axes::Local, position_m, velocity_m_s, acceleration_m_s2, yaw_rad, yaw_rate_rad_s }
+        PositionTarget {
+            axes: TargetFrame::Local,
+            position_m,
+            velocity_m_s,
+            acceleration_m_s2,
+            yaw_rad,
+            yaw_rate_rad_s,
+        }
     };
 
     /// Returns the setpoint of a target that gives a position in the local frame and a heading; other numbers that are
@@ -84,9 +91,9 @@ impl PositionTarget {
         };
         // A velocity along the vehicle's axes cannot be used in the local frame.
         let is_local = match self.axes {
-            Axes::Local => true,
-            Axes::Body => self.velocity_m_s.iter().chain(&self.acceleration_m_s2).all(|number| number.is_nan()),
-            Axes::Offset | Axes::BodyOffset => false,
+            TargetFrame::Local => true,
+            TargetFrame::Body => self.velocity_m_s.iter().chain(&self.acceleration_m_s2).all(|number| number.is_nan()),
+            TargetFrame::Offset | TargetFrame::BodyOffset => false,
         };
         (is_local && setpoint.is_plausible()).then_some(setpoint)
     }
@@ -95,7 +102,7 @@ impl PositionTarget {
     pub(crate) fn complete(&self) -> Option<Setpoint> {
         let numbers = [&self.position_m, &self.velocity_m_s, &self.acceleration_m_s2].into_iter().flatten();
         let all = numbers.chain([&self.yaw_rad, &self.yaw_rate_rad_s]).all(|number| number.is_finite());
-        (all && self.axes == Axes::Local).then(|| self.setpoint()).flatten()
+        (all && self.axes == TargetFrame::Local).then(|| self.setpoint()).flatten()
     }
 
     /// Returns the numbers of the message, and its type mask of ignored numbers.
@@ -109,15 +116,15 @@ impl PositionTarget {
     }
 
     /// Reads a target from numbers and their type mask. Forces are not supported, nor is a target that gives nothing.
-    fn read(axes: Axes, vectors: [[f32; 3]; 3], yaw: [f32; 2], mask: u16) -> Result<Self, Fault> {
+    fn read(axes: TargetFrame, vectors: [[f32; 3]; 3], yaw: [f32; 2], mask: u16) -> Result<Self, FrameFault> {
         if mask & FORCE != 0 || mask & NOTHING == NOTHING {
-            return Err(Fault::Unsupported);
+            return Err(FrameFault::Unsupported);
         }
         let bits = [[0, 1, 2], [3, 4, 5], [6, 7, 8]];
         // A number that is not ignored must be finite, so that a NaN from the sender does not count as "not given".
         let unless = |bit: u16, value: f32| match mask & (1 << bit) {
             0 if value.is_finite() => Ok(value),
-            0 => Err(Fault::Implausible),
+            0 => Err(FrameFault::Implausible),
             _ => Ok(f32::NAN),
         };
         let mut read = PositionTarget { axes, ..PositionTarget::NONE };
@@ -138,7 +145,7 @@ impl PositionTarget {
             yaw_rate_rad_s: or_zero(read.yaw_rate_rad_s),
             ..Setpoint::default()
         };
-        if whole.is_plausible() { Ok(read) } else { Err(Fault::Implausible) }
+        if whole.is_plausible() { Ok(read) } else { Err(FrameFault::Implausible) }
     }
 }
 
@@ -179,7 +186,7 @@ pub enum ExternalTarget {
     /// complete one in that frame is [`Uplink::Setpoint`](crate::Uplink::Setpoint).
     Motion(PositionTarget),
     /// SET_POSITION_TARGET_GLOBAL_INT (86): a position on the earth, each coordinate of which may be ignored.
-    Place(Place, PositionTarget),
+    GlobalPosition(GlobalPosition, PositionTarget),
     /// SET_ATTITUDE_TARGET (82) with attitude and thrust. Body rates without an attitude are unsupported.
     Attitude(AttitudeAndThrust),
     /// MANUAL_CONTROL (69).
@@ -190,15 +197,16 @@ pub enum ExternalTarget {
 
 /// Fields: time, nine numbers, heading and yaw rate, type mask, receiver, frame.
 type MotionFields = (u32, [[f32; 3]; 3], [f32; 2], u16, Address, u8);
-const MOTION: Layout<SET_POSITION_TARGET_LOCAL_NED_DATA, MotionFields> = Layout::NEW;
+const MOTION: MessageLayout<SET_POSITION_TARGET_LOCAL_NED_DATA, MotionFields> = MessageLayout::NEW;
 type PlaceFields = (u32, [i32; 2], f32, [[f32; 3]; 2], [f32; 2], u16, Address, u8);
-const PLACE: Layout<SET_POSITION_TARGET_GLOBAL_INT_DATA, PlaceFields> = Layout::NEW;
+const PLACE: MessageLayout<SET_POSITION_TARGET_GLOBAL_INT_DATA, PlaceFields> = MessageLayout::NEW;
 /// Fields: time, quaternion, rates, thrust, receiver, type mask, thrust in three dimensions.
 type AttitudeFields = (u32, [f32; 4], [f32; 3], f32, Address, u8, [f32; 3]);
-const ATTITUDE: Layout<SET_ATTITUDE_TARGET_DATA, AttitudeFields> = Layout::NEW;
+const ATTITUDE: MessageLayout<SET_ATTITUDE_TARGET_DATA, AttitudeFields> = MessageLayout::NEW;
 /// Fields: x, y, z, r; buttons, receiver; further buttons and axes.
-const STICKS: Layout<MANUAL_CONTROL_DATA, ([i16; 4], u16, u8, u16, u8, [i16; 8])> = Layout::NEW;
-const TARGET: Layout<POSITION_TARGET_LOCAL_NED_DATA, (u32, [[f32; 3]; 3], [f32; 2], u16, u8)> = Layout::NEW;
+const STICKS: MessageLayout<MANUAL_CONTROL_DATA, ([i16; 4], u16, u8, u16, u8, [i16; 8])> = MessageLayout::NEW;
+const TARGET: MessageLayout<POSITION_TARGET_LOCAL_NED_DATA, (u32, [[f32; 3]; 3], [f32; 2], u16, u8)> =
+    MessageLayout::NEW;
 
 /// Value of an axis of MANUAL_CONTROL that the sender does not have.
 const NO_AXIS: i16 = i16::MAX;
@@ -218,24 +226,24 @@ impl ExternalTarget {
     }
 
     /// Reads the message; `is_meant` tells whether a receiver is this vehicle.
-    pub(crate) fn read(id: u32, payload: &[u8], is_meant: impl Fn(Address) -> bool) -> Result<Self, Fault> {
-        let mine = |to| if is_meant(to) { Ok(()) } else { Err(Fault::Elsewhere) };
+    pub(crate) fn read(id: u32, payload: &[u8], is_meant: impl Fn(Address) -> bool) -> Result<Self, FrameFault> {
+        let mine = |to| if is_meant(to) { Ok(()) } else { Err(FrameFault::Elsewhere) };
         match id {
             SET_POSITION_TARGET_LOCAL_NED_DATA::ID => {
                 let (_, vectors, yaw, mask, to, frame) = MOTION.read(payload);
                 mine(to)?;
                 let axes = match frame {
-                    LOCAL_NED => Axes::Local,
-                    7 => Axes::Offset,
-                    8 => Axes::Body,
-                    9 | 12 => Axes::BodyOffset,
-                    _ => return Err(Fault::Unsupported),
+                    LOCAL_NED => TargetFrame::Local,
+                    7 => TargetFrame::Offset,
+                    8 => TargetFrame::Body,
+                    9 | 12 => TargetFrame::BodyOffset,
+                    _ => return Err(FrameFault::Unsupported),
                 };
                 let motion = PositionTarget::read(axes, vectors, yaw, mask)?;
                 // A position in the local frame and motion along the vehicle's axes cannot be combined.
                 let moves = motion.velocity_m_s.iter().chain(&motion.acceleration_m_s2).any(|it| it.is_finite());
-                if axes == Axes::Body && moves && motion.position_m.iter().any(|it| it.is_finite()) {
-                    return Err(Fault::Unsupported);
+                if axes == TargetFrame::Body && moves && motion.position_m.iter().any(|it| it.is_finite()) {
+                    return Err(FrameFault::Unsupported);
                 }
                 Ok(ExternalTarget::Motion(motion))
             }
@@ -243,19 +251,21 @@ impl ExternalTarget {
                 let (_, [latitude, longitude], altitude_m, [velocity, acceleration], yaw, mask, to, frame) =
                     PLACE.read(payload);
                 mine(to)?;
-                let above = datum(frame).ok_or(Fault::Unsupported)?;
+                let above = datum(frame).ok_or(FrameFault::Unsupported)?;
                 // The position is passed as zeros here and checked below.
-                let motion = PositionTarget::read(Axes::Local, [[0.0; 3], velocity, acceleration], yaw, mask)?;
-                let unless = |bit: u16, value: i32| if mask & (1 << bit) == 0 { value } else { Place::AS_IT_IS };
+                let motion = PositionTarget::read(TargetFrame::Local, [[0.0; 3], velocity, acceleration], yaw, mask)?;
+                let unless =
+                    |bit: u16, value: i32| if mask & (1 << bit) == 0 { value } else { GlobalPosition::AS_IT_IS };
                 let metres = if mask & 4 == 0 { altitude_m } else { f32::NAN };
                 let height = Height { metres, above };
-                let place = Place { latitude_e7: unless(0, latitude), longitude_e7: unless(1, longitude), height };
+                let place =
+                    GlobalPosition { latitude_e7: unless(0, latitude), longitude_e7: unless(1, longitude), height };
                 let is_whole = mask & 4 != 0 || altitude_m.is_finite();
                 let motion = PositionTarget { position_m: PositionTarget::NONE.position_m, ..motion };
                 if is_whole && place.is_plausible() {
-                    Ok(ExternalTarget::Place(place, motion))
+                    Ok(ExternalTarget::GlobalPosition(place, motion))
                 } else {
-                    Err(Fault::Implausible)
+                    Err(FrameFault::Implausible)
                 }
             }
             SET_ATTITUDE_TARGET_DATA::ID => {
@@ -263,13 +273,13 @@ impl ExternalTarget {
                 mine(to)?;
                 // Refuses ignored thrust or attitude, and thrust in three dimensions.
                 if mask & 0b1110_0000 != 0 {
-                    return Err(Fault::Unsupported);
+                    return Err(FrameFault::Unsupported);
                 }
                 let yaw_rate_rad_s = if mask & 4 == 0 { -yaw_rate } else { f32::NAN };
                 let norm = attitude.iter().map(|number| number * number).sum::<f32>();
                 let is_rate = mask & 4 != 0 || yaw_rate.abs() <= 1e3;
                 if !(is_rate && (0.25..=4.0).contains(&norm) && (0.0..=1.0).contains(&thrust)) {
-                    return Err(Fault::Implausible);
+                    return Err(FrameFault::Implausible);
                 }
                 let attitude = flip_turn(attitude);
                 Ok(ExternalTarget::Attitude(AttitudeAndThrust { attitude, yaw_rate_rad_s, thrust }))
@@ -278,7 +288,7 @@ impl ExternalTarget {
                 let (axes, _, system, ..) = STICKS.read(payload);
                 mine(Address { system, component: 0 })?;
                 if axes.contains(&NO_AXIS) {
-                    return Err(Fault::Unsupported);
+                    return Err(FrameFault::Unsupported);
                 }
                 let [pitch, roll, up, yaw] = axes.map(|axis| (f32::from(axis) / 1000.0).clamp(-1.0, 1.0));
                 // Below 0 would be thrust in the opposite direction, which no vehicle here has.
@@ -289,7 +299,7 @@ impl ExternalTarget {
                 mine(to)?;
                 Ok(ExternalTarget::Channels(channels))
             }
-            _ => Err(Fault::Unknown),
+            _ => Err(FrameFault::Unknown),
         }
     }
 
@@ -297,12 +307,12 @@ impl ExternalTarget {
         let to = Address::default();
         match self {
             ExternalTarget::Motion(motion) => write_motion(motion, payload),
-            ExternalTarget::Place(place, motion) => {
+            ExternalTarget::GlobalPosition(place, motion) => {
                 let ([_, velocity, acceleration], yaw, mask) = motion.fields();
-                let given = |value: i32| if value == Place::AS_IT_IS { 0 } else { value };
+                let given = |value: i32| if value == GlobalPosition::AS_IT_IS { 0 } else { value };
                 let height_m = place.height.metres;
-                let ignored = u16::from(place.latitude_e7 == Place::AS_IT_IS)
-                    | u16::from(place.longitude_e7 == Place::AS_IT_IS) << 1
+                let ignored = u16::from(place.latitude_e7 == GlobalPosition::AS_IT_IS)
+                    | u16::from(place.longitude_e7 == GlobalPosition::AS_IT_IS) << 1
                     | u16::from(height_m.is_nan()) << 2;
                 let vectors = [velocity.into(), acceleration.into()];
                 let xy = [given(place.latitude_e7), given(place.longitude_e7)];
@@ -329,10 +339,10 @@ impl ExternalTarget {
 pub(crate) fn write_motion(motion: &PositionTarget, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
     let (vectors, yaw, mask) = motion.fields();
     let frame = match motion.axes {
-        Axes::Local => LOCAL_NED,
-        Axes::Offset => 7,
-        Axes::Body => 8,
-        Axes::BodyOffset => 9,
+        TargetFrame::Local => LOCAL_NED,
+        TargetFrame::Offset => 7,
+        TargetFrame::Body => 8,
+        TargetFrame::BodyOffset => 9,
     };
     MOTION.write(&(0, vectors.map(Into::into), yaw, mask, Address::default(), frame), payload)
 }
@@ -342,12 +352,12 @@ pub(crate) fn followed_format() -> MessageFormat {
     TARGET.format()
 }
 
-pub(crate) fn read_followed(payload: &[u8]) -> Result<(u32, PositionTarget), Fault> {
+pub(crate) fn read_followed(payload: &[u8]) -> Result<(u32, PositionTarget), FrameFault> {
     let (time_ms, vectors, yaw, mask, frame) = TARGET.read(payload);
     if frame != LOCAL_NED {
-        return Err(Fault::Unsupported);
+        return Err(FrameFault::Unsupported);
     }
-    Ok((time_ms, PositionTarget::read(Axes::Local, vectors, yaw, mask)?))
+    Ok((time_ms, PositionTarget::read(TargetFrame::Local, vectors, yaw, mask)?))
 }
 
 pub(crate) fn write_followed(time_ms: u32, motion: &PositionTarget, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {

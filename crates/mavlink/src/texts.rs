@@ -1,17 +1,17 @@
 //! Extraction of the texts from sent messages.
 
-use crate::framing::{HEADER, Header, START};
+use crate::framing::{FrameHeader, HEADER, START};
 use mavlink::MessageData as _;
 use mavlink::dialects::common::STATUSTEXT_DATA;
 
-/// Returns severity (0 emergency to 7 debug) and text of each STATUSTEXT among complete frames that a [`Sender`] has
+/// Returns severity (0 emergency to 7 debug) and text of each STATUSTEXT among complete frames that an [`Encoder`] has
 /// written one after another. Used to write the texts to a log. Checksums are not verified.
 ///
-/// [`Sender`]: crate::Sender
+/// [`Encoder`]: crate::Encoder
 pub fn sent_texts(mut frames: &[u8]) -> impl Iterator<Item = (u8, &str)> {
     core::iter::from_fn(move || {
         loop {
-            let header = frames.first_chunk::<HEADER>().filter(|header| header[0] == START).map(Header::read)?;
+            let header = frames.first_chunk::<HEADER>().filter(|header| header[0] == START).map(FrameHeader::read)?;
             let (frame, rest) = frames.split_at_checked(header.frame_length())?;
             frames = rest;
             if header.id == STATUSTEXT_DATA::ID
@@ -36,7 +36,7 @@ fn read(payload: &[u8]) -> Option<(u8, &str)> {
 #[cfg(test)]
 mod tests {
     use super::sent_texts;
-    use crate::{Address, Downlink, FRAME_MAX, Key, MavSeverity, SIGNED_FRAME_MAX, Sender, Stamp, Text};
+    use crate::{Address, Downlink, Encoder, FRAME_MAX, MavSeverity, SIGNED_FRAME_MAX, SigningKey, Stamp, StatusText};
 
     const ME: Address = Address { system: 1, component: 1 };
 
@@ -45,17 +45,17 @@ mod tests {
     fn texts_are_found() {
         let all = "A text of fifty characters, which is the longest !";
         let texts = ["", "x", "Log: no card", all];
-        let mut sender = Sender::new(ME);
+        let mut sender = Encoder::new(ME);
         let mut frames = [0; 3000];
         let mut end = 0;
         let mut put = |bytes: &[u8]| {
             frames.iter_mut().skip(end).zip(bytes).for_each(|(place, byte)| *place = *byte);
             end += bytes.len();
         };
-        let key = Key([7; 32]);
+        let key = SigningKey([7; 32]);
         for (number, text) in texts.iter().enumerate() {
             let severity = MavSeverity::MAV_SEVERITY_WARNING;
-            let message = Downlink::Text { severity, text: Text::from(*text) };
+            let message = Downlink::Text { severity, text: StatusText::from(*text) };
             if number % 2 == 0 {
                 put(sender.send(&message, &mut [0; FRAME_MAX]));
             } else {

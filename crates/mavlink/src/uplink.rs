@@ -1,17 +1,17 @@
 //! Messages to the vehicle.
 
 use crate::address::Address;
-use crate::clocks::Clock;
-use crate::command::{self, Command};
+use crate::command::{self, VehicleCommand};
 use crate::frames::{Odometry, flip, flip_turn};
 use crate::interval::DataStream;
-use crate::message::{Fault, Message, MessageFormat, PAYLOAD_MAX, extension, field, parse, put, put_extended};
-use crate::mission::Mission;
+use crate::message::{FrameFault, MessageFormat, MessageSet, PAYLOAD_MAX, extension, field, parse, put, put_extended};
+use crate::mission::MissionMessage;
 use crate::operator::{CHANGE_ID, ControlRequest};
 use crate::parameter::ParameterRequest;
-use crate::question::Question;
+use crate::service::ServiceRequest;
 use crate::signature::SetupSigning;
 use crate::target::{ExternalTarget, PositionTarget, write_motion};
+use crate::time::TimeMessage;
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
@@ -28,8 +28,8 @@ pub enum Uplink {
     /// ODOMETRY (331): the full state, from motion capture, a companion computer or the simulator.
     ///
     /// Supported are the frames MAV_FRAME_LOCAL_NED and MAV_FRAME_LOCAL_FRD with the child frame MAV_FRAME_BODY_FRD.
-    /// Other frames are [`Fault::Unsupported`], and so is a quality of -1, "odometry has failed". The covariance of the
-    /// velocity is ignored.
+    /// Other frames are [`FrameFault::Unsupported`], and so is a quality of -1, "odometry has failed". The covariance
+    /// of the velocity is ignored.
     State {
         /// Time of the measurement on the sender's clock \[us\].
         sent_us: u64,
@@ -56,13 +56,13 @@ pub enum Uplink {
     /// Any other target, or a pilot's sticks.
     Target(ExternalTarget),
     /// COMMAND_LONG (76), COMMAND_INT (75), SET_MODE (11) or SET_HOME_POSITION (243).
-    Command(Command),
+    Command(VehicleCommand),
     /// MISSION_* messages.
-    Mission(Mission),
+    Mission(MissionMessage),
     /// PARAM_REQUEST_LIST, PARAM_REQUEST_READ, PARAM_SET.
     Parameter(ParameterRequest),
     /// TIMESYNC, PING, SYSTEM_TIME.
-    Clock(Clock),
+    Time(TimeMessage),
     /// REQUEST_DATA_STREAM (66).
     Stream(DataStream),
     /// CHANGE_OPERATOR_CONTROL (5).
@@ -70,10 +70,10 @@ pub enum Uplink {
     /// SETUP_SIGNING (256).
     Signing(SetupSigning),
     /// A request for an optional service.
-    Question(Question),
+    ServiceRequest(ServiceRequest),
 }
 
-impl Message for Uplink {
+impl MessageSet for Uplink {
     fn format(id: u32) -> Option<MessageFormat> {
         match id {
             HEARTBEAT_DATA::ID => Some(MessageFormat::of::<HEARTBEAT_DATA>(0)),
@@ -87,14 +87,14 @@ impl Message for Uplink {
             SetupSigning::ID => Some(SetupSigning::format()),
             _ => ExternalTarget::format(id)
                 .or_else(|| command::format(id))
-                .or_else(|| Mission::format(id))
-                .or_else(|| Clock::format(id))
+                .or_else(|| MissionMessage::format(id))
+                .or_else(|| TimeMessage::format(id))
                 .or_else(|| ParameterRequest::format(id))
-                .or_else(|| Question::format(id)),
+                .or_else(|| ServiceRequest::format(id)),
         }
     }
 
-    fn read(id: u32, payload: &[u8], receiver: Address) -> Result<Self, Fault> {
+    fn read(id: u32, payload: &[u8], receiver: Address) -> Result<Self, FrameFault> {
         match id {
             HEARTBEAT_DATA::ID => Ok(Uplink::Heartbeat),
             ODOMETRY_DATA::ID => read_odometry(&parse(payload)?, extension::<ODOMETRY_DATA, _>(payload)),
@@ -124,15 +124,15 @@ impl Message for Uplink {
                 let (command, to) = command::read(id, payload)?;
                 meant_for(receiver, to).map(|()| Uplink::Command(command))
             }
-            _ if Mission::format(id).is_some() => {
-                let (message, to) = Mission::read(id, payload)?;
+            _ if MissionMessage::format(id).is_some() => {
+                let (message, to) = MissionMessage::read(id, payload)?;
                 meant_for(receiver, to).map(|()| Uplink::Mission(message))
             }
             // Requests are for everyone. Answers concern only the requester; the caller checks this.
-            _ if Clock::format(id).is_some() => Clock::read(id, payload).map(Uplink::Clock),
-            _ if Question::format(id).is_some() => {
-                let (question, to) = Question::read(id, payload)?;
-                meant_for(receiver, to).map(|()| Uplink::Question(question))
+            _ if TimeMessage::format(id).is_some() => TimeMessage::read(id, payload).map(Uplink::Time),
+            _ if ServiceRequest::format(id).is_some() => {
+                let (question, to) = ServiceRequest::read(id, payload)?;
+                meant_for(receiver, to).map(|()| Uplink::ServiceRequest(question))
             }
             _ => {
                 let (request, to) = ParameterRequest::read(id, payload)?;
@@ -164,29 +164,29 @@ impl Message for Uplink {
             Uplink::Command(command) => command::write(*command, payload),
             Uplink::Mission(message) => message.write(Address::default(), payload),
             Uplink::Parameter(request) => request.write(payload),
-            Uplink::Clock(clock) => clock.write(payload),
+            Uplink::Time(clock) => clock.write(payload),
             Uplink::Stream(stream) => stream.write(payload),
             Uplink::Control(control) => control.write(payload),
             Uplink::Signing(setup) => setup.write(payload),
-            Uplink::Question(question) => question.write(payload),
+            Uplink::ServiceRequest(question) => question.write(payload),
         }
     }
 }
 
-/// Returns [`Fault::Elsewhere`] if `target` is not `receiver`.
-fn meant_for(receiver: Address, target: Address) -> Result<(), Fault> {
-    if receiver.is_meant_by(target) { Ok(()) } else { Err(Fault::Elsewhere) }
+/// Returns [`FrameFault::Elsewhere`] if `target` is not `receiver`.
+fn meant_for(receiver: Address, target: Address) -> Result<(), FrameFault> {
+    if receiver.is_meant_by(target) { Ok(()) } else { Err(FrameFault::Elsewhere) }
 }
 
 /// Length of ODOMETRY's extension fields \[bytes\]: reset counter, type of estimator, quality as `i8`.
 const ODOMETRY_EXTENSION: usize = 3;
 
-fn read_odometry(data: &ODOMETRY_DATA, extension: [u8; ODOMETRY_EXTENSION]) -> Result<Uplink, Fault> {
+fn read_odometry(data: &ODOMETRY_DATA, extension: [u8; ODOMETRY_EXTENSION]) -> Result<Uplink, FrameFault> {
     let earth = matches!(data.frame_id, MavFrame::MAV_FRAME_LOCAL_NED | MavFrame::MAV_FRAME_LOCAL_FRD);
     let body = data.child_frame_id == MavFrame::MAV_FRAME_BODY_FRD;
     let [_, _, quality] = extension;
     if !earth || !body || quality as i8 == -1 {
-        return Err(Fault::Unsupported);
+        return Err(FrameFault::Unsupported);
     }
     let odometry = Odometry {
         position_m: Vector3::new(data.x, data.y, data.z),
@@ -194,7 +194,7 @@ fn read_odometry(data: &ODOMETRY_DATA, extension: [u8; ODOMETRY_EXTENSION]) -> R
         velocity_m_s: Vector3::new(data.vx, data.vy, data.vz),
         rates_rad_s: Vector3::new(data.rollspeed, data.pitchspeed, data.yawspeed),
     };
-    let state = odometry.to_state().ok_or(Fault::Implausible)?;
+    let state = odometry.to_state().ok_or(FrameFault::Implausible)?;
     Ok(Uplink::State { sent_us: data.time_usec, state, sigmas: sigmas(&data.pose_covariance) })
 }
 
@@ -219,25 +219,25 @@ const COVARIANCE: usize = 4 * 21;
 /// Length of VISION_POSITION_ESTIMATE's extension fields \[bytes\]: covariance, reset counter.
 const POSE_EXTENSION: usize = COVARIANCE + 1;
 
-fn read_vision(data: &VISION_POSITION_ESTIMATE_DATA, payload: &[u8]) -> Result<Uplink, Fault> {
+fn read_vision(data: &VISION_POSITION_ESTIMATE_DATA, payload: &[u8]) -> Result<Uplink, FrameFault> {
     // Checks the angles, since even absurd angles would give a valid quaternion.
     let level = State { attitude_rad: Vector3::new(data.roll, -data.pitch, -data.yaw), ..State::default() };
     if !level.is_plausible() {
-        return Err(Fault::Implausible);
+        return Err(FrameFault::Implausible);
     }
     let position_m = flip(Vector3::new(data.x, data.y, data.z));
     let sigmas = extended_sigmas::<VISION_POSITION_ESTIMATE_DATA>(payload);
     plausible(data.usec, Pose { position_m, ..Pose::of(&level, sigmas) })
 }
 
-fn read_mocap(data: &ATT_POS_MOCAP_DATA, payload: &[u8]) -> Result<Uplink, Fault> {
+fn read_mocap(data: &ATT_POS_MOCAP_DATA, payload: &[u8]) -> Result<Uplink, FrameFault> {
     let position_m = flip(Vector3::new(data.x, data.y, data.z));
     let sigmas = extended_sigmas::<ATT_POS_MOCAP_DATA>(payload);
     plausible(data.time_usec, Pose { position_m, attitude: flip_turn(data.q), sigmas })
 }
 
-fn plausible(sent_us: u64, pose: Pose) -> Result<Uplink, Fault> {
-    if pose.is_plausible() { Ok(Uplink::Pose { sent_us, pose }) } else { Err(Fault::Implausible) }
+fn plausible(sent_us: u64, pose: Pose) -> Result<Uplink, FrameFault> {
+    if pose.is_plausible() { Ok(Uplink::Pose { sent_us, pose }) } else { Err(FrameFault::Implausible) }
 }
 
 fn write_mocap(sent_us: u64, pose: &Pose) -> ATT_POS_MOCAP_DATA {

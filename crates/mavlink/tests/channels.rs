@@ -1,7 +1,7 @@
 //! Radio control channels on the wire, compared with the specification.
 
 use afbc_mavlink::{
-    Address, ChannelsOverride, Decoder, Downlink, ExternalTarget, FRAME_MAX, RADIO_CHANNELS, RadioChannels, Sender,
+    Address, ChannelsOverride, Decoder, Downlink, Encoder, ExternalTarget, FRAME_MAX, RADIO_CHANNELS, RadioChannels,
     Telemetry, Uplink,
 };
 use proptest::prelude::*;
@@ -12,7 +12,7 @@ const STATION: Address = Address { system: 255, component: 190 };
 fn sent(message: &Uplink) -> Vec<Uplink> {
     let mut buffer = [0; FRAME_MAX];
     let (mut decoder, mut heard) = (Decoder::new(VEHICLE), Vec::new());
-    decoder.feed(Sender::new(STATION).send(message, &mut buffer), |_, message| heard.push(message));
+    decoder.feed(Encoder::new(STATION).send(message, &mut buffer), |_, message| heard.push(message));
     heard
 }
 
@@ -51,13 +51,13 @@ proptest! {
         raw[..8].iter().for_each(|us| payload.extend(us.to_le_bytes()));
         payload.extend([1, 1]);
         raw[8..].iter().for_each(|us| payload.extend(us.to_le_bytes()));
-        let read = <Uplink as afbc_mavlink::Message>::read(70, &payload, VEHICLE);
+        let read = <Uplink as afbc_mavlink::MessageSet>::read(70, &payload, VEHICLE);
         let Ok(Uplink::Target(ExternalTarget::Channels(channels))) = read else { panic!("{read:?}") };
         for place in 0..RADIO_CHANNELS {
             let us = channels.channel(place).unwrap_or(before[place]);
             prop_assert_eq!(us, expected(place, raw[place], before[place]), "channel {}", place + 1);
         }
-        let elsewhere = <Uplink as afbc_mavlink::Message>::read(70, &{
+        let elsewhere = <Uplink as afbc_mavlink::MessageSet>::read(70, &{
             payload[16] = 9;
             payload
         }, VEHICLE);
@@ -72,7 +72,7 @@ proptest! {
         let message = Downlink::Telemetry(Telemetry::Channels(RadioChannels { time_ms, us, rssi }));
         let mut buffer = [0; FRAME_MAX];
         let (mut decoder, mut heard) = (Decoder::new(STATION), Vec::new());
-        let frame = Sender::new(VEHICLE).send(&message, &mut buffer).to_vec();
+        let frame = Encoder::new(VEHICLE).send(&message, &mut buffer).to_vec();
         decoder.feed(&frame, |_, message: Downlink| heard.push(message));
         prop_assert_eq!(&heard, &[message]);
         // The number of channels follows the time and eighteen channels; trailing zeros are not sent.

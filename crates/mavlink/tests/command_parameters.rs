@@ -2,14 +2,14 @@
 //! something is silently ignored. A test of the same name in `afbc-comms` checks what the vehicle does.
 
 use crate::wire::{raw, read, theirs};
-use afbc_mavlink::{Command, Datum, Height, Place, Storage, Uplink};
+use afbc_mavlink::{Datum, GlobalPosition, Height, Storage, Uplink, VehicleCommand};
 use mavlink::dialects::common::SET_HOME_POSITION_DATA;
 use proptest::prelude::*;
 
 const NAN: f32 = f32::NAN;
 
 /// Returns the command read from a COMMAND_LONG (76): seven numbers, command and receiver.
-fn long(id: u16, parameters: [f32; 7]) -> Command {
+fn long(id: u16, parameters: [f32; 7]) -> VehicleCommand {
     let mut payload = [0; 33];
     for (bytes, number) in payload.chunks_exact_mut(4).zip(parameters) {
         bytes.copy_from_slice(&number.to_le_bytes());
@@ -22,35 +22,35 @@ fn long(id: u16, parameters: [f32; 7]) -> Command {
 }
 
 /// Returns the command with these first two numbers; the others are 0.
-fn two(id: u16, first: f32, second: f32) -> Command {
+fn two(id: u16, first: f32, second: f32) -> VehicleCommand {
     long(id, [first, second, 0.0, 0.0, 0.0, 0.0, 0.0])
 }
 
 /// Returns commands with valid numbers, and the indices of the numbers that they use.
-fn valid() -> Vec<([f32; 7], Command, &'static [usize])> {
-    let place = Place { latitude_e7: 470_000_000, longitude_e7: 80_000_000, height: at(500.0, Datum::Sea) };
+fn valid() -> Vec<([f32; 7], VehicleCommand, &'static [usize])> {
+    let place = GlobalPosition { latitude_e7: 470_000_000, longitude_e7: 80_000_000, height: at(500.0, Datum::Sea) };
     let (here, none): (_, &[usize]) = ([47.0, 8.0, 500.0], &[]);
-    let moved = Command::Reposition { place, yaw_rad: -0.5, speed_m_s: Some(3.0), changes_mode: true };
+    let moved = VehicleCommand::Reposition { place, yaw_rad: -0.5, speed_m_s: Some(3.0), changes_mode: true };
     vec![
-        (first([0.0; 4]), Command::Return, none),
-        (first([0.0; 4]), Command::Land, none),
-        (first([0.0; 4]), Command::CheckArming, none),
-        (first([0.0; 4]), Command::StopLogStream, none),
-        (first([0.0; 4]), Command::StartLogStream, &[0]),
-        (first([3.0, 0.0, 0.0, 0.0]), Command::SelectStandardMode(3), &[0]),
-        (first([30.0, 0.0, 0.0, 0.0]), Command::GetInterval(30), &[0]),
-        (first([1.0, 0.0, 0.0, 0.0]), Command::RequestProtocol, &[0]),
-        (first([1.0, 0.0, 0.0, 0.0]), Command::RequestCapabilities, &[0]),
-        (first([30.0, 5e4, 0.0, 0.0]), Command::SetInterval { message: 30, interval_us: 50_000 }, &[0, 1, 6]),
-        (first([242.0, 7.0, 0.0, 0.0]), Command::RequestMessage { message: 242, index: 7 }, &[0, 1, 6]),
-        (first([2.0, 5.0, 0.0, 0.0]), Command::StartMission(2, Some(5)), &[0, 1]),
-        (first([4.0, 1.0, 0.0, 0.0]), Command::SetCurrent(Some(4), true), &[0, 1]),
-        (first([1.0, 0.0, 0.0, 0.0]), Command::Storage(Storage::Save), &[0, 1]),
-        (first([1.0, 6.0, -1.0, 0.0]), Command::Speed(6.0), &[0, 1, 2]),
-        (first([1.0, 0.0, 0.0, 0.0]), Command::Home(None), &[0]),
-        ([0.0, 0.0, 0.0, 0.0, here[0], here[1], here[2]], Command::Home(Some(place)), &[0, 4, 5, 6]),
+        (first([0.0; 4]), VehicleCommand::Return, none),
+        (first([0.0; 4]), VehicleCommand::Land, none),
+        (first([0.0; 4]), VehicleCommand::CheckArming, none),
+        (first([0.0; 4]), VehicleCommand::StopLogStream, none),
+        (first([0.0; 4]), VehicleCommand::StartLogStream, &[0]),
+        (first([3.0, 0.0, 0.0, 0.0]), VehicleCommand::SelectStandardMode(3), &[0]),
+        (first([30.0, 0.0, 0.0, 0.0]), VehicleCommand::GetInterval(30), &[0]),
+        (first([1.0, 0.0, 0.0, 0.0]), VehicleCommand::RequestProtocol, &[0]),
+        (first([1.0, 0.0, 0.0, 0.0]), VehicleCommand::RequestCapabilities, &[0]),
+        (first([30.0, 5e4, 0.0, 0.0]), VehicleCommand::SetInterval { message: 30, interval_us: 50_000 }, &[0, 1, 6]),
+        (first([242.0, 7.0, 0.0, 0.0]), VehicleCommand::RequestMessage { message: 242, index: 7 }, &[0, 1, 6]),
+        (first([2.0, 5.0, 0.0, 0.0]), VehicleCommand::StartMission(2, Some(5)), &[0, 1]),
+        (first([4.0, 1.0, 0.0, 0.0]), VehicleCommand::SetCurrent(Some(4), true), &[0, 1]),
+        (first([1.0, 0.0, 0.0, 0.0]), VehicleCommand::Storage(Storage::Save), &[0, 1]),
+        (first([1.0, 6.0, -1.0, 0.0]), VehicleCommand::Speed(6.0), &[0, 1, 2]),
+        (first([1.0, 0.0, 0.0, 0.0]), VehicleCommand::Home(None), &[0]),
+        ([0.0, 0.0, 0.0, 0.0, here[0], here[1], here[2]], VehicleCommand::Home(Some(place)), &[0, 4, 5, 6]),
         ([3.0, 1.0, 0.0, 0.5, here[0], here[1], here[2]], moved, &[0, 1, 3, 4, 5, 6]),
-        ([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 7.0], Command::TakeOff(at(7.0, Datum::Here)), &[0, 6]),
+        ([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 7.0], VehicleCommand::TakeOff(at(7.0, Datum::Here)), &[0, 6]),
     ]
 }
 
@@ -73,7 +73,7 @@ fn no_number_is_ignored_in_silence() {
                 let mut changed = parameters;
                 changed[place] = value;
                 let read = long(id, changed);
-                assert_eq!(read, if is_neutral { expected } else { Command::Denied(id) }, "{place}: {value}");
+                assert_eq!(read, if is_neutral { expected } else { VehicleCommand::Denied(id) }, "{place}: {value}");
             }
         }
     }
@@ -98,41 +98,41 @@ fn numbers_that_are_none_of_a_commands_deny_it() {
         (22, vec![(1.0, 0.0), (-2.0, 0.0)]),
     ] {
         for (first, second) in numbers {
-            assert_eq!(two(id, first, second), Command::Denied(id), "{id}: {first} {second}");
+            assert_eq!(two(id, first, second), VehicleCommand::Denied(id), "{id}: {first} {second}");
         }
     }
 }
 
 #[test]
 fn what_leaves_something_alone_is_read_so() {
-    assert_eq!(two(224, -1.0, 0.0), Command::SetCurrent(None, false));
-    assert_eq!(two(224, 9.0, NAN), Command::SetCurrent(Some(9), false));
-    assert_eq!(two(300, NAN, NAN), Command::StartMission(0, None));
-    assert_eq!(two(300, 4.0, 4.0), Command::StartMission(4, Some(4)));
+    assert_eq!(two(224, -1.0, 0.0), VehicleCommand::SetCurrent(None, false));
+    assert_eq!(two(224, 9.0, NAN), VehicleCommand::SetCurrent(Some(9), false));
+    assert_eq!(two(300, NAN, NAN), VehicleCommand::StartMission(0, None));
+    assert_eq!(two(300, 4.0, 4.0), VehicleCommand::StartMission(4, Some(4)));
     for plans in [0.0, -1.0, NAN] {
-        assert_eq!(two(245, 0.0, plans), Command::Storage(Storage::Load));
-        assert_eq!(two(245, 2.0, plans), Command::Storage(Storage::Reset));
+        assert_eq!(two(245, 0.0, plans), VehicleCommand::Storage(Storage::Load));
+        assert_eq!(two(245, 2.0, plans), VehicleCommand::Storage(Storage::Reset));
     }
     // An interval of never, the default rate or a given rate; p7 selects the receiver and must be 0, 1 or 2.
     for (number, interval_us) in [(-1.0, -1), (-7.0, -1), (0.0, 0), (NAN, 0), (2e4, 20_000)] {
-        assert_eq!(two(511, 30.0, number), Command::SetInterval { message: 30, interval_us });
+        assert_eq!(two(511, 30.0, number), VehicleCommand::SetInterval { message: 30, interval_us });
     }
     for (to, is_known) in [(0.0, true), (1.0, true), (2.0, true), (NAN, true), (3.0, false), (-1.0, false)] {
         for (id, known) in [
-            (511, Command::SetInterval { message: 30, interval_us: 0 }),
-            (512, Command::RequestMessage { message: 30, index: 0 }),
+            (511, VehicleCommand::SetInterval { message: 30, interval_us: 0 }),
+            (512, VehicleCommand::RequestMessage { message: 30, index: 0 }),
         ] {
             let read = long(id, [30.0, 0.0, 0.0, 0.0, 0.0, 0.0, to]);
-            assert_eq!(read, if is_known { known } else { Command::Denied(id) }, "{id} to {to}");
+            assert_eq!(read, if is_known { known } else { VehicleCommand::Denied(id) }, "{id} to {to}");
         }
     }
     // Airspeed or ground speed with unchanged throttle; -2 is the default speed or throttle.
     for kind in [0.0, 1.0] {
         for throttle in [0.0, -1.0, -2.0, NAN] {
-            assert_eq!(long(178, first([kind, 5.0, throttle, 0.0])), Command::Speed(5.0));
+            assert_eq!(long(178, first([kind, 5.0, throttle, 0.0])), VehicleCommand::Speed(5.0));
         }
-        assert!(matches!(two(178, kind, -2.0), Command::Speed(usual) if usual > 5.0));
-        assert_eq!(long(178, first([kind, 5.0, 50.0, 0.0])), Command::Denied(178));
+        assert!(matches!(two(178, kind, -2.0), VehicleCommand::Speed(usual) if usual > 5.0));
+        assert_eq!(long(178, first([kind, 5.0, 50.0, 0.0])), VehicleCommand::Denied(178));
     }
 }
 
@@ -148,7 +148,7 @@ fn a_home_of_old_stations_is_a_place_above_the_sea() {
             target_system: 1,
             ..SET_HOME_POSITION_DATA::DEFAULT
         };
-        let Ok(Uplink::Command(Command::Home(Some(place)))) = read(&theirs(&data)) else { panic!("no home") };
+        let Ok(Uplink::Command(VehicleCommand::Home(Some(place)))) = read(&theirs(&data)) else { panic!("no home") };
         assert_eq!([place.latitude_e7, place.longitude_e7], [latitude, longitude]);
         assert_eq!(place.height.above, Datum::Sea);
         assert!((f64::from(place.height.metres) - f64::from(altitude) * 1e-3).abs() < 1e-3);
@@ -160,7 +160,7 @@ fn a_home_of_old_stations_is_a_place_above_the_sea() {
 fn a_circles_angle_is_rounded() {
     for (angle_deg, rounded) in [(0.0_f32, 0), (0.4, 0), (0.6, 1), (89.6, 90), (359.4, 359), (720.3, 720)] {
         let read = long(34, [10.0, 2.0, 0.0, angle_deg.to_radians(), 47.0, 8.0, 500.0]);
-        let Command::Orbit { angle_deg, .. } = read else { panic!("{read:?}") };
+        let VehicleCommand::Orbit { angle_deg, .. } = read else { panic!("{read:?}") };
         assert_eq!(angle_deg, rounded);
     }
 }
@@ -170,7 +170,7 @@ proptest! {
     #[test]
     fn degrees_become_whole_numbers(latitude in -89.0..89.0_f32, longitude in -179.0..179.0_f32) {
         let read = long(192, [-1.0, 0.0, 0.0, NAN, latitude, longitude, 500.0]);
-        let Command::Reposition { place, yaw_rad, speed_m_s, changes_mode } = read else { panic!("{read:?}") };
+        let VehicleCommand::Reposition { place, yaw_rad, speed_m_s, changes_mode } = read else { panic!("{read:?}") };
         prop_assert!((f64::from(latitude) * 1e7 - f64::from(place.latitude_e7)).abs() <= 1.0);
         prop_assert!((f64::from(longitude) * 1e7 - f64::from(place.longitude_e7)).abs() <= 1.0);
         prop_assert!(yaw_rad.is_nan() && speed_m_s.is_none() && !changes_mode);

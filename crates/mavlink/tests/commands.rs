@@ -4,7 +4,8 @@
 use crate::wire::{bytes, raw, read, theirs};
 use afbc_mavlink::telemetry::OrbitStatus;
 use afbc_mavlink::{
-    CalibrationRequest, Command, Counters, Datum, Downlink, Height, MavCmd, Place, Reboot, Telemetry, Uplink,
+    CalibrationRequest, Counters, Datum, Downlink, GlobalPosition, Height, MavCmd, Reboot, Telemetry, Uplink,
+    VehicleCommand,
 };
 use mavlink::dialects::common::{COMMAND_INT_DATA, COMMAND_LONG_DATA, MavFrame, ORBIT_EXECUTION_STATUS_DATA};
 
@@ -24,25 +25,25 @@ fn commands() {
             Ok(Uplink::Command(command)) => command,
             other => panic!("{other:?}"),
         };
-        assert_eq!(read(arm, 1.0, 0.0), Command::Arm);
-        assert_eq!(read(arm, 1.0, 21196.0), Command::Denied(400), "by force");
-        assert_eq!(read(arm, 0.0, 0.0), Command::Disarm);
-        assert_eq!(read(arm, 0.0, 21195.0), Command::Denied(400), "by which force?");
-        assert_eq!(read(arm, -0.0, 21196.0), Command::Kill);
+        assert_eq!(read(arm, 1.0, 0.0), VehicleCommand::Arm);
+        assert_eq!(read(arm, 1.0, 21196.0), VehicleCommand::Denied(400), "by force");
+        assert_eq!(read(arm, 0.0, 0.0), VehicleCommand::Disarm);
+        assert_eq!(read(arm, 0.0, 21195.0), VehicleCommand::Denied(400), "by which force?");
+        assert_eq!(read(arm, -0.0, 21196.0), VehicleCommand::Kill);
         for param1 in [0.5, -1.0, 2.0, f32::NAN, f32::INFINITY] {
-            assert_eq!(read(arm, param1, 21196.0), Command::Denied(400));
+            assert_eq!(read(arm, param1, 21196.0), VehicleCommand::Denied(400));
         }
         let reboot = MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN;
-        assert_eq!(read(reboot, 1.0, 0.0), Command::Reboot(Reboot::Program));
-        assert_eq!(read(reboot, 3.0, 0.0), Command::Reboot(Reboot::BootLoader));
+        assert_eq!(read(reboot, 1.0, 0.0), VehicleCommand::Reboot(Reboot::Program));
+        assert_eq!(read(reboot, 3.0, 0.0), VehicleCommand::Reboot(Reboot::BootLoader));
         // These values ask for nothing, for a shutdown, or are invalid.
         for param1 in [0.0, 2.0, 2.5, 4.0, -1.0, f32::NAN] {
-            assert_eq!(read(reboot, param1, 0.0), Command::Denied(246));
+            assert_eq!(read(reboot, param1, 0.0), VehicleCommand::Denied(246));
         }
-        assert_eq!(read(MavCmd::MAV_CMD_USER_1, 0.0, f32::NAN), Command::Engage);
-        assert_eq!(read(MavCmd::MAV_CMD_USER_2, 0.0, f32::NAN), Command::SelfTest);
-        assert_eq!(read(MavCmd::MAV_CMD_NAV_LAND, f32::NAN, 0.0), Command::Land);
-        assert_eq!(read(MavCmd::MAV_CMD_DO_SET_SERVO, 1.0, 0.0), Command::Other(183));
+        assert_eq!(read(MavCmd::MAV_CMD_USER_1, 0.0, f32::NAN), VehicleCommand::Engage);
+        assert_eq!(read(MavCmd::MAV_CMD_USER_2, 0.0, f32::NAN), VehicleCommand::SelfTest);
+        assert_eq!(read(MavCmd::MAV_CMD_NAV_LAND, f32::NAN, 0.0), VehicleCommand::Land);
+        assert_eq!(read(MavCmd::MAV_CMD_DO_SET_SERVO, 1.0, 0.0), VehicleCommand::Other(183));
     }
 }
 
@@ -80,7 +81,7 @@ fn calibrations_are_read() {
         for rest in [0.0, f32::NAN] {
             let mut parameters = [0.0, 0.0, 0.0, 0.0, 0.0, rest, rest];
             parameters[place] = value;
-            assert_eq!(read(parameters), Command::Calibrate(asked));
+            assert_eq!(read(parameters), VehicleCommand::Calibrate(asked));
         }
     }
     // Every other value of each parameter, and two parameters at once: pressure, radio, airspeed, temperature, simple.
@@ -89,9 +90,9 @@ fn calibrations_are_read() {
             let mut parameters = [0.0; 7];
             parameters[place] = value;
             let is_known = known.iter().any(|(_, at, what)| (*at, *what) == (place, value));
-            assert_eq!(read(parameters) == Command::Denied(241), !is_known, "{parameters:?}");
+            assert_eq!(read(parameters) == VehicleCommand::Denied(241), !is_known, "{parameters:?}");
             parameters[usize::from(place == 0)] = 1.0;
-            assert_eq!(read(parameters), Command::Denied(241), "{parameters:?}");
+            assert_eq!(read(parameters), VehicleCommand::Denied(241), "{parameters:?}");
         }
     }
 }
@@ -109,17 +110,17 @@ fn modes_come_in_parts_or_whole() {
     };
     for (main, sub) in (0..=255).flat_map(|main| (0..=255).map(move |sub| (main, sub))) {
         let mode = main << 16 | sub << 24;
-        assert_eq!(set_mode(1.0, main as f32, sub as f32), Command::SelectMode(mode));
-        assert_eq!(set_mode(29.0, mode as f32, 0.0), Command::SelectMode(mode));
-        assert_eq!(set_mode(1.0, mode as f32, f32::NAN), Command::SelectMode(mode));
+        assert_eq!(set_mode(1.0, main as f32, sub as f32), VehicleCommand::SelectMode(mode));
+        assert_eq!(set_mode(29.0, mode as f32, 0.0), VehicleCommand::SelectMode(mode));
+        assert_eq!(set_mode(1.0, mode as f32, f32::NAN), VehicleCommand::SelectMode(mode));
     }
     let hold = 0x0304_0000_u32 as f32;
     let wrong = [[1.0, 256.0, 0.0], [1.0, 65_535.0, 0.0], [1.0, 65_537.0, 0.0], [1.0, hold, 3.0], [0.0, hold, 0.0]];
     for [p1, p2, p3] in wrong {
-        assert_eq!(set_mode(p1, p2, p3), Command::Denied(176), "{p1} {p2} {p3}");
+        assert_eq!(set_mode(p1, p2, p3), VehicleCommand::Denied(176), "{p1} {p2} {p3}");
     }
     for p2 in [-65_536.0, 0.5, 4_294_967_296.0, f32::MAX, f32::INFINITY, f32::NAN] {
-        assert_eq!(set_mode(1.0, p2, 0.0), Command::Denied(176), "{p2}");
+        assert_eq!(set_mode(1.0, p2, 0.0), VehicleCommand::Denied(176), "{p2}");
     }
 }
 
@@ -130,11 +131,11 @@ fn every_command_is_read() {
         for (message, extra_crc, length) in [(76, 152, 33), (75, 158, 35)] {
             let mut payload = vec![0; length];
             payload[28..30].copy_from_slice(&id.to_le_bytes());
-            let known = Command::KNOWN.contains(&id);
+            let known = VehicleCommand::KNOWN.contains(&id);
             let Ok(Uplink::Command(expected)) = read(&raw(message, &payload, extra_crc)) else { panic!("{id}") };
-            assert_eq!(matches!(expected, Command::Other(_)), !known, "{id}");
-            assert_eq!(expected == Command::Disarm, id == 400);
-            assert_eq!(expected == Command::Engage, id == 31_010);
+            assert_eq!(matches!(expected, VehicleCommand::Other(_)), !known, "{id}");
+            assert_eq!(expected == VehicleCommand::Disarm, id == 400);
+            assert_eq!(expected == VehicleCommand::Engage, id == 31_010);
             // The same without trailing zeros.
             let again = read::<Uplink>(&raw(message, &payload[..30], extra_crc));
             assert_eq!(format!("{again:?}"), format!("{:?}", Ok::<_, Counters>(Uplink::Command(expected))));
@@ -157,14 +158,19 @@ fn circles_are_read_and_reported() {
         }
     };
     let height = Height { metres: z, above: Datum::Home };
-    let place = Place { latitude_e7: x, longitude_e7: y, height };
-    let flown =
-        |radius_m, speed_m_s, heading, angle_deg| Command::Orbit { place, radius_m, speed_m_s, angle_deg, heading };
+    let place = GlobalPosition { latitude_e7: x, longitude_e7: y, height };
+    let flown = |radius_m, speed_m_s, heading, angle_deg| VehicleCommand::Orbit {
+        place,
+        radius_m,
+        speed_m_s,
+        angle_deg,
+        heading,
+    };
     assert_eq!(orbit(10.0, 2.0, 0.0, 0.0), flown(10.0, 2.0, 0, 0));
     assert_eq!(orbit(-10.0, 2.0, 3.0, 4.712_389), flown(-10.0, 2.0, 3, 270));
     assert_eq!(orbit(10.0, -2.0, 5.0, nan), flown(-10.0, 2.0, 5, 0));
     assert_eq!(orbit(-10.0, -2.0, nan, 0.0), flown(10.0, 2.0, 0, 0));
-    let Command::Orbit { radius_m, speed_m_s, .. } = orbit(nan, nan, nan, nan) else { panic!("another") };
+    let VehicleCommand::Orbit { radius_m, speed_m_s, .. } = orbit(nan, nan, nan, nan) else { panic!("another") };
     assert!(radius_m.is_nan() && speed_m_s.is_nan());
     for [p1, p2, p3, p4] in [
         [f32::INFINITY, 2.0, 0.0, 0.0],
@@ -176,7 +182,7 @@ fn circles_are_read_and_reported() {
         [10.0, 2.0, 0.0, -1.0],
         [10.0, 2.0, 0.0, 1144.0],
     ] {
-        assert_eq!(orbit(p1, p2, p3, p4), Command::Denied(34), "{p1} {p2} {p3} {p4}");
+        assert_eq!(orbit(p1, p2, p3, p4), VehicleCommand::Denied(34), "{p1} {p2} {p3} {p4}");
     }
     let status = OrbitStatus { time_us: 77, radius_m: -9.5, place_e7: [x, y], altitude_m: 500.25 };
     let data = ORBIT_EXECUTION_STATUS_DATA {

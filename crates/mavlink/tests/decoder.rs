@@ -1,7 +1,7 @@
 //! Decoding of a stream: fragments, noise, corruption, truncation, frames within frames.
 
 use crate::reference;
-use afbc_mavlink::{Address, Command, Counters, Decoder, Downlink, FRAME_MAX, Message, Sender, Uplink};
+use afbc_mavlink::{Address, Counters, Decoder, Downlink, Encoder, FRAME_MAX, MessageSet, Uplink, VehicleCommand};
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 use mavlink::Message as _;
 use mavlink::dialects::common::MavMessage;
@@ -16,8 +16,8 @@ fn messages() -> impl Strategy<Value = Uplink> {
     let number = -100.0f32..100.0;
     prop_oneof![
         Just(Uplink::Heartbeat),
-        Just(Uplink::Command(Command::Arm)),
-        Just(Uplink::Command(Command::Disarm)),
+        Just(Uplink::Command(VehicleCommand::Arm)),
+        Just(Uplink::Command(VehicleCommand::Disarm)),
         (any::<u64>(), number.clone()).prop_map(|(sent_us, x)| {
             let state = State { position_m: Vector3::new(x, 2.0 * x, 3.0 * x), ..State::default() };
             Uplink::State { sent_us, state, sigmas: PoseSigmas::UNKNOWN }
@@ -33,7 +33,7 @@ fn messages() -> impl Strategy<Value = Uplink> {
 
 /// Returns the frames of `messages` from one sender.
 fn frames(messages: &[Uplink]) -> Vec<Vec<u8>> {
-    let mut sender = Sender::new(STATION);
+    let mut sender = Encoder::new(STATION);
     messages.iter().map(|message| sender.send(message, &mut [0; FRAME_MAX]).to_vec()).collect()
 }
 
@@ -291,7 +291,7 @@ fn a_truncated_frame_may_be_completed_by_the_start_of_the_next() {
 fn a_truncated_frame_may_become_another_by_chance() {
     let state =
         Uplink::State { sent_us: 14_286_421_826_361_620_939, state: State::default(), sigmas: PoseSigmas::UNKNOWN };
-    let sent = frames(&[Uplink::Heartbeat, Uplink::Command(Command::Disarm), state]);
+    let sent = frames(&[Uplink::Heartbeat, Uplink::Command(VehicleCommand::Disarm), state]);
     let part = (1..sent[1].len()).map(|length| &sent[1][..length]).find(|part| {
         let stream = [sent[0].as_slice(), part, &sent[2], &FLUSH].concat();
         reference::any_by_chance(&stream, &[sent[0].len() + part.len()], known_seed)
@@ -306,10 +306,10 @@ fn a_truncated_frame_may_become_another_by_chance() {
 fn a_corrupted_frame_is_dropped() {
     let state = State { position_m: Vector3::new(1.0, 2.0, 3.0), ..State::default() };
     let setpoint = Setpoint { position_m: Vector3::new(1.0, 2.0, 3.0), ..Setpoint::default() };
-    let neighbour = Uplink::Command(Command::Disarm);
+    let neighbour = Uplink::Command(VehicleCommand::Disarm);
     for hit in [
         Uplink::Heartbeat,
-        Uplink::Command(Command::Arm),
+        Uplink::Command(VehicleCommand::Arm),
         Uplink::Setpoint(setpoint),
         Uplink::Pose { sent_us: 1, pose: Pose { position_m: Vector3::new(1.0, 2.0, 3.0), ..Pose::default() } },
         Uplink::State { sent_us: 1, state, sigmas: PoseSigmas::UNKNOWN },
@@ -375,7 +375,7 @@ fn each_cause_has_its_count() {
 /// several lengths, signed and unsigned.
 #[test]
 fn fields_that_a_newer_dialect_appends_are_left_out() {
-    fn one<M: Message + core::fmt::Debug>(id: u32) {
+    fn one<M: MessageSet + core::fmt::Debug>(id: u32) {
         let Some(format) = M::format(id) else { return };
         for fill in [0_u8, 1, 63, 255] {
             let known = vec![fill; format.length_max];
@@ -413,7 +413,7 @@ fn gaps_between_sequence_numbers_are_counted() {
     assert_eq!(lost(&[5, 5, 6]), 0, "twice");
     assert_eq!(lost(&[5, 7, 6, 8]), 1, "out of order");
 
-    let mut other = Sender::new(Address { system: 2, component: 1 });
+    let mut other = Encoder::new(Address { system: 2, component: 1 });
     let foreign = other.send(&Uplink::Heartbeat, &mut [0; FRAME_MAX]).to_vec();
     assert_eq!(decode([sent[9].as_slice(), &foreign, &sent[10]]).1.lost, 0, "two senders");
 }
@@ -423,7 +423,7 @@ fn gaps_between_sequence_numbers_are_counted() {
 /// follows.
 #[test]
 fn a_frame_that_carries_another_is_skipped_whole() {
-    let disarm = frames(&[Uplink::Command(Command::Disarm)]).concat();
+    let disarm = frames(&[Uplink::Command(VehicleCommand::Disarm)]).concat();
     let next = frames(&[Uplink::Heartbeat]).concat();
     for flags in [0, 1] {
         for id in [385, 110, 120, 30, 42_000, 0xFF_FFFF] {
@@ -437,7 +437,7 @@ fn a_frame_that_carries_another_is_skipped_whole() {
                 for (outer, right) in [(&outer, known), (&damaged, false)] {
                     assert_eq!(decode([outer.as_slice(), &next]).0, [Uplink::Heartbeat], "{id}, {flags}, {before}");
                     assert_eq!(decode([outer.as_slice()]).0, [], "{id}, {flags}, {before}");
-                    let found = if right { vec![] } else { vec![Uplink::Command(Command::Disarm)] };
+                    let found = if right { vec![] } else { vec![Uplink::Command(VehicleCommand::Disarm)] };
                     assert_eq!(decode([outer.as_slice(), &FLUSH]).0, found, "{id}, {flags}, {before}");
                 }
             }

@@ -1,6 +1,6 @@
 //! HIGHRES_IMU, compared with the `mavlink` crate's own decoding.
 
-use afbc_mavlink::{Address, Decoder, Downlink, FRAME_MAX, InertialSample, Sender};
+use afbc_mavlink::{Address, Decoder, Downlink, Encoder, FRAME_MAX, InertialSample};
 use mavlink::dialects::common::HIGHRES_IMU_DATA;
 use mavlink::{MavlinkVersion, MessageData};
 use nalgebra::Vector3;
@@ -25,7 +25,7 @@ fn it_is_what_others_read() {
         [(Some(Vector3::new(20.0, -5.0, -45.0)), [0.2, 0.05, 0.45], 0o777), (None, [0.0, 0.0, 0.0], 0o77)]
     {
         let mut buffer = [0; FRAME_MAX];
-        let frame = Sender::new(VEHICLE).send(&sample(field_ut), &mut buffer);
+        let frame = Encoder::new(VEHICLE).send(&sample(field_ut), &mut buffer);
         let read = HIGHRES_IMU_DATA::deser(MavlinkVersion::V2, &frame[10..frame.len() - 2]).unwrap();
         assert_eq!(read.time_usec, 5_000_123);
         assert_eq!([read.xacc, read.yacc, read.zacc], [0.25, 0.5, -9.75]);
@@ -41,7 +41,7 @@ fn it_is_what_others_read() {
 fn it_is_read_again() {
     let mut buffer = [0; FRAME_MAX];
     let with_field = sample(Some(Vector3::new(32.0, -16.0, 8.0)));
-    let bytes = Sender::new(VEHICLE).send(&with_field, &mut buffer);
+    let bytes = Encoder::new(VEHICLE).send(&with_field, &mut buffer);
     let (mut own, mut others) = (Decoder::<InertialSample>::new(STATION), Decoder::<Downlink>::new(STATION));
     let mut read = Vec::new();
     own.feed(bytes, |from, sample| read.push((from, sample)));
@@ -51,7 +51,7 @@ fn it_is_read_again() {
     assert!((read[0].1.field_ut.unwrap() - with_field.field_ut.unwrap()).norm() < 1e-4);
     assert_eq!(InertialSample { field_ut: with_field.field_ut, ..read[0].1 }, with_field);
     let broken = InertialSample { rates_rad_s: Vector3::new(f32::NAN, 0.0, 0.0), ..with_field };
-    let bytes = Sender::new(VEHICLE).send(&broken, &mut buffer);
+    let bytes = Encoder::new(VEHICLE).send(&broken, &mut buffer);
     own.feed(bytes, |_, sample| unreachable!("{sample:?}"));
     assert_eq!(own.counters().implausible, 1);
 }

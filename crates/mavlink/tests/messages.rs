@@ -1,13 +1,13 @@
 //! For every message of both directions: a payload that can be read can also be written with the same content.
 
-use afbc_mavlink::{Address, Command, Decoder, Downlink, FRAME_MAX, Message, Sender, Transfer, Uplink};
+use afbc_mavlink::{Address, Decoder, Downlink, Encoder, FRAME_MAX, MessageSet, Transfer, Uplink, VehicleCommand};
 use core::fmt::Debug;
 use proptest::prelude::*;
 
 const VEHICLE: Address = Address { system: 1, component: 1 };
 
 /// Returns the ids of all messages of a direction.
-fn ids<M: Message>() -> Vec<u32> {
+fn ids<M: MessageSet>() -> Vec<u32> {
     (0..20_000).filter(|id| M::format(*id).is_some()).collect()
 }
 
@@ -28,7 +28,7 @@ fn payloads() -> impl Strategy<Value = Vec<u8>> {
 }
 
 /// Reads this payload as each message of a direction and writes each result again; returns the number of readable ones.
-fn check<M: Message + Debug>(payload: &[u8]) -> usize {
+fn check<M: MessageSet + Debug>(payload: &[u8]) -> usize {
     let understood = ids::<M>().into_iter().filter_map(|id| {
         let length = M::format(id).expect("known").length_max;
         M::read(id, &payload[..payload.len().min(length)], VEHICLE).ok()
@@ -36,7 +36,7 @@ fn check<M: Message + Debug>(payload: &[u8]) -> usize {
     understood
         .map(|message| {
             let mut buffer = [0; FRAME_MAX];
-            let bytes = Sender::new(VEHICLE).send(&message, &mut buffer);
+            let bytes = Encoder::new(VEHICLE).send(&message, &mut buffer);
             let mut again = Vec::new();
             Decoder::<M>::new(VEHICLE).feed(bytes, |_, message| again.push(message));
             // Compares as text, since NaN differs from itself.
@@ -61,7 +61,7 @@ proptest! {
             prop::sample::select([0.0, 1.0, 2.0, 4.0, -1.0, 21196.0, f32::NAN, f32::INFINITY].as_slice()),
             -100.0..1000.0f32,
         ]),
-        id in prop_oneof![8 => prop::sample::select(Command::KNOWN.as_slice()), 1 => any::<u16>()],
+        id in prop_oneof![8 => prop::sample::select(VehicleCommand::KNOWN.as_slice()), 1 => any::<u16>()],
         frame in 0..8u8,
     ) {
         let mut payload: Vec<u8> = numbers.into_iter().flat_map(f32::to_le_bytes).collect();
@@ -72,7 +72,7 @@ proptest! {
             let read = Uplink::read(message, &payload, VEHICLE);
             let Ok(Uplink::Command(command)) = read else { return Err(TestCaseError::fail(format!("{read:?}"))) };
             prop_assert_eq!(command.id(), id);
-            prop_assert_eq!(matches!(command, Command::Other(_)), !Command::KNOWN.contains(&id));
+            prop_assert_eq!(matches!(command, VehicleCommand::Other(_)), !VehicleCommand::KNOWN.contains(&id));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Poses of a tracker: bytes from the specification, conversion compared with `f64` rotation matrices, covariances.
 
-use afbc_mavlink::{Address, Counters, Decoder, FRAME_MAX, Sender, Uplink};
+use afbc_mavlink::{Address, Counters, Decoder, Encoder, FRAME_MAX, Uplink};
 use afbc_types::{Pose, PoseSigmas, State};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -115,7 +115,7 @@ fn all_messages_agree() {
     let mocap = pose(read(MOCAP, &payload(&[w, x, -y, -z, 1.0, 2.0, -3.0])));
     assert_eq!((vision, mocap), (pose_of, pose_of));
     let sent = Uplink::State { sent_us: 1, state, sigmas: PoseSigmas::UNKNOWN };
-    match receive(Sender::new(STATION).send(&sent, &mut [0; FRAME_MAX])) {
+    match receive(Encoder::new(STATION).send(&sent, &mut [0; FRAME_MAX])) {
         Ok(Uplink::State { state, sigmas, .. }) => {
             let crossed = Pose::of(&state, sigmas);
             assert_eq!(crossed.position_m, pose_of.position_m);
@@ -223,7 +223,7 @@ proptest! {
         let sigmas = PoseSigmas { position_m, attitude_rad };
         let attitude = attitude.map(|part| part / norm);
         let sent = Uplink::Pose { sent_us, pose: Pose { position_m: position.into(), attitude, sigmas } };
-        prop_assert_eq!(receive(Sender::new(STATION).send(&sent, &mut [0; FRAME_MAX])), Ok(sent));
+        prop_assert_eq!(receive(Encoder::new(STATION).send(&sent, &mut [0; FRAME_MAX])), Ok(sent));
     }
 
     /// The result is the wire's rotation matrix Rz(yaw) Ry(pitch) Rx(roll) with half a turn about x on both sides.

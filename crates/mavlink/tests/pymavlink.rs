@@ -2,14 +2,14 @@
 //! the same bytes.
 
 use afbc_mavlink::telemetry::{
-    ActuatorOutputs, AttitudeQuaternion, BatteryStatus, EstimatorStatus, Fix, GlobalOrigin, GlobalPosition, Home,
-    SystemStatus, Version, VfrHud,
+    ActuatorOutputs, AttitudeQuaternion, BatteryStatus, EstimatorStatus, GlobalOrigin, GlobalPositionInt, GpsRawInt,
+    HomePosition, SystemStatus, Version, VfrHud,
 };
 use afbc_mavlink::{
-    Address, Answer, AttitudeAndThrust, AvailableMode, Axes, Clock, Command, ControlAnswer, ControlRequest,
-    CurrentMode, DataStream, Datum, Decoder, Downlink, ExternalTarget, FRAME_MAX, Height, Interval, ManualControl,
-    MavSeverity, Message, Mission, MissionCurrent, MissionItem, MissionResult, ParameterRequest, ParameterValue, Place,
-    Plan, PositionTarget, Sender, Telemetry, Uplink,
+    Address, AttitudeAndThrust, AvailableMode, CommandResult, ControlAnswer, ControlRequest, CurrentMode, DataStream,
+    Datum, Decoder, Downlink, Encoder, ExternalTarget, FRAME_MAX, GlobalPosition, Height, ManualControl, MavSeverity,
+    MessageInterval, MessageSet, MissionCurrent, MissionItem, MissionMessage, MissionResult, MissionType,
+    ParameterRequest, ParameterValue, PositionTarget, TargetFrame, Telemetry, TimeMessage, Uplink, VehicleCommand,
 };
 use nalgebra::Vector3;
 
@@ -25,7 +25,7 @@ fn frame(name: &str) -> Vec<u8> {
 }
 
 /// Checks that the frame is read as `expected`. Compares as text, since NaN differs from itself.
-fn check<M: Message + core::fmt::Debug>(name: &str, expected: &M) {
+fn check<M: MessageSet + core::fmt::Debug>(name: &str, expected: &M) {
     let mut heard = Vec::new();
     let mut decoder = Decoder::<M>::new(VEHICLE);
     decoder.feed(&frame(name), |from, message| heard.push((from, message)));
@@ -35,7 +35,7 @@ fn check<M: Message + core::fmt::Debug>(name: &str, expected: &M) {
 /// Checks that the frame is read as `message`, and that writing `message` gives the same frame.
 fn check_both(name: &str, message: &Downlink) {
     check(name, message);
-    assert_eq!(Sender::new(STATION).send(message, &mut [0; FRAME_MAX]), frame(name), "{name}");
+    assert_eq!(Encoder::new(STATION).send(message, &mut [0; FRAME_MAX]), frame(name), "{name}");
 }
 
 fn name<const N: usize>(text: &str) -> [u8; N] {
@@ -47,12 +47,15 @@ fn name<const N: usize>(text: &str) -> [u8; N] {
 #[test]
 fn commands_are_read() {
     let command = |name, command| check(name, &Uplink::Command(command));
-    command("SET_MODE", Command::SelectMode(0x0304_0000));
-    command("COMMAND_LONG", Command::SelectMode(0x0304_0000));
+    command("SET_MODE", VehicleCommand::SelectMode(0x0304_0000));
+    command("COMMAND_LONG", VehicleCommand::SelectMode(0x0304_0000));
     let height = Height { metres: 12.25, above: Datum::Home };
-    let place = Place { latitude_e7: 473_977_420, longitude_e7: 85_455_940, height };
-    command("COMMAND_INT", Command::Reposition { place, yaw_rad: -0.5, speed_m_s: Some(2.5), changes_mode: true });
-    command("TAKEOFF", Command::TakeOff(Height { metres: 2.5, above: Datum::Here }));
+    let place = GlobalPosition { latitude_e7: 473_977_420, longitude_e7: 85_455_940, height };
+    command(
+        "COMMAND_INT",
+        VehicleCommand::Reposition { place, yaw_rad: -0.5, speed_m_s: Some(2.5), changes_mode: true },
+    );
+    command("TAKEOFF", VehicleCommand::TakeOff(Height { metres: 2.5, above: Datum::Here }));
     check("CONTROL", &Uplink::Control(ControlRequest::Release));
     check("STREAM", &Uplink::Stream(DataStream { group: 10, rate_hz: 4 }));
 }
@@ -64,15 +67,15 @@ fn targets_are_read() {
     target(
         "TARGET",
         ExternalTarget::Motion(PositionTarget {
-            axes: Axes::Body,
+            axes: TargetFrame::Body,
             velocity_m_s,
             yaw_rate_rad_s,
             ..PositionTarget::NONE
         }),
     );
     let height = Height { metres: 12.5, above: Datum::Home };
-    let place = Place { latitude_e7: 473_977_420, longitude_e7: 85_455_940, height };
-    target("PLACE", ExternalTarget::Place(place, PositionTarget::NONE));
+    let place = GlobalPosition { latitude_e7: 473_977_420, longitude_e7: 85_455_940, height };
+    target("PLACE", ExternalTarget::GlobalPosition(place, PositionTarget::NONE));
     let attitude = [0.5, 0.5, -0.5, -0.5];
     target(
         "ATTITUDE",
@@ -84,7 +87,7 @@ fn targets_are_read() {
 #[test]
 fn missions_are_read() {
     let mission = |name, message| check(name, &Uplink::Mission(message));
-    mission("COUNT", Mission::Count(300, Plan::FENCE));
+    mission("COUNT", MissionMessage::Count(300, MissionType::FENCE));
     let item = MissionItem {
         number: 513,
         command: 16,
@@ -96,23 +99,23 @@ fn missions_are_read() {
         y: -85_455_940,
         z: 10.5,
     };
-    mission("ITEM", Mission::Item(item, Plan::MISSION));
-    mission("LIST", Mission::List(Plan::RALLY));
-    mission("REQUEST", Mission::Request(3, Plan::MISSION));
-    mission("REQUEST_INT", Mission::Request(3, Plan::FENCE));
-    mission("ACK", Mission::Ack(MissionResult::INVALID_SEQUENCE, Plan::MISSION));
-    mission("CLEAR", Mission::Clear(Plan::ALL));
-    mission("SET_CURRENT", Mission::SetCurrent(9));
+    mission("ITEM", MissionMessage::Item(item, MissionType::MISSION));
+    mission("LIST", MissionMessage::List(MissionType::RALLY));
+    mission("REQUEST", MissionMessage::Request(3, MissionType::MISSION));
+    mission("REQUEST_INT", MissionMessage::Request(3, MissionType::FENCE));
+    mission("ACK", MissionMessage::Ack(MissionResult::INVALID_SEQUENCE, MissionType::MISSION));
+    mission("CLEAR", MissionMessage::Clear(MissionType::ALL));
+    mission("SET_CURRENT", MissionMessage::SetCurrent(9));
 }
 
 #[test]
 fn clocks_and_parameters_are_read() {
-    check("TIMESYNC", &Uplink::Clock(Clock::Sync { answered_ns: 0, asked_ns: -5, to: ALL }));
-    check("PING", &Uplink::Clock(Clock::Ping { time_us: 77, number: 5, to: ALL }));
-    check("SYSTEM_TIME", &Uplink::Clock(Clock::Time { unix_us: 1_700_000_000_000_000, boot_ms: 1234 }));
+    check("TIMESYNC", &Uplink::Time(TimeMessage::Sync { answered_ns: 0, asked_ns: -5, to: ALL }));
+    check("PING", &Uplink::Time(TimeMessage::Ping { time_us: 77, number: 5, to: ALL }));
+    check("SYSTEM_TIME", &Uplink::Time(TimeMessage::Time { unix_us: 1_700_000_000_000_000, boot_ms: 1234 }));
     let parameter = |name, request| check(name, &Uplink::Parameter(request));
     parameter("PARAM_READ", ParameterRequest::ReadName(name("MIS_TAKEOFF_ALT")));
-    parameter("PARAM_PLACE", ParameterRequest::ReadPlace(3));
+    parameter("PARAM_PLACE", ParameterRequest::ReadIndex(3));
     parameter("PARAM_LIST", ParameterRequest::List);
     let value = 1.5_f32.to_le_bytes();
     parameter("PARAM_SET", ParameterRequest::Set { name: name("SIXTEEN_LETTERS_"), value, kind: 9 });
@@ -123,7 +126,7 @@ fn places_are_read_and_written() {
     let both = |name, telemetry| check_both(name, &Downlink::Telemetry(telemetry));
     both(
         "<GLOBAL_POSITION_INT",
-        Telemetry::Global(GlobalPosition {
+        Telemetry::GlobalPositionInt(GlobalPositionInt {
             time_ms: 5,
             place_e7: [473_977_420, -85_455_940],
             altitude_mm: 488_123,
@@ -134,7 +137,7 @@ fn places_are_read_and_written() {
     );
     both(
         "<GPS_RAW_INT",
-        Telemetry::Fix(Fix {
+        Telemetry::GpsRawInt(GpsRawInt {
             time_us: 9,
             place_e7: [473_977_420, 85_455_940],
             altitude_mm: 488_000,
@@ -146,12 +149,18 @@ fn places_are_read_and_written() {
         }),
     );
     let (place_e7, altitude_mm, time_us) = ([1, 2], 3, 99);
-    both("<GPS_GLOBAL_ORIGIN", Telemetry::Origin(GlobalOrigin { place_e7, altitude_mm, time_us }));
+    both("<GPS_GLOBAL_ORIGIN", Telemetry::GpsGlobalOrigin(GlobalOrigin { place_e7, altitude_mm, time_us }));
     let (position_m, attitude) = (Vector3::new(4.0, -5.0, -6.0), [1.0, 0.0, -0.0, -0.0]);
     // Only reading is tested, since the conversion changes the signs of zeros.
     check(
         "<HOME_POSITION",
-        &Downlink::Telemetry(Telemetry::Home(Home { place_e7, altitude_mm, position_m, attitude, time_us })),
+        &Downlink::Telemetry(Telemetry::HomePosition(HomePosition {
+            place_e7,
+            altitude_mm,
+            position_m,
+            attitude,
+            time_us,
+        })),
     );
 }
 
@@ -192,7 +201,7 @@ fn telemetry_is_read_and_written() {
     both("<AUTOPILOT_VERSION", Telemetry::Version(Version { capabilities: 8706, uid: 77, software, commit }));
     both(
         "<VFR_HUD",
-        Telemetry::Summary(VfrHud {
+        Telemetry::VfrHud(VfrHud {
             speed_m_s: 1.5,
             altitude_m: 490.0,
             climb_m_s: -0.5,
@@ -205,28 +214,28 @@ fn telemetry_is_read_and_written() {
 #[test]
 fn the_rest_is_read_and_written() {
     let to = Address { system: 245, component: 190 };
-    check_both("<COMMAND_ACK", &Downlink::Answer { command: 22, answer: Answer::InProgress, to });
-    check_both("<MESSAGE_INTERVAL", &Downlink::Interval(Interval { message: 31, interval_us: -1 }));
+    check_both("<COMMAND_ACK", &Downlink::CommandAck { command: 22, answer: CommandResult::InProgress, to });
+    check_both("<MESSAGE_INTERVAL", &Downlink::Interval(MessageInterval { message: 31, interval_us: -1 }));
     let (custom, name_of_mode) = (0x0204_0000, name("takeoff"));
-    let mode = AvailableMode { count: 9, place: 2, standard: 8, custom, properties: 4, name: name_of_mode };
+    let mode = AvailableMode { count: 9, index: 2, standard: 8, custom, properties: 4, name: name_of_mode };
     check_both("<AVAILABLE_MODES", &Downlink::AvailableMode(mode));
     let mode = CurrentMode { standard: 7, custom: 0x0604_0000, intended: 0x0304_0000 };
     check_both("<CURRENT_MODE", &Downlink::CurrentMode(mode));
     let current = MissionCurrent { number: 3, total: 9, state: 3, mode: 1 };
-    check_both("<MISSION_CURRENT", &Downlink::Mission { message: Mission::Current(current), to: ALL });
-    check_both("<MISSION_ITEM_REACHED", &Downlink::Mission { message: Mission::Reached(3), to: ALL });
+    check_both("<MISSION_CURRENT", &Downlink::Mission { message: MissionMessage::Current(current), to: ALL });
+    check_both("<MISSION_ITEM_REACHED", &Downlink::Mission { message: MissionMessage::Reached(3), to: ALL });
     let value = 2.5_f32.to_le_bytes();
-    let parameter = ParameterValue { name: name("GF_MAX_HOR_DIST"), value, kind: 9, count: 300, place: u16::MAX };
+    let parameter = ParameterValue { name: name("GF_MAX_HOR_DIST"), value, kind: 9, count: 300, index: u16::MAX };
     check_both("<PARAM_VALUE", &Downlink::Parameter(parameter));
     let followed = PositionTarget {
-        axes: Axes::Local,
+        axes: TargetFrame::Local,
         position_m: Vector3::new(1.0, -2.0, -3.0),
         velocity_m_s: Vector3::new(4.0, -5.0, -6.0),
         acceleration_m_s2: Vector3::new(7.0, -8.0, -9.0),
         yaw_rad: -0.5,
         yaw_rate_rad_s: -0.25,
     };
-    check_both("<POSITION_TARGET", &Downlink::Followed(5, followed));
+    check_both("<POSITION_TARGET", &Downlink::PositionTarget(5, followed));
     let refused = ControlAnswer { station: 245, control: ControlRequest::Take, granted: false };
     check_both("<CONTROL", &Downlink::Control(refused));
     let (severity, text) = (MavSeverity::MAV_SEVERITY_WARNING, "refused: not armed".into());

@@ -1,7 +1,7 @@
 //! Signatures match those of MAVLink's reference implementation (`reference/signed.py`), and any changed bit is
 //! detected.
 
-use afbc_mavlink::{Address, Decoder, Downlink, Key, Message, SIGNED_FRAME_MAX, Sender, Stamp, Uplink};
+use afbc_mavlink::{Address, Decoder, Downlink, Encoder, MessageSet, SIGNED_FRAME_MAX, SigningKey, Stamp, Uplink};
 use proptest::prelude::*;
 
 const STATION: Address = Address { system: 255, component: 190 };
@@ -9,7 +9,7 @@ const VEHICLE: Address = Address { system: 1, component: 1 };
 
 struct Signed {
     name: &'static str,
-    key: Key,
+    key: SigningKey,
     time_10us: u64,
     bytes: Vec<u8>,
 }
@@ -22,7 +22,7 @@ fn signed() -> Vec<Signed> {
     let lines = include_str!("reference/signed.txt").lines().map(|line| line.split(' ').collect::<Vec<_>>());
     let read = |fields: Vec<&'static str>| Signed {
         name: fields[0],
-        key: Key(bytes(fields[1]).try_into().expect("32 bytes")),
+        key: SigningKey(bytes(fields[1]).try_into().expect("32 bytes")),
         time_10us: fields[2].parse().expect("a number"),
         bytes: bytes(fields[3]),
     };
@@ -30,7 +30,7 @@ fn signed() -> Vec<Signed> {
 }
 
 /// Decodes with this key; returns link ids, timestamps and messages.
-fn decode<M: Message>(frame: &[u8], key: Key) -> Vec<(Stamp, M)> {
+fn decode<M: MessageSet>(frame: &[u8], key: SigningKey) -> Vec<(Stamp, M)> {
     let (mut stamps, mut messages) = (Vec::new(), Vec::new());
     let accept = |frame: &afbc_mavlink::ReceivedFrame<'_>| {
         let genuine = frame.is_signed_by(&key);
@@ -44,7 +44,7 @@ fn decode<M: Message>(frame: &[u8], key: Key) -> Vec<(Stamp, M)> {
     stamps.into_iter().zip(messages).collect()
 }
 
-fn check<M: Message + core::fmt::Debug>(signed: &Signed) {
+fn check<M: MessageSet + core::fmt::Debug>(signed: &Signed) {
     let Signed { name, key, time_10us, bytes } = signed;
     let heard = decode::<M>(bytes, *key);
     let [(stamp, message)] = &heard[..] else { panic!("{name}: {heard:?}") };
@@ -58,7 +58,7 @@ fn check<M: Message + core::fmt::Debug>(signed: &Signed) {
     // Signing the message again gives the same frame, except for messages that this crate writes with other fields.
     if !matches!(*name, "HEARTBEAT" | "SET_MODE" | "SETUP_SIGNING") {
         let mut buffer = [0; SIGNED_FRAME_MAX];
-        assert_eq!(Sender::new(STATION).send_signed(message, Some((key, *stamp)), &mut buffer), bytes, "{name}");
+        assert_eq!(Encoder::new(STATION).send_signed(message, Some((key, *stamp)), &mut buffer), bytes, "{name}");
     }
 }
 
@@ -75,7 +75,7 @@ fn the_reference_implementation_signs_the_same() {
 fn a_key_that_is_all_zero_is_none() {
     let setup = afbc_mavlink::SetupSigning { key: None, time_10us: 77 };
     let mut buffer = [0; afbc_mavlink::FRAME_MAX];
-    let frame = Sender::new(STATION).send(&Uplink::Signing(setup), &mut buffer).to_vec();
+    let frame = Encoder::new(STATION).send(&Uplink::Signing(setup), &mut buffer).to_vec();
     let mut heard = Vec::new();
     Decoder::new(VEHICLE).feed(&frame, |_, message: Uplink| heard.push(message));
     assert_eq!(heard, [Uplink::Signing(setup)]);
@@ -90,9 +90,10 @@ proptest! {
         time_10us in 0..=afbc_mavlink::TIME_MAX,
         bit in any::<prop::sample::Index>(),
     ) {
-        let (key, stamp) = (Key(key), Stamp { link, time_10us });
+        let (key, stamp) = (SigningKey(key), Stamp { link, time_10us });
         let mut buffer = [0; SIGNED_FRAME_MAX];
-        let mut frame = Sender::new(STATION).send_signed(&Uplink::Heartbeat, Some((&key, stamp)), &mut buffer).to_vec();
+        let signature = Some((&key, stamp));
+        let mut frame = Encoder::new(STATION).send_signed(&Uplink::Heartbeat, signature, &mut buffer).to_vec();
         prop_assert_eq!(decode(&frame, key), [(stamp, Uplink::Heartbeat)]);
         let bit = bit.index(8 * (frame.len() + 32));
         let mut other = key;

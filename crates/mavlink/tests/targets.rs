@@ -2,7 +2,7 @@
 //! type mask removes, and which numbers are refused.
 
 use crate::wire::{read, theirs};
-use afbc_mavlink::{ExternalTarget, Mission, Uplink};
+use afbc_mavlink::{ExternalTarget, MissionMessage, Uplink};
 use mavlink::dialects::common::{
     AttitudeTargetTypemask, MISSION_ITEM_DATA, MavFrame, PositionTargetTypemask, SET_ATTITUDE_TARGET_DATA,
     SET_POSITION_TARGET_GLOBAL_INT_DATA,
@@ -79,7 +79,7 @@ fn a_mask_takes_away_what_it_says() {
                 assert!(target.is_none(), "a target of nothing: {target:?}");
                 continue;
             }
-            let Some(ExternalTarget::Place(place, motion)) = target else { panic!("{mask:b}: {target:?}") };
+            let Some(ExternalTarget::GlobalPosition(place, motion)) = target else { panic!("{mask:b}: {target:?}") };
             assert_eq!([place.latitude_e7, place.longitude_e7], [given(0, 470_000_000), given(1, 80_000_000)]);
             assert_eq!(place.height.metres.is_nan(), no_height);
             let rest = [motion.position_m, motion.velocity_m_s, motion.acceleration_m_s2];
@@ -100,7 +100,7 @@ proptest! {
         for (frame, units) in [(MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT, 1e7), (MavFrame::MAV_FRAME_LOCAL_NED, 1e4)] {
             let item = MISSION_ITEM_DATA { x, y, z: 12.5, seq, current, frame, ..MISSION_ITEM_DATA::DEFAULT };
             let data = MISSION_ITEM_DATA { autocontinue: 1, ..item };
-            let Ok(Uplink::Mission(Mission::Item(item, _))) = read(&theirs(&data)) else { panic!("no item") };
+            let Ok(Uplink::Mission(MissionMessage::Item(item, _))) = read(&theirs(&data)) else { panic!("no item") };
             let nearest = |number: f32| (f64::from(number) * units).round() as i32;
             prop_assert_eq!([item.x, item.y], [nearest(x), nearest(y)]);
             prop_assert_eq!((item.number, item.is_current, item.goes_on, item.z), (seq, current == 1, true, 12.5));

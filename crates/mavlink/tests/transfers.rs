@@ -1,8 +1,8 @@
 //! Files and logs on the wire, compared with the `mavlink` crate's decoding.
 
 use afbc_mavlink::{
-    Address, ComponentMetadata, Decoder, FRAME_MAX, FileOpcode, FilePacket, LogData, LogEntry, LogMessage, LogRequest,
-    Question, ReceivedFrame, Sender, Transfer, Uplink,
+    Address, ComponentMetadata, Decoder, Encoder, FRAME_MAX, FileOpcode, FilePacket, LogData, LogEntry, LogMessage,
+    LogRequest, ReceivedFrame, ServiceRequest, Transfer, Uplink,
 };
 use mavlink::dialects::common::{MavCmd, MavMessage};
 use mavlink::{MavlinkVersion, Message as _};
@@ -15,7 +15,7 @@ const STATION: Address = Address { system: 255, component: 190 };
 /// Checks that this crate decodes the message it wrote; returns the message as the `mavlink` crate decodes it.
 fn as_others_read(message: &Transfer) -> MavMessage {
     let mut buffer = [0; FRAME_MAX];
-    let frame = Sender::new(VEHICLE).send(message, &mut buffer);
+    let frame = Encoder::new(VEHICLE).send(message, &mut buffer);
     let mut decoder = Decoder::<Transfer>::new(STATION);
     let mut back = None;
     decoder.feed(frame, |from, read| back = Some((from, read)));
@@ -76,9 +76,9 @@ fn metadata_has_its_address() {
 #[test]
 fn logs_are_erased_and_ended_by_request() {
     for (request, id) in [(LogRequest::Erase, 121), (LogRequest::End, 122)] {
-        let message = Uplink::Question(Question::Log(request));
+        let message = Uplink::ServiceRequest(ServiceRequest::Log(request));
         let mut buffer = [0; FRAME_MAX];
-        let frame = Sender::new(STATION).send(&message, &mut buffer);
+        let frame = Encoder::new(STATION).send(&message, &mut buffer);
         assert_eq!(frame[7], id);
         let mut heard = None;
         Decoder::<Uplink>::new(VEHICLE).feed(frame, |_, message| heard = Some(message));
@@ -94,7 +94,7 @@ proptest! {
         let packet = FilePacket::request(5, FileOpcode::WRITE_FILE, 1, 77, 0).with(&data);
         let mut stream = Vec::new();
         let mut buffer = [0; FRAME_MAX];
-        let mut sender = Sender::new(STATION);
+        let mut sender = Encoder::new(STATION);
         for _ in 0..2 {
             // Removes start bytes from the noise, since they would delay the following frames.
             stream.extend(noise.iter().filter(|byte| **byte != 0xFD));

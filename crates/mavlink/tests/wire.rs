@@ -2,8 +2,8 @@
 //! the crate lacks: extension fields, masks, frames, targets.
 
 use afbc_mavlink::{
-    Address, Answer, Axes, Command, Counters, Decoder, Downlink, ExternalTarget, FRAME_MAX, HealthArray, MavCmd,
-    MavSeverity, Message, PositionTarget, Sender, StatesRefused, Uplink,
+    Address, CommandResult, Counters, Decoder, Downlink, Encoder, ExternalTarget, FRAME_MAX, HealthArray, MavCmd,
+    MavSeverity, MessageSet, PositionTarget, StatesRefused, TargetFrame, Uplink, VehicleCommand,
 };
 use afbc_types::{Axis, PerAxis, PoseSigmas, RotorSpeeds, Setpoint, State};
 use mavlink::dialects::common::{
@@ -17,8 +17,8 @@ use proptest::prelude::*;
 const STATION: Address = Address { system: 255, component: 190 };
 const VEHICLE: Address = Address { system: 1, component: 1 };
 
-pub fn bytes(message: &impl Message) -> Vec<u8> {
-    Sender::new(STATION).send(message, &mut [0; FRAME_MAX]).to_vec()
+pub fn bytes(message: &impl MessageSet) -> Vec<u8> {
+    Encoder::new(STATION).send(message, &mut [0; FRAME_MAX]).to_vec()
 }
 
 /// Returns a frame encoded by the `mavlink` crate.
@@ -29,7 +29,7 @@ pub fn theirs(data: &impl MessageData) -> Vec<u8> {
 }
 
 /// Returns the only message in `bytes`, or the counts.
-pub fn read<M: Message + Clone>(bytes: &[u8]) -> Result<M, Counters> {
+pub fn read<M: MessageSet + Clone>(bytes: &[u8]) -> Result<M, Counters> {
     let mut decoder = Decoder::<M>::new(VEHICLE);
     let mut messages = Vec::new();
     decoder.feed(bytes, |from, message| {
@@ -87,21 +87,21 @@ fn bytes_are_the_mavlink_crates() {
 
     let command =
         COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, param1: 1.0, ..COMMAND_LONG_DATA::DEFAULT };
-    assert_eq!(bytes(&Uplink::Command(Command::Arm)), theirs(&command));
+    assert_eq!(bytes(&Uplink::Command(VehicleCommand::Arm)), theirs(&command));
 
     // Command 31010 has no parameters.
     let command = COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_USER_1, ..COMMAND_LONG_DATA::DEFAULT };
-    let engage = Uplink::Command(Command::Engage);
+    let engage = Uplink::Command(VehicleCommand::Engage);
     assert_eq!(bytes(&engage), theirs(&command));
     assert_eq!(bytes(&engage)[38..40], 31010_u16.to_le_bytes());
     assert_eq!(read(&theirs(&command)), Ok(engage));
-    let denied = Uplink::Command(Command::Denied(31_010));
+    let denied = Uplink::Command(VehicleCommand::Denied(31_010));
     assert_eq!(read(&theirs(&COMMAND_LONG_DATA { param1: 7.0, ..command })), Ok(denied));
 }
 
 #[test]
 fn sequence_numbers_count_and_wrap() {
-    let mut sender = Sender::new(STATION);
+    let mut sender = Encoder::new(STATION);
     for expected in (0..=255).chain(0..3) {
         assert_eq!(sender.send(&Uplink::Heartbeat, &mut [0; FRAME_MAX])[4], expected);
     }
@@ -109,9 +109,9 @@ fn sequence_numbers_count_and_wrap() {
 
 #[test]
 fn answers_carry_their_extension_fields() {
-    let answer = Downlink::Answer {
+    let answer = Downlink::CommandAck {
         command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16,
-        answer: Answer::Refused(0x0102_0304),
+        answer: CommandResult::Refused(0x0102_0304),
         to: Address { system: 255, component: 190 },
     };
     let frame = bytes(&answer);
@@ -246,7 +246,7 @@ fn every_type_mask_means_what_the_specification_says() {
         }
         let unless = |ignored, value: f32| if ignored { f32::NAN } else { value };
         let expected = PositionTarget {
-            axes: Axes::Local,
+            axes: TargetFrame::Local,
             position_m: Vector3::new(unless(bit(0), 1.0), unless(bit(1), -2.0), unless(bit(2), -3.0)),
             velocity_m_s: Vector3::new(unless(bit(3), 4.0), unless(bit(4), -5.0), unless(bit(5), -6.0)),
             acceleration_m_s2: Vector3::new(unless(bit(6), 7.0), unless(bit(7), -8.0), unless(bit(8), -9.0)),
@@ -304,10 +304,10 @@ fn targets_in_frames_of_the_vehicle_are_read() {
     // Only velocity, only position, both.
     let [velocity, position, both] = [0b1111_1100_0111, 0b1101_1111_1000, 0b1101_1100_0000];
     for mask in [velocity, position, both].map(|mask: u16| mask & !(1 << 9)) {
-        assert_eq!(axes(F::MAV_FRAME_LOCAL_OFFSET_NED, mask), Ok(Axes::Offset));
-        assert_eq!(axes(F::MAV_FRAME_BODY_OFFSET_NED, mask), Ok(Axes::BodyOffset));
-        assert_eq!(axes(F::MAV_FRAME_BODY_FRD, mask), Ok(Axes::BodyOffset));
-        let expected = if mask == both { Err(1) } else { Ok(Axes::Body) };
+        assert_eq!(axes(F::MAV_FRAME_LOCAL_OFFSET_NED, mask), Ok(TargetFrame::Offset));
+        assert_eq!(axes(F::MAV_FRAME_BODY_OFFSET_NED, mask), Ok(TargetFrame::BodyOffset));
+        assert_eq!(axes(F::MAV_FRAME_BODY_FRD, mask), Ok(TargetFrame::BodyOffset));
+        let expected = if mask == both { Err(1) } else { Ok(TargetFrame::Body) };
         assert_eq!(axes(F::MAV_FRAME_BODY_NED, mask), expected, "{mask:#b}");
         for frame in [F::MAV_FRAME_LOCAL_ENU, F::MAV_FRAME_GLOBAL, F::MAV_FRAME_LOCAL_FLU] {
             assert_eq!(axes(frame, mask), Err(1));
@@ -378,7 +378,7 @@ proptest! {
         armed: bool,
         failsafe: bool,
         text in "[ -~]{0,50}",
-        command in any::<u16>().prop_filter("not ours", |id| !Command::KNOWN.contains(id)),
+        command in any::<u16>().prop_filter("not ours", |id| !VehicleCommand::KNOWN.contains(id)),
         severity in 0..8usize,
     ) {
         let (a, b) = (v.into(), w.into());
@@ -393,13 +393,13 @@ proptest! {
         for message in [
             Uplink::Heartbeat,
             Uplink::Setpoint(setpoint),
-            Uplink::Command(Command::Arm),
-            Uplink::Command(Command::Disarm),
-            Uplink::Command(Command::Engage),
-            Uplink::Command(Command::SelfTest),
-            Uplink::Command(Command::Kill),
-            Uplink::Command(Command::Denied(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16)),
-            Uplink::Command(Command::Other(command)),
+            Uplink::Command(VehicleCommand::Arm),
+            Uplink::Command(VehicleCommand::Disarm),
+            Uplink::Command(VehicleCommand::Engage),
+            Uplink::Command(VehicleCommand::SelfTest),
+            Uplink::Command(VehicleCommand::Kill),
+            Uplink::Command(VehicleCommand::Denied(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16)),
+            Uplink::Command(VehicleCommand::Other(command)),
         ] {
             prop_assert_eq!(read(&bytes(&message)), Ok(message));
         }
@@ -407,11 +407,11 @@ proptest! {
             Downlink::Heartbeat { armed, failsafe, mode: n },
             Downlink::Attitude { time_ms: n, attitude_rad: a, rates_rad_s: b },
             Downlink::Position { time_ms: n, position_m: a, velocity_m_s: b },
-            Downlink::Answer { command, answer: Answer::Unsupported, to: VEHICLE },
-            Downlink::Answer { command, answer: Answer::Accepted, to: VEHICLE },
-            Downlink::Answer { command, answer: Answer::Refused(n as i32), to: VEHICLE },
-            Downlink::Answer { command, answer: Answer::Denied, to: VEHICLE },
-            Downlink::Answer { command, answer: Answer::Failed, to: VEHICLE },
+            Downlink::CommandAck { command, answer: CommandResult::Unsupported, to: VEHICLE },
+            Downlink::CommandAck { command, answer: CommandResult::Accepted, to: VEHICLE },
+            Downlink::CommandAck { command, answer: CommandResult::Refused(n as i32), to: VEHICLE },
+            Downlink::CommandAck { command, answer: CommandResult::Denied, to: VEHICLE },
+            Downlink::CommandAck { command, answer: CommandResult::Failed, to: VEHICLE },
             Downlink::Text { severity: SEVERITIES[severity], text: text.as_str().into() },
         ] {
             prop_assert_eq!(read(&bytes(&message)), Ok(message));

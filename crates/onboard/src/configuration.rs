@@ -3,7 +3,7 @@
 use crate::esc_settings::EscSettings;
 use crate::link::Link;
 use afbc::adaptive::Gains;
-use afbc::monitor::Bounds;
+use afbc::monitor::MonitorBounds;
 use afbc::{Guarded, Profile, Settings};
 use afbc_control::drag::KnownDrag;
 use afbc_estimator::Settings as Estimation;
@@ -93,7 +93,7 @@ impl Configuration {
         parameters.validate()?;
         settings.validate()?;
         gains.validate()?;
-        let bounds = Bounds::new(gains, parameters, settings);
+        let bounds = MonitorBounds::new(gains, parameters, settings);
         Guarded::new(self.airframe()?, *settings, *gains, bounds)
     }
 }

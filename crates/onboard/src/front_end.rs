@@ -8,8 +8,8 @@ use crate::tick_record::{TickBefore, TickInputs};
 use crate::vibration::Vibration;
 use afbc_control::math::{max, min};
 use afbc_estimator::{
-    Estimate, Estimator, ImuCalibration, ImuSample, Inertial, LeverFinder, Measurement, Memory, OutputFilter, Stamped,
-    VelocityNotch,
+    Estimate, Estimator, ImuCalibration, ImuSample, InertialState, LeverArmEstimator, Measurement, Memory,
+    OutputFilter, Stamped, VelocityNotch,
 };
 use afbc_flight_core::{Inbox, Refusal};
 use afbc_types::{Mounting, Pose, PoseSigmas, SensorCalibration, State};
@@ -101,7 +101,7 @@ pub struct EstimatorFrontEnd {
     output_filter: OutputFilter,
     corrections: Corrections,
     /// Offset of the inertial sensor from its configured place, estimated in flight.
-    lever: LeverFinder,
+    lever: LeverArmEstimator,
     clearance: Clearance,
     /// The last sample, corrected for the mounting.
     last: Option<ImuSample>,
@@ -216,7 +216,7 @@ impl EstimatorFrontEnd {
     }
 
     /// Returns the estimate at the time of the last sample, or none before the first.
-    pub fn inertial(&self) -> Option<Inertial> {
+    pub fn inertial(&self) -> Option<InertialState> {
         self.memory.inertial(self.estimator.settings(), self.corrections.imu.to_body())
     }
 
@@ -246,7 +246,7 @@ impl EstimatorFrontEnd {
 
     /// Returns the estimated offset of the inertial sensor, for evaluation.
     #[must_use]
-    pub fn lever(&self) -> &LeverFinder {
+    pub fn lever(&self) -> &LeverArmEstimator {
         &self.lever
     }
 
@@ -269,7 +269,7 @@ impl EstimatorFrontEnd {
     /// Declares the vehicle to be in the air: a simulation has placed it there.
     pub fn set_clear_of_ground(&mut self) {
         self.clearance = Clearance::default();
-        self.output_filter.unhide();
+        self.output_filter.stop_hiding();
         self.lever.settle();
     }
 
@@ -321,7 +321,11 @@ impl EstimatorFrontEnd {
         self.clearance.advance(estimate.state.position_m.z);
         self.stands_m = estimate.at_rest.then_some(estimate.state.position_m);
         if let Some(sample) = &sample {
-            self.output_filter.feel(&sample.specific_force_m_s2, estimate.attitude, self.clearance.has_left());
+            self.output_filter.update_fast_forces(
+                &sample.specific_force_m_s2,
+                estimate.attitude,
+                self.clearance.has_left(),
+            );
         }
         publish(&estimate, self.output_filter.step(&estimate), now_us, inbox);
         inbox.hand_over(self.output_filter.reset());
@@ -381,8 +385,8 @@ impl EstimatorFrontEnd {
 }
 
 /// Returns the finder for rotors at the notch's speed. Without a notch, the rotors count as fast.
-fn lever_finder(output_filter: &OutputFilter) -> LeverFinder {
-    LeverFinder::new(output_filter.notch().map_or(f32::MAX, VelocityNotch::centre_rad_s))
+fn lever_finder(output_filter: &OutputFilter) -> LeverArmEstimator {
+    LeverArmEstimator::new(output_filter.notch().map_or(f32::MAX, VelocityNotch::centre_rad_s))
 }
 
 /// Returns a magnetometer's reading without its errors \[uT\].

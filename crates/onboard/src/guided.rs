@@ -4,8 +4,8 @@ use crate::configuration::Configuration;
 use crate::control_inputs::ControlInputs;
 use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::{Mode, Stamped, Ticketed};
-use afbc_guidance::net::FailedSensors;
-use afbc_guidance::{Guidance, GuidanceInputs, Guided, Lift};
+use afbc_guidance::failsafe::FailedSensors;
+use afbc_guidance::{AvailableThrust, Guidance, GuidanceInputs, GuidanceOutputs};
 use afbc_types::{OutOfRange, State};
 
 /// Ticket number of the guidance's own requests, whose answers are ignored.
@@ -15,7 +15,7 @@ const OWN: u8 = u8::MAX;
 #[derive(Clone, Debug)]
 pub(crate) struct Guide {
     guidance: Guidance,
-    lift: Lift,
+    lift: AvailableThrust,
     mass_kg: f32,
     last_us: u64,
 }
@@ -41,7 +41,7 @@ impl Guide {
         let most_m_s2 = rotors.count() as f32 * settings.common.rotor_force_max_n / parameters.mass_kg;
         Ok(Guide {
             guidance: Guidance::new(*guidance)?,
-            lift: Lift { most_m_s2, gravity_m_s2: parameters.gravity_m_s2, given_m_s2: None },
+            lift: AvailableThrust { most_m_s2, gravity_m_s2: parameters.gravity_m_s2, given_m_s2: None },
             mass_kg: parameters.mass_kg,
             last_us: 0,
         })
@@ -62,7 +62,7 @@ impl Guide {
 
     /// Runs the guidance on the oldest order, and puts its setpoint and requests into the flight core's inbox.
     #[inline(always)]
-    pub(crate) fn tick(&mut self, now_us: u64, inputs: &mut ControlInputs, core: &Core<'_>) -> Guided {
+    pub(crate) fn tick(&mut self, now_us: u64, inputs: &mut ControlInputs, core: &Core<'_>) -> GuidanceOutputs {
         let ControlInputs { inbox, orders, battery, .. } = inputs;
         let fresh = inbox.state().filter(|state| state.age_us(now_us) <= COAST_US);
         let state = fresh.map(|state| &state.value).or(core.observed);
@@ -80,7 +80,7 @@ impl Guide {
             rested: core.rested,
             battery: *battery,
             sensors: core.sensors,
-            lift: self.lift,
+            available_thrust: self.lift,
         };
         let guided = self.guidance.tick(&sight, orders);
         if let Some(value) = guided.setpoint {
@@ -88,7 +88,7 @@ impl Guide {
         }
         inbox.set_idle_on_ground(guided.idle_on_ground);
         inbox.command_rates(self.guidance.rates());
-        inbox.inhibit(self.guidance.against());
+        inbox.inhibit(self.guidance.arming_refusals());
         if let Some(request) = guided.request {
             // A station's request has priority.
             if inbox.asked().is_none() {

@@ -1,6 +1,6 @@
 //! Decides which of two disagreeing inertial sensors is right, by other measurements.
 
-use afbc_estimator::Inertial;
+use afbc_estimator::InertialState;
 use nalgebra::{Matrix3, Vector3};
 
 /// Distance between the lanes from which another sensor can decide. For the magnetic field it is a share of the field.
@@ -54,7 +54,7 @@ pub struct OtherSensors {
 ///   proves nothing: the filter trusts its gyroscope, and at first rejects contradictions.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ImuLanes {
-    last: Inertial,
+    last: InertialState,
     begin_biases: [Vector3<f32>; 2],
     /// Turn \[rad\] and velocity \[m/s\] in the earth frame, relative to the lane that flies: of the other lane, and of
     /// the estimate.
@@ -71,7 +71,7 @@ pub(crate) struct ImuLanes {
 
 impl ImuLanes {
     /// Starts the lanes at an estimate.
-    pub(crate) fn new(now: &Inertial, field: Option<Vector3<f32>>) -> Self {
+    pub(crate) fn new(now: &InertialState, field: Option<Vector3<f32>>) -> Self {
         let zero = [Vector3::zeros(); 2];
         ImuLanes {
             last: *now,
@@ -89,7 +89,7 @@ impl ImuLanes {
     /// m/s2\].
     pub(crate) fn advance(
         &mut self,
-        now: &Inertial,
+        now: &InertialState,
         [rates_apart, force_apart]: [Vector3<f32>; 2],
         others: &OtherSensors,
     ) {
@@ -117,7 +117,7 @@ impl ImuLanes {
         }
     }
 
-    fn remember(&mut self, now: &Inertial) {
+    fn remember(&mut self, now: &InertialState) {
         let ([_, other], [_, estimate]) = (self.other, self.estimate);
         let newest_us = self.past.iter().map(|(at_us, _)| *at_us).max();
         if newest_us.is_none_or(|newest_us| now.at_us >= newest_us + APART_US)
@@ -183,7 +183,7 @@ impl ImuLanes {
     }
 
     /// Returns the change of gyroscope \[rad/s\] and accelerometer \[m/s2\] biases since the start.
-    pub(crate) fn moved(&self, now: &Inertial) -> [Vector3<f32>; 2] {
+    pub(crate) fn moved(&self, now: &InertialState) -> [Vector3<f32>; 2] {
         let [gyro, accel] = self.begin_biases;
         [now.gyro_bias - gyro, now.accel_bias - accel]
     }

@@ -2,7 +2,7 @@
 
 use crate::imu_lanes::{ImuLanes, OtherSensors};
 use afbc_control::math::{min, sqrt};
-use afbc_estimator::Inertial;
+use afbc_estimator::InertialState;
 use nalgebra::Vector3;
 
 /// Time without a sample after which the other sensor takes over, shorter than a gap that would affect the estimate
@@ -221,7 +221,7 @@ impl ImuSelector {
 
     /// Checks the two sensors against each other, by the estimate and other measurements. Switches to the other sensor
     /// if that one is right. Call it in every tick with an estimate.
-    pub fn cross_check(&mut self, now: &Inertial, others: &OtherSensors) {
+    pub fn cross_check(&mut self, now: &InertialState, others: &OtherSensors) {
         let works = !self.first.is_silent(now.at_us) && !self.second.is_silent(now.at_us);
         if !works {
             self.lanes = None;
@@ -248,7 +248,7 @@ impl ImuSelector {
     }
 
     /// Switches to the other sensor as if it had flown since the lanes began.
-    fn change(&mut self, now: &Inertial) {
+    fn change(&mut self, now: &InertialState) {
         let Some(lanes) = self.lanes.take() else { return };
         let to_imu = now.to_body.transpose();
         let (wrong, right) =

@@ -117,7 +117,7 @@ mod tests {
     use crate::control_inputs::ControlInputs;
     use crate::flight::Flight;
     use crate::readings::Readings;
-    use afbc_guidance::notice::Cause;
+    use afbc_guidance::notice::FailsafeCause;
     use std::string::String;
     use std::vec::Vec;
 
@@ -152,7 +152,7 @@ mod tests {
         // While armed, neither reasons against arming nor the time matter.
         (report.against, report.time_us) = (Refusal::AlreadyArmed.into(), 1_000);
         assert_eq!(Indication::of(&report), Indication::Armed);
-        report.guided.failsafe = Some(Cause::Station);
+        report.guided.failsafe = Some(FailsafeCause::Station);
         assert_eq!(Indication::of(&report), Indication::Failsafe);
         report.guided.failsafe = None;
         for mode in [Mode::Coasting, Mode::Descending] {

@@ -1,6 +1,6 @@
 //! Interface to the law of a flight.
 
-use afbc::monitor::Norm;
+use afbc::monitor::EstimateNorms;
 use afbc::{AdaptiveEstimate, Guarded, guarded};
 use afbc_control::FlightController;
 use afbc_types::{Axis, PerAxis};
@@ -9,7 +9,7 @@ use afbc_types::{Axis, PerAxis};
 pub trait FlightLaw<const N: usize>: FlightController<N> + Clone {
     /// Returns the norms of one subsystem's estimates, a different subsystem in each tick; none for a law without a
     /// monitor.
-    fn norms(memory: &Self::Memory) -> Option<(Axis, Norm)>;
+    fn norms(memory: &Self::Memory) -> Option<(Axis, EstimateNorms)>;
 
     /// Returns AFBC's adaptive estimates; none for another law.
     fn estimates(memory: &Self::Memory) -> Option<PerAxis<AdaptiveEstimate>>;
@@ -17,7 +17,7 @@ pub trait FlightLaw<const N: usize>: FlightController<N> + Clone {
 
 impl<const N: usize> FlightLaw<N> for Guarded<N> {
     #[inline(always)]
-    fn norms(memory: &guarded::Memory<N>) -> Option<(Axis, Norm)> {
+    fn norms(memory: &guarded::Memory<N>) -> Option<(Axis, EstimateNorms)> {
         Some(memory.figures().latest())
     }
 

@@ -1,7 +1,7 @@
 //! Converts the drivers' readings to measurements for the estimator.
 
-use afbc_drivers::{FixReading, MagneticReading, PressureReading};
-use afbc_estimator::{Measurement, Origin};
+use afbc_drivers::{GnssReading, MagneticReading, PressureReading};
+use afbc_estimator::{GeodeticOrigin, Measurement};
 use nalgebra::{Matrix3, Vector3};
 
 /// Standard deviation of a barometer's height, from noise and wind pressure but without drift \[m\].
@@ -32,7 +32,7 @@ const NEAR_M: f32 = 200.0;
 #[derive(Clone, Copy, Debug)]
 pub struct FixFrame {
     /// Last fix, and number of consecutive near fixes. Once fixes are believed, the frame's origin.
-    near: Option<(Origin, u8)>,
+    near: Option<(GeodeticOrigin, u8)>,
 }
 
 impl FixFrame {
@@ -40,15 +40,15 @@ impl FixFrame {
     pub const NEW: Self = FixFrame { near: None };
 
     /// Returns the frame's origin, once fixes are believed.
-    pub fn origin(&self) -> Option<Origin> {
+    pub fn origin(&self) -> Option<GeodeticOrigin> {
         self.near.filter(|(_, count)| *count >= BELIEVED).map(|(origin, _)| origin)
     }
 
     /// Converts a fix to a measurement, with true for the first one. Returns none for impossible coordinates, and until
     /// five fixes in a row are each within 200 m of the previous one.
-    pub fn measure(&mut self, fix: &FixReading) -> Option<(Measurement, bool)> {
-        let FixReading { latitude_deg, longitude_deg, altitude_m, .. } = *fix;
-        let here = Origin::new(latitude_deg, longitude_deg, altitude_m)?;
+    pub fn measure(&mut self, fix: &GnssReading) -> Option<(Measurement, bool)> {
+        let GnssReading { latitude_deg, longitude_deg, altitude_m, .. } = *fix;
+        let here = GeodeticOrigin::new(latitude_deg, longitude_deg, altitude_m)?;
         let (origin, mut count) = self.near.unwrap_or((here, 0));
         let known = count >= BELIEVED;
         let mut position_m = origin.local(latitude_deg, longitude_deg, altitude_m);
@@ -95,7 +95,7 @@ mod tests {
 
     #[test]
     fn fixes_are_local_to_the_first() {
-        let first = FixReading {
+        let first = GnssReading {
             latitude_deg: 47.0,
             longitude_deg: 8.0,
             altitude_m: 500.0,
@@ -107,9 +107,9 @@ mod tests {
             satellites: 9,
         };
         let mut frame = FixFrame::NEW;
-        assert_eq!(frame.measure(&FixReading { latitude_deg: 91.0, ..first }), None);
+        assert_eq!(frame.measure(&GnssReading { latitude_deg: 91.0, ..first }), None);
         // Fixes that are far away, before or among the others, are ignored.
-        let wild = FixReading { latitude_deg: -20.0, longitude_deg: 100.0, ..first };
+        let wild = GnssReading { latitude_deg: -20.0, longitude_deg: 100.0, ..first };
         for fix in [wild, first, first, wild, first, first, first, first] {
             assert_eq!(frame.measure(&fix), None);
         }
@@ -120,7 +120,7 @@ mod tests {
             if position_m == Vector3::zeros() && velocity_m_s == velocity));
         assert!(matches!(measurement, Measurement::Gnss { speed_sigma_m_s: 0.2, climb_sigma_m_s: 0.3, .. }));
         let (measurement, is_first) = frame
-            .measure(&FixReading { latitude_deg: 47.001, longitude_deg: 8.001, altitude_m: 510.0, ..first })
+            .measure(&GnssReading { latitude_deg: 47.001, longitude_deg: 8.001, altitude_m: 510.0, ..first })
             .expect("near");
         assert!(!is_first);
         assert!(matches!(measurement, Measurement::Gnss { position_m, .. }

@@ -2,11 +2,11 @@
 //! here and never compute them again.
 
 use crate::readings::{AIDS_MAX, Readings};
-use afbc::monitor::Norm;
+use afbc::monitor::EstimateNorms;
 use afbc_control::Trace;
-use afbc_estimator::{Aids, Estimate, ImuSample, Measurement};
+use afbc_estimator::{AidRecords, Estimate, ImuSample, Measurement};
 use afbc_flight_core::{EndReason, Mode, Reasons, RequestAnswer, TickHealth};
-use afbc_guidance::{BatteryReading, Guided, Sticks};
+use afbc_guidance::{BatteryReading, GuidanceOutputs, Sticks};
 use afbc_types::{Axis, Pose, ROTORS_MAX, RotorSpeeds, Stamped, State};
 use nalgebra::Vector3;
 
@@ -31,7 +31,7 @@ pub struct Report {
     /// Number of ticks since power-up in which a rotor's commanded force was beyond its limits.
     pub saturated_ticks: u32,
     /// Norms of one subsystem's estimates, a different subsystem in each tick; none before the first flight.
-    pub norms: Option<(Axis, Norm)>,
+    pub norms: Option<(Axis, EstimateNorms)>,
     /// True in the air while [vibration](crate::vibration) of the accelerometer is too high.
     pub shaken: bool,
     /// Answer to a request.
@@ -41,7 +41,7 @@ pub struct Report {
     /// Reasons against arming in this tick; the answer to a request to arm uses them.
     pub against: Reasons,
     /// The guidance's decisions.
-    pub guided: Guided,
+    pub guided: GuidanceOutputs,
 }
 
 /// Inputs of a tick, apart from messages.
@@ -98,7 +98,7 @@ pub struct TickDetails {
     /// Estimate with its uncertainty and validity; none without an inertial sensor.
     pub estimate: Option<Estimate>,
     /// The estimator's statistics for each kind of measurement.
-    pub aids: Aids,
+    pub aids: AidRecords,
     /// Local frame's origin in the GNSS receiver's frame, from the first usable fix on \[m\].
     pub origin_m: Option<Vector3<f32>>,
     /// Newest state that the flight core trusts.

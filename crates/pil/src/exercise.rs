@@ -1,7 +1,7 @@
 //! A test flight with every kind of event, as the bytes that reach the vehicle. Used for comparisons and budgets.
 
 use afbc_hil::Station;
-use afbc_mavlink::{Command, Uplink};
+use afbc_mavlink::{Uplink, VehicleCommand};
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 
@@ -29,10 +29,10 @@ pub fn bytes_of_tick(station: &mut Station, tick: u64) -> Vec<u8> {
     }
     match tick {
         // The first request is refused, since the tick rate is not known yet.
-        100 | ARMED => station.say(&Uplink::Command(Command::Arm)),
+        100 | ARMED => station.say(&Uplink::Command(VehicleCommand::Arm)),
         // The motion does not follow the rotors, so AFBC's monitor trips repeatedly.
-        3_000 | 5_200 => station.say(&Uplink::Command(Command::Engage)),
-        5_900 => station.say(&Uplink::Command(Command::Kill)),
+        3_000 | 5_200 => station.say(&Uplink::Command(VehicleCommand::Engage)),
+        5_900 => station.say(&Uplink::Command(VehicleCommand::Kill)),
         _ => (),
     }
     let mut bytes = station.take();

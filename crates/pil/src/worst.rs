@@ -8,7 +8,7 @@
 use crate::{Emulator, Error};
 use afbc_estimator::Measurement;
 use afbc_hil::Station;
-use afbc_mavlink::{Command, Uplink};
+use afbc_mavlink::{Uplink, VehicleCommand};
 use afbc_onboard::{AIDS_MAX, Aged, Readings};
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
@@ -66,7 +66,7 @@ pub fn search(emulator: Emulator, source: StateSource, seed: u64, candidates: u6
         for tick in 0..2 * HOLD {
             // Repeated, since the monitor trips and the safety net leaves the mode.
             if tick == 0 {
-                flight.station.say(&Uplink::Command(Command::Engage));
+                flight.station.say(&Uplink::Command(VehicleCommand::Engage));
                 flight.station.follow();
             }
             let (state, setpoint) = flight.inputs(&numbers, tick >= HOLD);
@@ -199,7 +199,7 @@ impl EmulatedFlight {
     fn arm(&mut self) -> Result<(), Error> {
         for tick in 0..3 * REST {
             if tick >= REST && tick.is_multiple_of(10) {
-                self.station.say(&Uplink::Command(Command::Arm));
+                self.station.say(&Uplink::Command(VehicleCommand::Arm));
             }
             if self.fly(State::default(), Setpoint::default())?.is_some() {
                 return Ok(());

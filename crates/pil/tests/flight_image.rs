@@ -7,7 +7,7 @@ mod common;
 use afbc_comms::CLOCK_FAILED;
 use afbc_flight_core::Refusal;
 use afbc_hil::Station;
-use afbc_mavlink::{Address, Answer, Command, Decoder, Downlink, HealthArray, Uplink};
+use afbc_mavlink::{Address, CommandResult, Decoder, Downlink, HealthArray, Uplink, VehicleCommand};
 use common::start_or_skip;
 use pil::budget::Linked;
 use pil::clock_tree::{FLASH_ACR, RCC_CFGR, RCC_PLLCFGR};
@@ -46,7 +46,7 @@ struct Heard {
     /// Newest time in a rotor command or health message \[us since power-up\].
     time_us: u64,
     health: HealthArray,
-    answers: HashSet<Answer>,
+    answers: HashSet<CommandResult>,
     texts: HashSet<String>,
 }
 
@@ -57,7 +57,7 @@ impl Talk {
     }
 
     /// Sends states, each followed by `command`, until `enough` returns true.
-    fn until(&mut self, command: Option<Command>, enough: impl Fn(&Heard) -> bool) {
+    fn until(&mut self, command: Option<VehicleCommand>, enough: impl Fn(&Heard) -> bool) {
         let start = Instant::now();
         while !enough(&self.heard) {
             assert!(start.elapsed() < PATIENCE, "{:?}", self.heard);
@@ -70,7 +70,7 @@ impl Talk {
                     heard.time_us = heard.time_us.max(health.time_us);
                     heard.health = health;
                 }
-                Downlink::Answer { command: ARM_DISARM, answer, .. } => drop(heard.answers.insert(answer)),
+                Downlink::CommandAck { command: ARM_DISARM, answer, .. } => drop(heard.answers.insert(answer)),
                 Downlink::Text { text, .. } => drop(heard.texts.insert(text.to_str().unwrap().to_owned())),
                 Downlink::Rotors { time_us, .. } => heard.time_us = time_us,
                 _ => (),
@@ -91,7 +91,7 @@ impl Talk {
     /// Requests arming until the only remaining refusal is that the vehicle must report rest for a whole second without
     /// a gap. QEMU's USART is too slow for that.
     fn ask(&mut self) {
-        self.until(Some(Command::Arm), |heard| heard.texts.contains(Refusal::NotAtRest.reason()));
+        self.until(Some(VehicleCommand::Arm), |heard| heard.texts.contains(Refusal::NotAtRest.reason()));
     }
 }
 
@@ -140,9 +140,9 @@ fn without_a_crystal_it_runs_on_and_does_not_arm() {
     assert_eq!(board.clock_register(FLASH_ACR), FLASH_ON);
     let mut talk = Talk::new(board);
     talk.until(None, |heard| heard.health.rate_hz > 0.0);
-    talk.until(Some(Command::Arm), |heard| heard.texts.contains(Refusal::Unhealthy.reason()));
+    talk.until(Some(VehicleCommand::Arm), |heard| heard.texts.contains(Refusal::Unhealthy.reason()));
     assert!(talk.heard.texts.contains(CLOCK_FAILED), "{:?}", talk.heard);
-    assert!(!talk.heard.answers.contains(&Answer::Accepted), "{:?}", talk.heard);
+    assert!(!talk.heard.answers.contains(&CommandResult::Accepted), "{:?}", talk.heard);
 }
 
 #[test]
@@ -161,7 +161,7 @@ fn a_crystal_that_fails_does_not_stop_it() {
     let failed_us = talk.heard.time_us;
     talk.heard.texts.remove(Refusal::NotAtRest.reason());
     talk.until(None, |heard| heard.texts.contains(CLOCK_FAILED));
-    talk.until(Some(Command::Arm), |heard| heard.texts.contains(Refusal::Unhealthy.reason()));
+    talk.until(Some(VehicleCommand::Arm), |heard| heard.texts.contains(Refusal::Unhealthy.reason()));
     talk.until(None, |heard| heard.time_us > failed_us + 1_000_000 && heard.health.time_us > failed_us + 1_000_000);
     assert!(RATE_HZ.contains(&talk.heard.health.rate_hz), "by its own clock: {:?}", talk.heard);
 }

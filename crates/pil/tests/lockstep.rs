@@ -6,7 +6,7 @@ mod common;
 use afbc_comms::services::streams::DEFAULTS;
 use afbc_flight_core::Mode;
 use afbc_hil::{Host, HostTick, Station};
-use afbc_mavlink::{Command, Uplink};
+use afbc_mavlink::{Uplink, VehicleCommand};
 use common::start_or_skip;
 use pil::exercise::{TICKS, bytes_of_tick};
 use pil::{Emulator, Image, TickReply};
@@ -58,7 +58,7 @@ fn no_tick_is_late_while_every_stream_runs_at_full_rate() {
         let Some(mut emulator) = start_or_skip(Image::Pil, start) else { return };
         let (mut station, mut sent) = (Station::default(), 0);
         for (place, (message, _)) in DEFAULTS.iter().enumerate() {
-            let command = Command::SetInterval { message: *message, interval_us: 1_000 };
+            let command = VehicleCommand::SetInterval { message: *message, interval_us: 1_000 };
             station.say(&Uplink::Command(command));
             if place % 4 == 3 {
                 emulator.exchange(&station.take()).unwrap();
@@ -66,7 +66,7 @@ fn no_tick_is_late_while_every_stream_runs_at_full_rate() {
         }
         let mut last_us: Option<u64> = None;
         for tick in 0..3_000 {
-            station.say(&Uplink::Command(Command::RequestMessage { message: 148, index: 0 }));
+            station.say(&Uplink::Command(VehicleCommand::RequestMessage { message: 148, index: 0 }));
             let reply = emulator.exchange(&[station.take(), bytes_of_tick(&mut station, tick)].concat()).unwrap();
             let gap_us = last_us.map_or(1_000, |last_us| reply.time_us - last_us);
             assert!(

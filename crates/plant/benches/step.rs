@@ -4,10 +4,11 @@
 //! same. Every figure includes the time of the feedback and of [`Plant::motion`], which `feedback_alone` measures.
 #![allow(clippy::unwrap_used, missing_docs)] // a plant that cannot be built must stop the bench
 
-use afbc_plant::instruments::{Barometer, Gnss, Imu, Magnetometer, TrackerModel};
+use afbc_plant::instruments::{BarometerModel, GnssModel, ImuModel, MagnetometerModel, TrackerModel};
 use afbc_plant::{
-    Battery, Contact, CosineGust, Deviations, Drag, Dropouts, Environment, GroundEffect, InstrumentSuite, Instruments,
-    Motion, Plant, PlantModel, Realism, Rotors, Sensing, StateSensor, Turbulence, Wind,
+    BatteryModel, Contact, CosineGust, Deviations, Drag, Environment, GroundEffect, InstrumentSuite,
+    MeasurementDropouts, Motion, Plant, PlantModel, Realism, Rotors, Sensing, SimulatedInstruments, StateSensor,
+    Turbulence, Wind,
 };
 use afbc_types::{Parameters, RotorSpeeds};
 use divan::counter::ItemsCount;
@@ -44,7 +45,7 @@ fn usual() -> Realism {
 
 fn everything() -> Realism {
     Realism {
-        rotors: Rotors { battery: Some(Battery::THREE_CELLS), ..lag() },
+        rotors: Rotors { battery: Some(BatteryModel::THREE_CELLS), ..lag() },
         contact: Some(Contact::PAPER),
         ground_effect: Some(GroundEffect::PAPER),
         ..usual()
@@ -125,7 +126,7 @@ fn sensors() -> StateSensor {
         noise: Deviations::all(0.001),
         bias: Deviations::all(0.001),
         delay_s: 0.002,
-        dropouts: Some(Dropouts { rate_hz: 1.0, mean_s: 0.01 }),
+        dropouts: Some(MeasurementDropouts { rate_hz: 1.0, mean_s: 0.01 }),
         ..Sensing::DEFAULT
     };
     StateSensor::new(&sensing, 1, STEP_S).unwrap()
@@ -141,19 +142,19 @@ fn truth(bencher: Bencher) {
 /// All instruments of a vehicle that flies outdoors, and a tracker.
 #[divan::bench(args = [false, true], sample_count = 200, sample_size = 2000)]
 fn instruments(bencher: Bencher, vibration: bool) {
-    let mut imu = Imu::ICM_42688_P;
+    let mut imu = ImuModel::ICM_42688_P;
     if vibration {
         (imu.gyro.vibration_rad_s, imu.accel.vibration_m_s2) = (0.02, 1.0);
     }
     let suite = InstrumentSuite {
         imu: Some(imu),
         tracker: Some(TrackerModel::MOCAP_100),
-        gnss: Some(Gnss::M10),
-        barometer: Some(Barometer::DPS310),
-        magnetometer: Some(Magnetometer::IST8310),
+        gnss: Some(GnssModel::M10),
+        barometer: Some(BarometerModel::DPS310),
+        magnetometer: Some(MagnetometerModel::IST8310),
     };
     let mut truth = Plant::new(PlantModel::RigidBody, start(), environment()).truth();
-    let mut instruments = Instruments::new(&suite, &[], 1, STEP_S).unwrap();
+    let mut instruments = SimulatedInstruments::new(&suite, &[], 1, STEP_S).unwrap();
     bencher.counter(ItemsCount::new(1_usize)).bench_local(|| {
         truth.time_s += STEP_S;
         instruments.measure(black_box(&truth))
@@ -169,6 +170,6 @@ fn measurement(bencher: Bencher) {
 
 #[divan::bench(sample_count = 200, sample_size = 2000)]
 fn normal_number(bencher: Bencher) {
-    let mut noise = afbc_plant::noise::Noise::new(1, afbc_plant::noise::Stream::Wind);
+    let mut noise = afbc_plant::noise::Noise::new(1, afbc_plant::noise::NoiseStream::Wind);
     bencher.counter(ItemsCount::new(1_usize)).bench_local(|| noise.normal());
 }

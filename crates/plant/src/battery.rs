@@ -9,7 +9,7 @@ parameters! {
     /// an open-circuit voltage that falls linearly with the charge drawn.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-    pub struct Battery {
+    pub struct BatteryModel {
         /// Open-circuit voltage when full, at which the rotors reach their largest speed.
         #[parameter(FULL, "V", 1.0..=1000.0)]
         pub full_v: f64 = 12.6,
@@ -36,7 +36,7 @@ parameters! {
         pub effect: Sag = Sag::Ceiling,
     }
     together(battery) {
-        Range { max: battery.full_v, ..Battery::EMPTY.range }.check(battery.empty_v)
+        Range { max: battery.full_v, ..BatteryModel::EMPTY.range }.check(battery.empty_v)
     }
 }
 
@@ -55,14 +55,14 @@ impl Choice for Sag {
     const WORDS: &'static [&'static str] = &["ceiling", "speed"];
 }
 
-impl Battery {
+impl BatteryModel {
     /// Three lithium-polymer cells of 1.5 A h, which carry the paper's vehicle for about a quarter of an hour.
     pub const THREE_CELLS: Self = Self::DEFAULT;
 }
 
 /// State of a battery.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Charge {
+pub struct BatteryState {
     /// Terminal voltage under load \[V\].
     pub voltage_v: f64,
     /// Current \[A\].
@@ -73,24 +73,24 @@ pub struct Charge {
 
 /// Battery in simulation.
 #[derive(Clone, Debug)]
-pub(crate) struct Discharge {
-    battery: Battery,
+pub(crate) struct SimulatedBattery {
+    battery: BatteryModel,
     /// Share of the capacity drawn by one ampere in one step \[1/A\].
     per_ampere: f64,
-    pub(crate) now: Charge,
+    pub(crate) now: BatteryState,
 }
 
-impl Discharge {
-    pub(crate) fn new(battery: Battery, step_s: f64) -> Self {
-        let now = Charge { voltage_v: 0.0, current_a: 0.0, charge: battery.initial_charge };
-        let mut discharge = Discharge { battery, per_ampere: step_s / (3600.0 * battery.capacity_a_h), now };
+impl SimulatedBattery {
+    pub(crate) fn new(battery: BatteryModel, step_s: f64) -> Self {
+        let now = BatteryState { voltage_v: 0.0, current_a: 0.0, charge: battery.initial_charge };
+        let mut discharge = SimulatedBattery { battery, per_ampere: step_s / (3600.0 * battery.capacity_a_h), now };
         discharge.now.voltage_v = discharge.open_circuit_v();
         discharge
     }
 
     /// Returns the open-circuit voltage \[V\], 0 for an empty battery, so that nothing flies without charge.
     fn open_circuit_v(&self) -> f64 {
-        let Battery { full_v, empty_v, .. } = self.battery;
+        let BatteryModel { full_v, empty_v, .. } = self.battery;
         if self.now.charge > 0.0 { empty_v + (full_v - empty_v) * self.now.charge } else { 0.0 }
     }
 
@@ -99,7 +99,7 @@ impl Discharge {
     /// # Errors
     /// Returns an error if the share is out of range.
     pub(crate) fn charge(&mut self, share: f64) -> Result<(), OutOfRange> {
-        Battery::CHARGE.range.check(share)?;
+        BatteryModel::CHARGE.range.check(share)?;
         self.now.charge = share;
         Ok(())
     }
@@ -120,7 +120,7 @@ impl Discharge {
     /// solution, and the battery gives its largest power.
     #[inline]
     pub(crate) fn supply(&mut self, rotor_w: f64) {
-        let Battery { resistance_ohm: r, efficiency, avionics_w, .. } = self.battery;
+        let BatteryModel { resistance_ohm: r, efficiency, avionics_w, .. } = self.battery;
         let power_w = rotor_w / efficiency + avionics_w;
         let v = self.open_circuit_v();
         // With the root in the divisor there is no division by R, which may be 0, and no loss of digits where R I is

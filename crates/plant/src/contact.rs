@@ -68,7 +68,7 @@ impl Contact {
     }
 
     /// Returns the ground contact of this vehicle.
-    pub(crate) fn ground(&self, vehicle: &Parameters<f64>) -> Ground {
+    pub(crate) fn ground(&self, vehicle: &Parameters<f64>) -> SimulatedGround {
         let stiffness_n_m = vehicle.weight_n() / (4.0 * self.sink_m);
         let (feet, arm) = (self.foot_radius_m, vehicle.arm_m);
         let around = |radius: f64, z: f64| {
@@ -76,7 +76,7 @@ impl Contact {
         };
         let points = [around(feet, -self.foot_depth_m), around(arm, self.rotor_height_m)];
         let reach = |[point, ..]: &[Vector3<f64>; 4]| sqrt(point.norm_squared());
-        Ground {
+        SimulatedGround {
             stiffness_n_m,
             // Four feet share 2 zeta sqrt(4 k m).
             damping_n_s_m: 0.5 * self.damping_ratio * sqrt(4.0 * stiffness_n_m * vehicle.mass_kg),
@@ -94,7 +94,7 @@ const NEAR_M: f64 = 0.02;
 
 /// Ground below one vehicle.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Ground {
+pub(crate) struct SimulatedGround {
     /// Stiffness k and damping c of each point.
     stiffness_n_m: f64,
     damping_n_s_m: f64,
@@ -105,7 +105,7 @@ pub(crate) struct Ground {
     points: [[Vector3<f64>; 4]; 2],
 }
 
-impl Ground {
+impl SimulatedGround {
     /// Returns true if a vehicle at this height may touch the ground within a step.
     #[inline]
     pub(crate) fn is_near(&self, height_m: f64, climb_m_s: f64) -> bool {

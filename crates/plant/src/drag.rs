@@ -1,6 +1,6 @@
 //! Aerodynamic drag: a concrete form of the paper's A_i = 1/2 rho C_i W^2.
 
-use crate::frame::{Frame, Sums};
+use crate::frame::{RotorLayout, RotorSums};
 use afbc_types::{Declared, OutOfRange, Parameters, Range, parameters};
 use libm::sqrt;
 use nalgebra::Vector3;
@@ -59,7 +59,7 @@ impl Drag {
     pub fn validate_for(
         &self,
         vehicle: &Parameters<f64>,
-        frame: &Frame,
+        frame: &RotorLayout,
         max_rad_s: f64,
         step_s: f64,
     ) -> Result<(), OutOfRange> {
@@ -77,8 +77,8 @@ impl Drag {
 
     /// Returns the drag for one step, with arms of `arm_m` and these rotor speeds \[rad/s\].
     #[inline]
-    pub(crate) fn held(&self, speeds: &Sums, arm_m: f64) -> HeldDrag {
-        let Sums { all, x, y, square, .. } = *speeds;
+    pub(crate) fn held(&self, speeds: &RotorSums, arm_m: f64) -> HeldDrag {
+        let RotorSums { all, x, y, square, .. } = *speeds;
         let lever = self.blade_n_s2_m * arm_m;
         HeldDrag {
             blade_n_s_m: self.blade_n_s2_m * all,

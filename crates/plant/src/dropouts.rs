@@ -9,7 +9,7 @@ parameters! {
     /// channel*).
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-    pub struct Dropouts {
+    pub struct MeasurementDropouts {
         /// Rate at which dropouts begin while there is none.
         #[parameter(RATE, "Hz", 0.0..=1000.0)]
         pub rate_hz: f64 = 0.0,
@@ -21,7 +21,7 @@ parameters! {
 
 /// Dropouts in simulation.
 #[derive(Clone, Debug)]
-pub(crate) struct Outage {
+pub(crate) struct SimulatedDropouts {
     random: Noise,
     /// Probabilities per step that a dropout begins, and that it ends.
     begins: f64,
@@ -29,9 +29,9 @@ pub(crate) struct Outage {
     now: bool,
 }
 
-impl Outage {
-    pub(crate) fn new(dropouts: &Dropouts, random: Noise, step_s: f64) -> Self {
-        Outage {
+impl SimulatedDropouts {
+    pub(crate) fn new(dropouts: &MeasurementDropouts, random: Noise, step_s: f64) -> Self {
+        SimulatedDropouts {
             random,
             begins: 1.0 - exp(-dropouts.rate_hz * step_s),
             // With a mean length of zero a dropout ends with probability 1.

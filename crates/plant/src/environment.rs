@@ -1,6 +1,6 @@
 //! External disturbances, and parameters of the vehicle that change over time.
 
-use crate::frame::Frame;
+use crate::frame::RotorLayout;
 use crate::ratios::Ratios;
 use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, Range};
 use alloc::vec::Vec;
@@ -56,7 +56,7 @@ pub enum PlantParameter {
 /// Change that multiplies one parameter by `factor` from `start_s` to `end_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct ParameterChange {
+pub struct PlantParameterChange {
     /// Parameter that changes.
     pub quantity: PlantParameter,
     /// Factor on the parameter; 1 changes nothing.
@@ -100,7 +100,7 @@ pub const PAYLOAD_LEFT: Range = Range::new("left_m", -10.0, 10.0);
 impl Payload {
     /// Adds the payload's mass, its inertia (by the parallel axis theorem m m_p/(m + m_p) times the squared distance
     /// from each axis), and its shift of the centre of mass.
-    fn load(&self, vehicle: &mut Parameters<f64>, rig: &mut Rig) {
+    fn load(&self, vehicle: &mut Parameters<f64>, rig: &mut WrenchEffect) {
         let Payload { mass_kg, below_m, ahead_m, left_m, .. } = *self;
         let total_kg = vehicle.mass_kg + mass_kg;
         let [below, ahead, left] = [below_m, ahead_m, left_m].map(|distance_m| distance_m * distance_m);
@@ -118,8 +118,8 @@ impl Payload {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Environment {
     nominal: Parameters<f64>,
-    frame: Frame,
-    changes: Vec<ParameterChange>,
+    frame: RotorLayout,
+    changes: Vec<PlantParameterChange>,
     gusts: Vec<Gust>,
     payloads: Vec<Payload>,
 }
@@ -138,17 +138,17 @@ fn active(start_s: f64, end_s: f64, t: f64) -> bool {
 
 /// Effect of the rotors' wrench on the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Rig {
+pub(crate) struct WrenchEffect {
     /// Factors on the rotors' moments about body x, y, z.
     pub(crate) moments: Vector3<f64>,
     /// Moments about body x and y per thrust \[m\] that result from a centre of mass beside the thrust, subtracted.
     pub(crate) lever_m: Vector2<f64>,
 }
 
-impl Rig {
+impl WrenchEffect {
     /// Returns the intact rig: the thrust acts through the centre of mass.
     pub(crate) fn intact() -> Self {
-        Rig { moments: Vector3::repeat(1.0), lever_m: Vector2::zeros() }
+        WrenchEffect { moments: Vector3::repeat(1.0), lever_m: Vector2::zeros() }
     }
 }
 
@@ -157,7 +157,7 @@ impl Rig {
 pub(crate) struct Segment {
     pub(crate) parameters: Parameters<f64>,
     pub(crate) ratios: Ratios,
-    pub(crate) rig: Rig,
+    pub(crate) rig: WrenchEffect,
     /// \[A_x, A_y, A_z\], earth frame \[m/s2\].
     pub(crate) a_force: Vector3<f64>,
     /// \[A_phi, A_theta, A_psi\], body frame \[rad/s2\].
@@ -170,7 +170,7 @@ impl Segment {
     /// Creates a segment with these parameters and the paper's disturbances, valid until `until_s`.
     pub(crate) fn new(
         parameters: Parameters<f64>,
-        rig: Rig,
+        rig: WrenchEffect,
         [a_force, a_moment]: [Vector3<f64>; 2],
         until_s: f64,
     ) -> Self {
@@ -192,8 +192,12 @@ impl Environment {
     /// # Errors
     /// Returns the first parameter out of range, initially or at any time, or the first gust out of [`GUST_SIZE`] or
     /// [`START`].
-    pub fn new(nominal: Parameters<f64>, changes: Vec<ParameterChange>, gusts: Vec<Gust>) -> Result<Self, OutOfRange> {
-        let environment = Environment { nominal, frame: Frame::default(), changes, gusts, payloads: Vec::new() };
+    pub fn new(
+        nominal: Parameters<f64>,
+        changes: Vec<PlantParameterChange>,
+        gusts: Vec<Gust>,
+    ) -> Result<Self, OutOfRange> {
+        let environment = Environment { nominal, frame: RotorLayout::default(), changes, gusts, payloads: Vec::new() };
         nominal.validate()?;
         for gust in &environment.gusts {
             GUST_SIZE.check(gust.size)?;
@@ -232,7 +236,7 @@ impl Environment {
 
     /// Returns the environment for a vehicle with this frame instead of the paper's.
     #[must_use]
-    pub fn with_frame(self, frame: Frame) -> Self {
+    pub fn with_frame(self, frame: RotorLayout) -> Self {
         Environment { frame, ..self }
     }
 
@@ -249,7 +253,7 @@ impl Environment {
     }
 
     /// Returns the positions of the rotors.
-    pub fn frame(&self) -> &Frame {
+    pub fn frame(&self) -> &RotorLayout {
         &self.frame
     }
 
@@ -259,7 +263,7 @@ impl Environment {
     }
 
     /// Returns every parameter change.
-    pub fn changes(&self) -> &[ParameterChange] {
+    pub fn changes(&self) -> &[PlantParameterChange] {
         &self.changes
     }
 
@@ -270,7 +274,7 @@ impl Environment {
 
     /// Returns parameters and disturbances at time `t` \[s\], with the time of the next change.
     pub(crate) fn segment(&self, t: f64) -> Segment {
-        let (mut parameters, mut rig) = (self.nominal, Rig::intact());
+        let (mut parameters, mut rig) = (self.nominal, WrenchEffect::intact());
         for change in self.changes.iter().filter(|c| active(c.start_s, c.end_s, t)) {
             match change.quantity {
                 PlantParameter::Mass => parameters.mass_kg *= change.factor,

@@ -6,7 +6,7 @@
 //!
 //! This is the paper's plant. [`Realism`] adds optional effects: rotors with lag, limits, delay, faults and a battery;
 //! drag; wind with gusts and turbulence; ground. A [`StateSensor`] measures the motion for a controller like a perfect
-//! tracker; [`Instruments`] are the sensors of a real vehicle. Every flight is reproducible from a seed.
+//! tracker; [`SimulatedInstruments`] are the sensors of a real vehicle. Every flight is reproducible from a seed.
 //!
 //! [`afbc_types`] defines frames, units and the meaning of "(n)". Trigonometry comes from the `libm` crate, so a flight
 //! gives the same bits on every host.
@@ -54,22 +54,22 @@ pub mod turbulence;
 mod vehicle;
 pub mod wind;
 
-pub use battery::{Battery, Charge, Sag};
+pub use battery::{BatteryModel, BatteryState, Sag};
 pub use contact::Contact;
 pub use drag::Drag;
-pub use dropouts::Dropouts;
+pub use dropouts::MeasurementDropouts;
 pub use environment::{
-    Environment, GUST_SIZE, Gust, GustKind, PAYLOAD_AHEAD, PAYLOAD_BELOW, PAYLOAD_LEFT, PAYLOAD_MASS, ParameterChange,
-    Payload, PlantParameter, START,
+    Environment, GUST_SIZE, Gust, GustKind, PAYLOAD_AHEAD, PAYLOAD_BELOW, PAYLOAD_LEFT, PAYLOAD_MASS, Payload,
+    PlantParameter, PlantParameterChange, START,
 };
-pub use frame::{Frame, Lanes};
+pub use frame::{PerRotor, RotorLayout};
 pub use ground_effect::GroundEffect;
-pub use instruments::{InstrumentReadings, InstrumentSuite, Instruments};
+pub use instruments::{InstrumentReadings, InstrumentSuite, SimulatedInstruments};
 pub use load::Load;
 pub use motion::Motion;
 pub use realism::{EffectsState, Realism, STEP};
-pub use rotors::{RotorFault, Rotors, Start};
-pub use sensor_fault::{Misreading, SensorFault, SensorFaults};
+pub use rotors::{RotorFault, RotorStart, Rotors};
+pub use sensor_fault::{SensorFault, SensorFaultKind, SensorFaults};
 pub use sensors::{Deviations, Sensing, StateMeasurement, StateSensor};
 pub use truth::Truth;
 pub use turbulence::Turbulence;

@@ -1,7 +1,7 @@
 //! Forces and moments over one step.
 
-use crate::environment::{Rig, Segment};
-use crate::frame::{Frame, Lanes, Sums};
+use crate::environment::{Segment, WrenchEffect};
+use crate::frame::{PerRotor, RotorLayout, RotorSums};
 use afbc_types::Parameters;
 use nalgebra::Vector3;
 
@@ -34,14 +34,14 @@ impl Load {
         a_moment: Vector3<f64>,
     ) -> Self {
         let [w1, w2, w3, w4] = speeds_rad_s;
-        let speeds = Lanes::from([w1, w2, w3, w4, 0.0, 0.0, 0.0, 0.0]);
-        let segment = Segment::new(*parameters, Rig::intact(), [a_force, a_moment], f64::INFINITY);
-        Self::ideal(&segment, &Frame::default(), &speeds)
+        let speeds = PerRotor::from([w1, w2, w3, w4, 0.0, 0.0, 0.0, 0.0]);
+        let segment = Segment::new(*parameters, WrenchEffect::intact(), [a_force, a_moment], f64::INFINITY);
+        Self::ideal(&segment, &RotorLayout::default(), &speeds)
     }
 
     /// Computes the load of ideal rotors on any frame, including the segment's moment factors and levers.
     #[inline]
-    pub(crate) fn ideal(segment: &Segment, frame: &Frame, speeds_rad_s: &Lanes) -> Self {
+    pub(crate) fn ideal(segment: &Segment, frame: &RotorLayout, speeds_rad_s: &PerRotor) -> Self {
         let squares = speeds_rad_s.map(|w| w * w);
         let [speeds, squares] = [speeds_rad_s, &squares].map(|values| frame.sums(values));
         Self::of_rotors(segment, [&speeds, &squares], 1.0)
@@ -51,12 +51,12 @@ impl Load {
     /// already include each rotor's efficiency. Thrusts and drag moments follow from the squares; thrusts are also
     /// multiplied by `thrust_ratio`.
     #[inline]
-    pub(crate) fn of_rotors(segment: &Segment, [speeds, squares]: [&Sums; 2], thrust_ratio: f64) -> Self {
+    pub(crate) fn of_rotors(segment: &Segment, [speeds, squares]: [&RotorSums; 2], thrust_ratio: f64) -> Self {
         let Segment { parameters, ratios, rig, a_force, a_moment, .. } = segment;
         let Parameters { mass_kg, arm_m, inertia_kg_m2: i, rotor_inertia_kg_m2, .. } = *parameters;
-        let Sums { all, x, y, spin, .. } = *squares;
+        let RotorSums { all, x, y, spin, .. } = *squares;
         let (b, d) = (thrust_ratio * parameters.thrust_factor_n_s2, parameters.drag_factor_n_m_s2);
-        let (thrust_n, Rig { moments, lever_m }) = (b * all, rig);
+        let (thrust_n, WrenchEffect { moments, lever_m }) = (b * all, rig);
         let momentum = rotor_inertia_kg_m2 * speeds.spin;
         Load {
             thrust_m_s2: thrust_n / mass_kg,

@@ -13,7 +13,7 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 /// User of a stream of random numbers. Streams of one seed do not overlap: each begins 2^128 draws after the previous
 /// one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stream {
+pub enum NoiseStream {
     /// Turbulence.
     Wind,
     /// Measurement noise and bias.
@@ -59,7 +59,7 @@ impl fmt::Debug for Noise {
 
 impl Noise {
     /// Creates the random numbers of `stream` with `seed`.
-    pub fn new(seed: u64, stream: Stream) -> Self {
+    pub fn new(seed: u64, stream: NoiseStream) -> Self {
         let mut bits = Xoshiro256PlusPlus::seed_from_u64(seed);
         // By the order of the variants: a new one must go last, so that the others keep their numbers.
         for _ in 0..stream as usize {
@@ -111,7 +111,7 @@ impl Noise {
     /// stream.
     #[cold]
     #[inline(never)]
-    fn beyond(mut self, layer: &Layer, x: f64) -> (Self, Option<f64>) {
+    fn beyond(mut self, layer: &ZigguratLayer, x: f64) -> (Self, Option<f64>) {
         if layer.height == LAYERS_BASE_HEIGHT {
             let far = self.tail().copysign(x);
             return (self, Some(far));
@@ -139,7 +139,7 @@ const AREA: f64 = 4.928_673_233_974_655e-3;
 
 /// Horizontal layer under exp(-x^2/2).
 #[derive(Clone, Copy)]
-struct Layer {
+struct ZigguratLayer {
     /// Half width divided by 2^52, one step of the position. The half width is the curve's abscissa at the lower edge;
     /// the lowest layer is widened to include the tail's area.
     step: f64,
@@ -157,18 +157,18 @@ const STEPS: f64 = (1_u64 << 52) as f64;
 /// Height of the lowest layer, whose lower edge is not on the curve.
 const LAYERS_BASE_HEIGHT: f64 = 0.0;
 
-static LAYERS: [Layer; 256] = layers();
+static LAYERS: [ZigguratLayer; 256] = layers();
 
 #[expect(clippy::indexing_slicing, reason = "evaluated when compiled")]
-const fn layers() -> [Layer; 256] {
+const fn layers() -> [ZigguratLayer; 256] {
     let (mut x, mut y) = (R, gauss(R));
-    let base = Layer { step: AREA / y / STEPS, width_above: R, height: LAYERS_BASE_HEIGHT, height_above: y };
+    let base = ZigguratLayer { step: AREA / y / STEPS, width_above: R, height: LAYERS_BASE_HEIGHT, height_above: y };
     let mut layers = [base; 256];
     let mut i = 1;
     while i < 256 {
         // Each layer has the same area, x (y_above - y). The topmost ends at the peak.
         let (x_above, y_above) = if i == 255 { (0.0, 1.0) } else { (gauss_inverse(y + AREA / x, x), y + AREA / x) };
-        layers[i] = Layer { step: x / STEPS, width_above: x_above, height: y, height_above: y_above };
+        layers[i] = ZigguratLayer { step: x / STEPS, width_above: x_above, height: y, height_above: y_above };
         (x, y) = (x_above, y_above);
         i += 1;
     }

@@ -1,17 +1,17 @@
 //! Optional realistic effects that the paper's vehicle lacks.
 
-use crate::battery::Charge;
+use crate::battery::BatteryState;
 use crate::body_axes::BodyAxes;
-use crate::contact::{Contact, Ground};
+use crate::contact::{Contact, SimulatedGround};
 use crate::drag::{Drag, HeldDrag};
 use crate::environment::{Environment, Segment};
-use crate::frame::{Frame, Lanes};
+use crate::frame::{PerRotor, RotorLayout};
 use crate::ground_effect::GroundEffect;
 use crate::load::Load;
 use crate::ratios::Ratios;
-use crate::rotors::{RotorFault, Rotors, Spin};
-use crate::surroundings::Surroundings;
-use crate::wind::{Weather, Wind};
+use crate::rotors::{RotorFault, Rotors, SimulatedRotors};
+use crate::surroundings::AirAndGround;
+use crate::wind::{SimulatedWind, Wind};
 use afbc_types::{Declared, OutOfRange, Range};
 use alloc::vec::Vec;
 use nalgebra::Vector3;
@@ -73,7 +73,7 @@ pub struct Realism {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EffectsState {
     /// Rotor speeds at the end of the step \[rad/s\]; 0 for rotors that the vehicle does not have.
-    pub rotor_speeds_rad_s: Lanes,
+    pub rotor_speeds_rad_s: PerRotor,
     /// Velocity of the air, earth frame \[m/s\].
     pub wind_m_s: Vector3<f64>,
     /// Thrust divided by its value far from the ground.
@@ -81,32 +81,32 @@ pub struct EffectsState {
     /// True if a foot or a rotor touched the ground at the start of the step.
     pub on_ground: bool,
     /// State of the battery, if there is one.
-    pub battery: Option<Charge>,
+    pub battery: Option<BatteryState>,
 }
 
 /// Effects of [`Realism`] in simulation.
 #[derive(Clone, Debug)]
-pub(crate) struct Effects {
-    frame: Frame,
-    spin: Spin,
+pub(crate) struct SimulatedEffects {
+    frame: RotorLayout,
+    spin: SimulatedRotors,
     drag: Option<Drag>,
     /// Drag at the rotor speeds of the last step, `None` before the first step.
     held: Option<HeldDrag>,
-    weather: Weather,
-    ground: Option<Ground>,
+    weather: SimulatedWind,
+    ground: Option<SimulatedGround>,
     ground_effect: Option<GroundEffect>,
     wind_m_s: Vector3<f64>,
     thrust_ratio: f64,
     on_ground: bool,
 }
 
-impl Effects {
+impl SimulatedEffects {
     pub(crate) fn new(realism: &Realism, environment: &Environment, step_s: f64) -> Result<Self, OutOfRange> {
         let Realism { rotors, drag, wind, contact, ground_effect, seed } = realism;
         let (vehicle, frame) = (environment.nominal(), environment.frame());
         STEP.check(step_s)?;
-        let spin = Spin::new(rotors.clone(), vehicle, frame, step_s)?;
-        let weather = Weather::new(wind.clone(), *seed, step_s)?;
+        let spin = SimulatedRotors::new(rotors.clone(), vehicle, frame, step_s)?;
+        let weather = SimulatedWind::new(wind.clone(), *seed, step_s)?;
         if let Some(drag) = drag {
             drag.validate_for(vehicle, frame, rotors.max_rad_s, step_s)?;
         }
@@ -116,7 +116,7 @@ impl Effects {
         if let Some(ground_effect) = ground_effect {
             ground_effect.validate()?;
         }
-        Ok(Effects {
+        Ok(SimulatedEffects {
             frame: *frame,
             spin,
             drag: *drag,
@@ -134,13 +134,13 @@ impl Effects {
     #[inline]
     pub(crate) fn begin_step<'a>(
         &'a mut self,
-        speeds: &Lanes,
+        speeds: &PerRotor,
         segment: &'a Segment,
         time_s: f64,
         position_m: &Vector3<f64>,
         velocity_m_s: &Vector3<f64>,
         axes: impl FnOnce() -> BodyAxes,
-    ) -> (Load, Surroundings<'a>) {
+    ) -> (Load, AirAndGround<'a>) {
         let Segment { parameters, ratios, .. } = segment;
         let drive = self.spin.advance(&self.frame, speeds, time_s, parameters.drag_factor_n_m_s2);
         self.wind_m_s = self.weather.advance(time_s, position_m.z, velocity_m_s);
@@ -163,13 +163,13 @@ impl Effects {
 
     /// Returns air and ground for this height and climb rate, with the wind and rotors of the last step.
     #[inline]
-    pub(crate) fn surroundings<'a>(&'a self, ratios: &'a Ratios, height_m: f64, climb_m_s: f64) -> Surroundings<'a> {
-        Surroundings::new(ratios, self.held.as_ref(), self.wind_m_s, self.near(height_m, climb_m_s))
+    pub(crate) fn surroundings<'a>(&'a self, ratios: &'a Ratios, height_m: f64, climb_m_s: f64) -> AirAndGround<'a> {
+        AirAndGround::new(ratios, self.held.as_ref(), self.wind_m_s, self.near(height_m, climb_m_s))
     }
 
     /// Returns the ground if the vehicle can reach it within a step.
     #[inline]
-    fn near(&self, height_m: f64, climb_m_s: f64) -> Option<&Ground> {
+    fn near(&self, height_m: f64, climb_m_s: f64) -> Option<&SimulatedGround> {
         self.ground.as_ref().filter(|ground| ground.is_near(height_m, climb_m_s))
     }
 

@@ -3,12 +3,12 @@
 use crate::body_axes::BodyAxes;
 use crate::load::Load;
 use crate::motion::Motion;
-use crate::surroundings::Surroundings;
+use crate::surroundings::AirAndGround;
 use libm::{asin, atan2, cos, sin, sqrt};
 use nalgebra::{SVector, Vector3};
 
 /// State vector: \[x, y, z, their rates, quaternion w x y z (body to earth), p, q, r\].
-pub type Vector = SVector<f64, 13>;
+pub type RigidBodyVector = SVector<f64, 13>;
 
 /// Returns the unit quaternion w, x, y, z (body to earth) of roll, pitch and yaw.
 pub(crate) fn quaternion(attitude_rad: &Vector3<f64>) -> [f64; 4] {
@@ -25,8 +25,8 @@ pub(crate) fn quaternion(attitude_rad: &Vector3<f64>) -> [f64; 4] {
 }
 
 /// Converts `motion` to the state vector.
-pub fn vector(motion: &Motion) -> Vector {
-    let mut x = Vector::zeros();
+pub fn vector(motion: &Motion) -> RigidBodyVector {
+    let mut x = RigidBodyVector::zeros();
     x.fixed_rows_mut::<3>(0).copy_from(&motion.position_m);
     x.fixed_rows_mut::<3>(3).copy_from(&motion.velocity_m_s);
     x.fixed_rows_mut::<4>(6).copy_from_slice(&quaternion(&motion.attitude_rad));
@@ -36,7 +36,7 @@ pub fn vector(motion: &Motion) -> Vector {
 
 /// Converts a state vector to the motion, with yaw and roll within -pi to pi and pitch within -pi/2 to pi/2.
 #[inline]
-pub fn motion(v: &Vector) -> Motion {
+pub fn motion(v: &RigidBodyVector) -> Motion {
     let (w, x, y, z) = (v[6], v[7], v[8], v[9]);
     Motion {
         position_m: v.fixed_rows::<3>(0).into(),
@@ -62,16 +62,16 @@ pub fn euler_rates(attitude_rad: &Vector3<f64>, rates_rad_s: &Vector3<f64>) -> V
 
 /// Returns the derivative of the state vector with a constant load.
 #[inline]
-pub fn derivative(v: &Vector, load: &Load) -> Vector {
+pub fn derivative(v: &RigidBodyVector, load: &Load) -> RigidBodyVector {
     pack(v, &load.acceleration(&body_axes(v).up), &load.angular_acceleration(&Vector3::new(v[10], v[11], v[12])))
 }
 
 /// Returns the derivative of the state vector from its accelerations.
 #[inline]
-fn pack(v: &Vector, acceleration: &Vector3<f64>, angular_acceleration: &Vector3<f64>) -> Vector {
+fn pack(v: &RigidBodyVector, acceleration: &Vector3<f64>, angular_acceleration: &Vector3<f64>) -> RigidBodyVector {
     let (w, x, y, z) = (v[6], v[7], v[8], v[9]);
     let (p, q, r) = (v[10], v[11], v[12]);
-    Vector::from([
+    RigidBodyVector::from([
         v[3],
         v[4],
         v[5],
@@ -91,14 +91,14 @@ fn pack(v: &Vector, acceleration: &Vector3<f64>, angular_acceleration: &Vector3<
 
 /// Returns the body axes from the unit quaternion.
 #[inline]
-pub(crate) fn body_axes(v: &Vector) -> BodyAxes {
+pub(crate) fn body_axes(v: &RigidBodyVector) -> BodyAxes {
     BodyAxes::of_quaternion(v[6], v[7], v[8], v[9])
 }
 
 /// Returns [`derivative`] with the forces that depend on position and velocity.
 // Always inlined, with its callees: passing a state through memory costs a fifth of this function's time.
 #[inline(always)]
-pub(crate) fn derivative_in(v: &Vector, load: &Load, surroundings: &Surroundings) -> Vector {
+pub(crate) fn derivative_in(v: &RigidBodyVector, load: &Load, surroundings: &AirAndGround) -> RigidBodyVector {
     let (velocity, rates) = (Vector3::new(v[3], v[4], v[5]), Vector3::new(v[10], v[11], v[12]));
     let axes = body_axes(v);
     let (a, angular) = surroundings.accelerations(v[2], &velocity, &axes, &rates);
@@ -107,7 +107,7 @@ pub(crate) fn derivative_in(v: &Vector, load: &Load, surroundings: &Surroundings
 
 /// Normalises the quaternion, whose length drifts slowly in the integration.
 #[inline]
-pub(crate) fn normalise(v: &mut Vector) {
+pub(crate) fn normalise(v: &mut RigidBodyVector) {
     let (w, x, y, z) = (v[6], v[7], v[8], v[9]);
     let scale = 1.0 / sqrt(w * w + x * x + y * y + z * z);
     v[6] *= scale;

@@ -1,9 +1,9 @@
 //! Rotors with lag, delay, limits and faults, supplied by a battery.
 
-use crate::battery::{Battery, Charge, Discharge, Sag};
+use crate::battery::{BatteryModel, BatteryState, Sag, SimulatedBattery};
 use crate::delay::{DelayLine, whole_steps};
 use crate::frame;
-use crate::frame::{Frame, Lanes};
+use crate::frame::{PerRotor, RotorLayout};
 use afbc_types::{Choice, Declared, OutOfRange, Parameters, ROTORS_MAX, Range, parameters};
 use alloc::vec::Vec;
 use libm::exp;
@@ -30,11 +30,11 @@ parameters! {
         pub max_rad_s: f64 = 10_000.0,
         /// Speeds before the first command arrives: those of hover, or the smallest.
         #[choice(START)]
-        pub start: Start = Start::Hover,
+        pub start: RotorStart = RotorStart::Hover,
         /// Faults that reduce a rotor's thrust.
         pub faults: Vec<RotorFault> = Vec::new(),
         /// Battery that supplies the rotors; without one, the voltage is constant.
-        pub battery: Option<Battery> = None,
+        pub battery: Option<BatteryModel> = None,
     }
     together(rotors) {
         Range { max: rotors.max_rad_s, ..Rotors::MIN.range }.check(rotors.min_rad_s)?;
@@ -46,15 +46,15 @@ parameters! {
 /// Actual and commanded rotor speeds before the first command arrives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub enum Start {
+pub enum RotorStart {
     /// Hover speed, for a flight that begins in the air without a transient.
     Hover,
     /// Smallest speed, for a flight that begins on the ground.
     Idle,
 }
 
-impl Choice for Start {
-    const ALL: &'static [Self] = &[Start::Hover, Start::Idle];
+impl Choice for RotorStart {
+    const ALL: &'static [Self] = &[RotorStart::Hover, RotorStart::Idle];
     const WORDS: &'static [&'static str] = &["hover", "idle"];
 }
 
@@ -92,7 +92,7 @@ impl RotorFault {
 
 impl Rotors {
     /// Returns each rotor's share of its thrust at time `t` \[s\], and the time of the next change.
-    fn efficiency(&self, frame: &Frame, t: f64) -> (Lanes, f64) {
+    fn efficiency(&self, frame: &RotorLayout, t: f64) -> (PerRotor, f64) {
         let (mut efficiency, mut until_s) = (frame.repeat(1.0), f64::INFINITY);
         // `check` refuses a rotor 0, so the subtraction does not underflow.
         for fault in &self.faults {
@@ -111,20 +111,20 @@ const TIME_SLACK_S: f64 = 1e-9;
 
 /// Rotor speeds over one step.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Drive {
+pub(crate) struct RotorSpeedStep {
     /// Speeds in the middle of the step \[rad/s\].
-    pub(crate) speeds_rad_s: Lanes,
+    pub(crate) speeds_rad_s: PerRotor,
     /// Squares of the speeds times each rotor's efficiency \[rad2/s2\].
-    pub(crate) squares: Lanes,
+    pub(crate) squares: PerRotor,
 }
 
 /// Returns 1 for each rotor that its motor drives. Rotors that the vehicle does not have have an efficiency of 0.
-fn driven(efficiency: &Lanes) -> Lanes {
+fn driven(efficiency: &PerRotor) -> PerRotor {
     efficiency.map(|share| if share > 0.0 { 1.0 } else { 0.0 })
 }
 
 /// Checks rotor faults for a vehicle with this frame.
-fn check(faults: &[RotorFault], frame: &Frame) -> Result<(), OutOfRange> {
+fn check(faults: &[RotorFault], frame: &RotorLayout) -> Result<(), OutOfRange> {
     faults.iter().try_for_each(|fault| {
         fault.validate()?;
         Range { max: frame.count() as f64, ..limits::ROTOR }.check(fault.rotor)
@@ -133,41 +133,41 @@ fn check(faults: &[RotorFault], frame: &Frame) -> Result<(), OutOfRange> {
 
 /// Rotors in simulation.
 #[derive(Clone, Debug)]
-pub(crate) struct Spin {
+pub(crate) struct SimulatedRotors {
     rotors: Rotors,
-    commands: DelayLine<Lanes>,
+    commands: DelayLine<PerRotor>,
     /// exp(-dt / 2 tau): remaining share of a speed's distance to its target after half a step.
     half_step: f64,
     /// Present speeds \[rad/s\].
-    pub(crate) speeds_rad_s: Lanes,
-    efficiency: Lanes,
+    pub(crate) speeds_rad_s: PerRotor,
+    efficiency: PerRotor,
     efficiency_until_s: f64,
     /// 1 for each rotor that its motor drives.
-    driven: Lanes,
-    battery: Option<Discharge>,
+    driven: PerRotor,
+    battery: Option<SimulatedBattery>,
 }
 
-impl Spin {
-    /// Creates rotors for a vehicle with these parameters, with the initial speeds of [`Start`].
+impl SimulatedRotors {
+    /// Creates rotors for a vehicle with these parameters, with the initial speeds of [`RotorStart`].
     ///
     /// # Errors
     /// Returns the first parameter that is out of range.
     pub(crate) fn new(
         rotors: Rotors,
         vehicle: &Parameters<f64>,
-        frame: &Frame,
+        frame: &RotorLayout,
         step_s: f64,
     ) -> Result<Self, OutOfRange> {
         rotors.validate()?;
         check(&rotors.faults, frame)?;
         let start_rad_s = match rotors.start {
-            Start::Hover => {
+            RotorStart::Hover => {
                 frame.masked(&frame.hover_rad_s(vehicle).map(|w| w.max(rotors.min_rad_s).min(rotors.max_rad_s)))
             }
-            Start::Idle => frame.repeat(rotors.min_rad_s),
+            RotorStart::Idle => frame.repeat(rotors.min_rad_s),
         };
         let (efficiency, efficiency_until_s) = rotors.efficiency(frame, 0.0);
-        Ok(Spin {
+        Ok(SimulatedRotors {
             // Commands are `f32`, so the commands before the first one are rounded to `f32` too.
             commands: DelayLine::new(whole_steps(rotors.delay_s, step_s), start_rad_s.map(|w| f64::from(w as f32))),
             // At tau = 0 this is exp(-infinity) = 0: no lag.
@@ -176,7 +176,7 @@ impl Spin {
             efficiency,
             efficiency_until_s,
             driven: driven(&efficiency),
-            battery: rotors.battery.map(|battery| Discharge::new(battery, step_s)),
+            battery: rotors.battery.map(|battery| SimulatedBattery::new(battery, step_s)),
             rotors,
         })
     }
@@ -186,7 +186,13 @@ impl Spin {
     /// The lag is discretised exactly. The load over the step is that of the speeds at its middle, which is accurate to
     /// second order. A command of NaN counts as the smallest speed.
     #[inline]
-    pub(crate) fn advance(&mut self, frame: &Frame, command_rad_s: &Lanes, t: f64, drag_factor_n_m_s2: f64) -> Drive {
+    pub(crate) fn advance(
+        &mut self,
+        frame: &RotorLayout,
+        command_rad_s: &PerRotor,
+        t: f64,
+        drag_factor_n_m_s2: f64,
+    ) -> RotorSpeedStep {
         if t >= self.efficiency_until_s {
             (self.efficiency, self.efficiency_until_s) = self.rotors.efficiency(frame, t);
             self.driven = driven(&self.efficiency);
@@ -218,8 +224,8 @@ impl Spin {
 
     /// Advances the speeds of the first `N` rotors toward `target` of their commands. There are no other rotors.
     #[inline]
-    fn follow<const N: usize>(&mut self, command: &Lanes, target: impl Fn(f64) -> f64) -> Drive {
-        let mut drive = Drive { speeds_rad_s: Lanes::zeros(), squares: Lanes::zeros() };
+    fn follow<const N: usize>(&mut self, command: &PerRotor, target: impl Fn(f64) -> f64) -> RotorSpeedStep {
+        let mut drive = RotorSpeedStep { speeds_rad_s: PerRotor::zeros(), squares: PerRotor::zeros() };
         let driven_commands = command.as_slice().iter().zip(self.driven.as_slice());
         let speeds = self.speeds_rad_s.as_mut_slice().iter_mut().zip(self.efficiency.as_slice());
         let driven = drive.speeds_rad_s.as_mut_slice().iter_mut().zip(drive.squares.as_mut_slice());
@@ -234,7 +240,7 @@ impl Spin {
     }
 
     /// Returns the squares of the present speeds times each rotor's efficiency \[rad2/s2\].
-    pub(crate) fn squares(&self) -> Lanes {
+    pub(crate) fn squares(&self) -> PerRotor {
         self.speeds_rad_s.component_mul(&self.speeds_rad_s).component_mul(&self.efficiency)
     }
 
@@ -242,7 +248,7 @@ impl Spin {
     ///
     /// # Errors
     /// Returns the first number that is out of range, and changes nothing then.
-    pub(crate) fn set_faults(&mut self, frame: &Frame, faults: Vec<RotorFault>) -> Result<(), OutOfRange> {
+    pub(crate) fn set_faults(&mut self, frame: &RotorLayout, faults: Vec<RotorFault>) -> Result<(), OutOfRange> {
         check(&faults, frame)?;
         self.rotors.faults = faults;
         // Makes the next step evaluate the faults again, at any time.
@@ -258,7 +264,7 @@ impl Spin {
         self.battery.as_mut().map_or(Ok(false), |battery| battery.charge(share).map(|()| true))
     }
 
-    pub(crate) fn charge(&self) -> Option<Charge> {
+    pub(crate) fn charge(&self) -> Option<BatteryState> {
         self.battery.as_ref().map(|battery| battery.now)
     }
 }

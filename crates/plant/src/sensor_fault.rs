@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 /// Kind of error of a measured coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub enum Misreading {
+pub enum SensorFaultKind {
     /// Coordinate and rate are multiplied; a factor below 0 reverses the sign.
     Factor(f64),
     /// The coordinate is too large by this much \[m\] or \[rad\]; its rate is right.
@@ -24,7 +24,7 @@ pub struct SensorFault {
     /// `None` for the whole state.
     pub axis: Option<Axis>,
     /// Kind of error.
-    pub misreading: Misreading,
+    pub misreading: SensorFaultKind,
     /// Onset \[s\].
     pub start_s: f64,
     /// End \[s\], infinite for a permanent fault.
@@ -68,17 +68,17 @@ impl SensorFaults {
     }
 }
 
-impl Misreading {
+impl SensorFaultKind {
     /// Changes one coordinate of `seen` and its rate; `held` is the motion at the onset.
     fn apply(self, axis: Axis, seen: &mut Motion, held: &Motion) {
         let [coordinate, rate] = coordinates(seen, axis);
         match self {
-            Misreading::Factor(factor) => {
+            SensorFaultKind::Factor(factor) => {
                 *coordinate *= factor;
                 *rate *= factor;
             }
-            Misreading::Offset(offset) => *coordinate += offset,
-            Misreading::Frozen => [*coordinate, *rate] = coordinates(&mut { *held }, axis).map(|number| *number),
+            SensorFaultKind::Offset(offset) => *coordinate += offset,
+            SensorFaultKind::Frozen => [*coordinate, *rate] = coordinates(&mut { *held }, axis).map(|number| *number),
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Measurement of the true motion for a controller.
 
 use crate::delay::{DelayLine, whole_steps};
-use crate::dropouts::{Dropouts, Outage};
+use crate::dropouts::{MeasurementDropouts, SimulatedDropouts};
 use crate::motion::Motion;
-use crate::noise::{Noise, Stream};
+use crate::noise::{Noise, NoiseStream};
 use afbc_types::{Declared, OutOfRange, State, parameters};
 use nalgebra::Vector3;
 
@@ -68,7 +68,7 @@ parameters! {
         #[switch(GYRO)]
         pub gyro: bool = false,
         /// Dropouts of measurements.
-        pub dropouts: Option<Dropouts> = None,
+        pub dropouts: Option<MeasurementDropouts> = None,
     }
     together(sensing) {
         sensing.dropouts.map_or(Ok(()), |dropouts| dropouts.validate())
@@ -100,7 +100,7 @@ pub struct StateSensor {
     period: usize,
     until: usize,
     gyro: bool,
-    outage: Option<Outage>,
+    outage: Option<SimulatedDropouts>,
     step_s: f64,
     /// Last state that arrived, if any.
     last: Option<State>,
@@ -116,7 +116,7 @@ impl StateSensor {
     pub fn new(sensing: &Sensing, seed: u64, step_s: f64) -> Result<Self, OutOfRange> {
         sensing.validate()?;
         crate::realism::STEP.check(step_s)?;
-        let mut random = Noise::new(seed, Stream::Sensors);
+        let mut random = Noise::new(seed, NoiseStream::Sensors);
         let steps = whole_steps(sensing.delay_s, step_s);
         let period = whole_steps(sensing.period_s, step_s).max(1);
         Ok(StateSensor {
@@ -133,7 +133,7 @@ impl StateSensor {
             outage: sensing
                 .dropouts
                 .as_ref()
-                .map(|dropouts| Outage::new(dropouts, Noise::new(seed, Stream::Dropouts), step_s)),
+                .map(|dropouts| SimulatedDropouts::new(dropouts, Noise::new(seed, NoiseStream::Dropouts), step_s)),
             step_s,
             last: None,
             since: 0,
@@ -162,7 +162,7 @@ impl StateSensor {
         let sampled = self.until == 0 || first;
         self.until = if self.until == 0 { self.period } else { self.until } - 1;
         let mut newest = self.last.unwrap_or(state);
-        let fresh = first || !self.outage.as_mut().is_some_and(Outage::advance);
+        let fresh = first || !self.outage.as_mut().is_some_and(SimulatedDropouts::advance);
         if fresh && sampled {
             newest = arriving;
             self.since = 0;

@@ -3,16 +3,16 @@
 use crate::body_axes::BodyAxes;
 use crate::load::Load;
 use crate::motion::Motion;
-use crate::surroundings::Surroundings;
+use crate::surroundings::AirAndGround;
 use libm::{cos, sin};
 use nalgebra::{SVector, Vector3};
 
 /// State vector: \[x, y, z, their rates, phi, theta, psi, their rates\].
-pub type Vector = SVector<f64, 12>;
+pub type SimplifiedVector = SVector<f64, 12>;
 
 /// Converts `motion` to the state vector.
-pub fn vector(motion: &Motion) -> Vector {
-    let mut x = Vector::zeros();
+pub fn vector(motion: &Motion) -> SimplifiedVector {
+    let mut x = SimplifiedVector::zeros();
     x.fixed_rows_mut::<3>(0).copy_from(&motion.position_m);
     x.fixed_rows_mut::<3>(3).copy_from(&motion.velocity_m_s);
     x.fixed_rows_mut::<3>(6).copy_from(&motion.attitude_rad);
@@ -21,7 +21,7 @@ pub fn vector(motion: &Motion) -> Vector {
 }
 
 /// Converts a state vector to the motion.
-pub fn motion(x: &Vector) -> Motion {
+pub fn motion(x: &SimplifiedVector) -> Motion {
     Motion {
         position_m: x.fixed_rows::<3>(0).into(),
         velocity_m_s: x.fixed_rows::<3>(3).into(),
@@ -32,9 +32,9 @@ pub fn motion(x: &Vector) -> Motion {
 
 /// Returns f(X) of (6) with a constant load.
 #[inline]
-pub fn derivative(x: &Vector, load: &Load) -> Vector {
+pub fn derivative(x: &SimplifiedVector, load: &Load) -> SimplifiedVector {
     let Motion { velocity_m_s, rates_rad_s: eta_dot, .. } = motion(x);
-    let mut x_dot = Vector::zeros();
+    let mut x_dot = SimplifiedVector::zeros();
     x_dot.fixed_rows_mut::<3>(0).copy_from(&velocity_m_s);
     x_dot.fixed_rows_mut::<3>(3).copy_from(&load.acceleration(&body_axes(x).up));
     x_dot.fixed_rows_mut::<3>(6).copy_from(&eta_dot);
@@ -66,7 +66,7 @@ pub(crate) fn body_rates(
 
 /// Returns the body axes: the columns of Rz(psi) Ry(theta) Rx(phi).
 #[inline]
-pub(crate) fn body_axes(x: &Vector) -> BodyAxes {
+pub(crate) fn body_axes(x: &SimplifiedVector) -> BodyAxes {
     let (s_phi, c_phi) = (sin(x[6]), cos(x[6]));
     let (s_theta, c_theta) = (sin(x[7]), cos(x[7]));
     let (s_psi, c_psi) = (sin(x[8]), cos(x[8]));
@@ -87,14 +87,14 @@ pub(crate) fn body_axes(x: &Vector) -> BodyAxes {
 
 /// Returns [`derivative`] with the forces that depend on position and velocity. d eta/dt replaces Omega here, too.
 #[inline]
-pub(crate) fn derivative_in(x: &Vector, load: &Load, surroundings: &Surroundings) -> Vector {
+pub(crate) fn derivative_in(x: &SimplifiedVector, load: &Load, surroundings: &AirAndGround) -> SimplifiedVector {
     let (velocity, rates) = (Vector3::new(x[3], x[4], x[5]), Vector3::new(x[9], x[10], x[11]));
     let axes = body_axes(x);
     let (a, angular) = surroundings.accelerations(x[2], &velocity, &axes, &rates);
     // As in `derivative`, with the known direction of the thrust.
     let a = a + load.acceleration(&axes.up);
     let angular = angular + load.angular_acceleration(&rates);
-    Vector::from([
+    SimplifiedVector::from([
         velocity.x, velocity.y, velocity.z, a.x, a.y, a.z, rates.x, rates.y, rates.z, angular.x, angular.y, angular.z,
     ])
 }

@@ -1,29 +1,29 @@
 //! Forces of air and ground, which depend on position and velocity within a step.
 
 use crate::body_axes::BodyAxes;
-use crate::contact::Ground;
+use crate::contact::SimulatedGround;
 use crate::drag::HeldDrag;
 use crate::ratios::Ratios;
 use nalgebra::Vector3;
 
 /// Air and ground over one step: the wind is constant, drag and contact follow the motion.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Surroundings<'a> {
+pub(crate) struct AirAndGround<'a> {
     drag: Option<&'a HeldDrag>,
     /// Velocity of the air, earth frame \[m/s\].
     wind_m_s: Vector3<f64>,
-    ground: Option<&'a Ground>,
+    ground: Option<&'a SimulatedGround>,
     ratios: &'a Ratios,
 }
 
-impl<'a> Surroundings<'a> {
+impl<'a> AirAndGround<'a> {
     pub(crate) fn new(
         ratios: &'a Ratios,
         drag: Option<&'a HeldDrag>,
         wind_m_s: Vector3<f64>,
-        ground: Option<&'a Ground>,
+        ground: Option<&'a SimulatedGround>,
     ) -> Self {
-        Surroundings { drag, wind_m_s, ground, ratios }
+        AirAndGround { drag, wind_m_s, ground, ratios }
     }
 
     /// Returns true if there are no such forces.

@@ -1,7 +1,7 @@
 //! Input of the instruments: the vehicle's true motion.
 
 use crate::body_axes::BodyAxes;
-use crate::frame::Lanes;
+use crate::frame::PerRotor;
 use nalgebra::{Quaternion, Vector3};
 
 /// True motion of the vehicle at one time, with accelerations and rotor speeds. [`Plant::truth`](crate::Plant::truth)
@@ -28,7 +28,7 @@ pub struct Truth {
     /// Gravity \[m/s2\].
     pub gravity_m_s2: f64,
     /// Rotor speeds \[rad/s\]; 0 for rotors that the vehicle does not have.
-    pub rotor_speeds_rad_s: Lanes,
+    pub rotor_speeds_rad_s: PerRotor,
     /// Hover speed of the fastest rotor of the nominal vehicle \[rad/s\].
     pub hover_rad_s: f64,
     /// Thrust of all rotors divided by the nominal vehicle's weight.

@@ -2,13 +2,13 @@
 
 use crate::body_axes::BodyAxes;
 use crate::environment::{Environment, Segment};
-use crate::frame::Lanes;
+use crate::frame::PerRotor;
 use crate::integrate::rk4;
 use crate::load::Load;
 use crate::motion::Motion;
-use crate::realism::{Effects, EffectsState, Realism};
+use crate::realism::{EffectsState, Realism, SimulatedEffects};
 use crate::rotors::RotorFault;
-use crate::surroundings::Surroundings;
+use crate::surroundings::AirAndGround;
 use crate::truth::Truth;
 use crate::wind::Wind;
 use crate::{rigid_body, simplified};
@@ -39,16 +39,16 @@ impl PlantModel {
 
 /// State vector of the chosen model.
 #[derive(Clone, Debug)]
-enum Body {
-    Simplified(simplified::Vector),
-    RigidBody(rigid_body::Vector),
+enum ModelVector {
+    Simplified(simplified::SimplifiedVector),
+    RigidBody(rigid_body::RigidBodyVector),
 }
 
-impl Body {
+impl ModelVector {
     fn new(model: PlantModel, initial: &Motion) -> Self {
         match model {
-            PlantModel::Simplified => Body::Simplified(simplified::vector(initial)),
-            PlantModel::RigidBody => Body::RigidBody(rigid_body::vector(initial)),
+            PlantModel::Simplified => ModelVector::Simplified(simplified::vector(initial)),
+            PlantModel::RigidBody => ModelVector::RigidBody(rigid_body::vector(initial)),
         }
     }
 
@@ -56,8 +56,8 @@ impl Body {
     #[inline]
     fn advance(&mut self, load: &Load, dt_s: f64) {
         match self {
-            Body::Simplified(x) => *x = rk4(|x| simplified::derivative(x, load), x, dt_s),
-            Body::RigidBody(x) => {
+            ModelVector::Simplified(x) => *x = rk4(|x| simplified::derivative(x, load), x, dt_s),
+            ModelVector::RigidBody(x) => {
                 *x = rk4(|x| rigid_body::derivative(x, load), x, dt_s);
                 rigid_body::normalise(x);
             }
@@ -66,10 +66,10 @@ impl Body {
 
     /// Advances by `dt_s` with a constant load and forces that depend on position and velocity.
     #[inline]
-    fn advance_in(&mut self, load: &Load, surroundings: &Surroundings, dt_s: f64) {
+    fn advance_in(&mut self, load: &Load, surroundings: &AirAndGround, dt_s: f64) {
         match self {
-            Body::Simplified(x) => *x = rk4(|x| simplified::derivative_in(x, load, surroundings), x, dt_s),
-            Body::RigidBody(x) => {
+            ModelVector::Simplified(x) => *x = rk4(|x| simplified::derivative_in(x, load, surroundings), x, dt_s),
+            ModelVector::RigidBody(x) => {
                 *x = rk4(|x| rigid_body::derivative_in(x, load, surroundings), x, dt_s);
                 rigid_body::normalise(x);
             }
@@ -77,12 +77,12 @@ impl Body {
     }
 
     /// Returns d^2 xi/dt^2, earth frame \[m/s2\], and the derivative of the model's rates \[rad/s2\].
-    fn accelerations(&self, load: &Load, surroundings: Option<&Surroundings>) -> (Vector3<f64>, Vector3<f64>) {
+    fn accelerations(&self, load: &Load, surroundings: Option<&AirAndGround>) -> (Vector3<f64>, Vector3<f64>) {
         match (self, surroundings) {
-            (Body::Simplified(x), None) => halves(&simplified::derivative(x, load), 9),
-            (Body::Simplified(x), Some(s)) => halves(&simplified::derivative_in(x, load, s), 9),
-            (Body::RigidBody(x), None) => halves(&rigid_body::derivative(x, load), 10),
-            (Body::RigidBody(x), Some(s)) => halves(&rigid_body::derivative_in(x, load, s), 10),
+            (ModelVector::Simplified(x), None) => halves(&simplified::derivative(x, load), 9),
+            (ModelVector::Simplified(x), Some(s)) => halves(&simplified::derivative_in(x, load, s), 9),
+            (ModelVector::RigidBody(x), None) => halves(&rigid_body::derivative(x, load), 10),
+            (ModelVector::RigidBody(x), Some(s)) => halves(&rigid_body::derivative_in(x, load, s), 10),
         }
     }
 
@@ -90,15 +90,15 @@ impl Body {
     #[inline]
     fn place(&self) -> (Vector3<f64>, Vector3<f64>) {
         match self {
-            Body::Simplified(x) => (x.fixed_rows::<3>(0).into(), x.fixed_rows::<3>(3).into()),
-            Body::RigidBody(x) => (x.fixed_rows::<3>(0).into(), x.fixed_rows::<3>(3).into()),
+            ModelVector::Simplified(x) => (x.fixed_rows::<3>(0).into(), x.fixed_rows::<3>(3).into()),
+            ModelVector::RigidBody(x) => (x.fixed_rows::<3>(0).into(), x.fixed_rows::<3>(3).into()),
         }
     }
 
     fn axes(&self) -> BodyAxes {
         match self {
-            Body::Simplified(x) => simplified::body_axes(x),
-            Body::RigidBody(x) => rigid_body::body_axes(x),
+            ModelVector::Simplified(x) => simplified::body_axes(x),
+            ModelVector::RigidBody(x) => rigid_body::body_axes(x),
         }
     }
 }
@@ -111,15 +111,15 @@ fn halves<const N: usize>(derivative: &SVector<f64, N>, rates: usize) -> (Vector
 /// One vehicle in one environment.
 #[derive(Clone, Debug)]
 pub struct Plant {
-    body: Body,
+    body: ModelVector,
     environment: Environment,
     segment: Segment,
     /// Boxed, so that the ideal plant stays small.
-    effects: Option<Box<Effects>>,
+    effects: Option<Box<SimulatedEffects>>,
     /// Load of the last step; before the first step, that of the initial rotor speeds.
     load: Load,
     /// Rotor speeds of the last step of an ideal plant, initially hover speeds.
-    speeds_rad_s: Lanes,
+    speeds_rad_s: PerRotor,
     /// Hover speed of the fastest rotor of the nominal vehicle \[rad/s\].
     hover_rad_s: f64,
     steps: u64,
@@ -129,7 +129,7 @@ pub struct Plant {
 impl Plant {
     /// Creates a vehicle with the motion `initial` at t = 0, ideal rotors, and only the environment's forces.
     pub fn new(model: PlantModel, initial: Motion, environment: Environment) -> Self {
-        let body = Body::new(model, &initial);
+        let body = ModelVector::new(model, &initial);
         let segment = environment.segment(0.0);
         let speeds_rad_s = environment.frame().hover_rad_s(environment.nominal());
         let hover_rad_s = speeds_rad_s.max();
@@ -148,7 +148,7 @@ impl Plant {
         realism: &Realism,
         step_s: f64,
     ) -> Result<Self, OutOfRange> {
-        let effects = Effects::new(realism, &environment, step_s)?;
+        let effects = SimulatedEffects::new(realism, &environment, step_s)?;
         let ideal = Plant::new(model, initial, environment);
         Ok(Plant { load: effects.start(&ideal.segment), effects: Some(Box::new(effects)), ..ideal })
     }
@@ -176,7 +176,7 @@ impl Plant {
     /// Advances with all effects of [`Realism`].
     // Not inlined, so that the ideal plant's step stays short.
     #[inline(never)]
-    fn advance_in_effect(&mut self, speeds: &Lanes, dt_s: f64) {
+    fn advance_in_effect(&mut self, speeds: &PerRotor, dt_s: f64) {
         let Some(effects) = &mut self.effects else { return };
         let (position, velocity) = self.body.place();
         let body = &self.body;
@@ -194,10 +194,10 @@ impl Plant {
     /// Sets the motion of the vehicle, as when a hand holds it.
     pub fn set_motion(&mut self, motion: &Motion) {
         let model = match &self.body {
-            Body::Simplified(_) => PlantModel::Simplified,
-            Body::RigidBody(_) => PlantModel::RigidBody,
+            ModelVector::Simplified(_) => PlantModel::Simplified,
+            ModelVector::RigidBody(_) => PlantModel::RigidBody,
         };
-        self.body = Body::new(model, motion);
+        self.body = ModelVector::new(model, motion);
     }
 
     /// Returns the input of the instruments: the present motion with its accelerations by the forces of the last step.
@@ -208,8 +208,8 @@ impl Plant {
             self.effects.as_ref().map(|effects| effects.surroundings(ratios, position_m.z, velocity_m_s.z));
         let (acceleration_m_s2, angular) = self.body.accelerations(&self.load, surroundings.as_ref());
         let (attitude, rates_rad_s, angular_acceleration_rad_s2) = match &self.body {
-            Body::RigidBody(x) => ([x[6], x[7], x[8], x[9]], Vector3::new(x[10], x[11], x[12]), angular),
-            Body::Simplified(x) => {
+            ModelVector::RigidBody(x) => ([x[6], x[7], x[8], x[9]], Vector3::new(x[10], x[11], x[12]), angular),
+            ModelVector::Simplified(x) => {
                 let Motion { attitude_rad, rates_rad_s, .. } = simplified::motion(x);
                 let (rates, angular) = simplified::body_rates(&attitude_rad, &rates_rad_s, &angular);
                 (rigid_body::quaternion(&attitude_rad), rates, angular)
@@ -235,8 +235,8 @@ impl Plant {
     #[inline]
     pub fn motion(&self) -> Motion {
         match &self.body {
-            Body::Simplified(x) => simplified::motion(x),
-            Body::RigidBody(x) => rigid_body::motion(x),
+            ModelVector::Simplified(x) => simplified::motion(x),
+            ModelVector::RigidBody(x) => rigid_body::motion(x),
         }
     }
 

@@ -1,7 +1,7 @@
 //! Wind: steady wind, discrete gusts, turbulence.
 
-use crate::noise::{Noise, Stream};
-use crate::turbulence::{Eddies, Turbulence};
+use crate::noise::{Noise, NoiseStream};
+use crate::turbulence::{SimulatedTurbulence, Turbulence};
 use afbc_types::{Declared, OutOfRange, parameters};
 use alloc::vec::Vec;
 use core::f64::consts::PI;
@@ -84,16 +84,16 @@ impl CosineGust {
 
 /// Wind in simulation.
 #[derive(Clone, Debug)]
-pub(crate) struct Weather {
+pub(crate) struct SimulatedWind {
     wind: Wind,
     /// Cosine and sine of the steady wind's direction.
     heading: (f64, f64),
-    eddies: Option<Eddies>,
+    eddies: Option<SimulatedTurbulence>,
     seed: u64,
     step_s: f64,
 }
 
-impl Weather {
+impl SimulatedWind {
     /// # Errors
     /// Returns the first parameter that is out of range.
     pub(crate) fn new(wind: Wind, seed: u64, step_s: f64) -> Result<Self, OutOfRange> {
@@ -101,8 +101,10 @@ impl Weather {
         let (x, y) = (wind.steady_m_s.x, wind.steady_m_s.y);
         let speed = sqrt(x * x + y * y);
         let heading = if speed > 0.0 { (x / speed, y / speed) } else { (1.0, 0.0) };
-        let eddies = wind.turbulence.map(|turbulence| Eddies::new(turbulence, Noise::new(seed, Stream::Wind), step_s));
-        Ok(Weather { wind, heading, eddies, seed, step_s })
+        let eddies = wind
+            .turbulence
+            .map(|turbulence| SimulatedTurbulence::new(turbulence, Noise::new(seed, NoiseStream::Wind), step_s));
+        Ok(SimulatedWind { wind, heading, eddies, seed, step_s })
     }
 
     /// Changes the wind. Turbulence with unchanged settings continues; otherwise it starts anew.
@@ -110,7 +112,7 @@ impl Weather {
     /// # Errors
     /// Returns the first parameter that is out of range, and changes nothing then.
     pub(crate) fn change(&mut self, wind: &Wind) -> Result<(), OutOfRange> {
-        let mut changed = Weather::new(wind.clone(), self.seed, self.step_s)?;
+        let mut changed = SimulatedWind::new(wind.clone(), self.seed, self.step_s)?;
         if wind.turbulence == self.wind.turbulence {
             changed.eddies = self.eddies.take();
         }

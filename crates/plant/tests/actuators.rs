@@ -1,6 +1,8 @@
 //! Compares rotors with closed-form solutions, and checks the battery's energy balance.
 
-use afbc_plant::{Battery, Charge, Environment, Motion, Plant, PlantModel, Realism, RotorFault, Rotors, Sag, Start};
+use afbc_plant::{
+    BatteryModel, BatteryState, Environment, Motion, Plant, PlantModel, Realism, RotorFault, RotorStart, Rotors, Sag,
+};
 use afbc_types::{Parameters, RotorSpeeds};
 use nalgebra::{Vector3, Vector4};
 
@@ -39,7 +41,7 @@ fn refused(rotors: Rotors) -> &'static str {
 #[test]
 fn a_step_of_the_command_is_answered_by_an_exponential() {
     let tau = 0.02;
-    let mut plant = plant(Rotors { time_constant_s: tau, start: Start::Idle, ..Rotors::default() });
+    let mut plant = plant(Rotors { time_constant_s: tau, start: RotorStart::Idle, ..Rotors::default() });
     for k in 1..=200 {
         plant.step(&command(250.0), STEP_S);
         let expected = 250.0 * (1.0 - (-f64::from(k) * STEP_S / tau).exp());
@@ -56,7 +58,7 @@ fn lagging_thrust_is_right_to_second_order() {
     let expected = 4.0 * P.thrust_factor_n_s2 * square / P.mass_kg - P.gravity_m_s2 * t;
     let error = |steps: u32| {
         let step_s = t / f64::from(steps);
-        let mut plant = plant_at(Rotors { time_constant_s: tau, start: Start::Idle, ..Rotors::default() }, step_s);
+        let mut plant = plant_at(Rotors { time_constant_s: tau, start: RotorStart::Idle, ..Rotors::default() }, step_s);
         (0..steps).for_each(|_| plant.step(&command(w), step_s));
         plant.motion().velocity_m_s.z - expected
     };
@@ -147,14 +149,14 @@ fn a_dead_rotor_slows_down() {
     assert!((speeds(&plant).y - 200.0).abs() < 1e-3);
 }
 
-fn battery_of(plant: &Plant) -> Charge {
+fn battery_of(plant: &Plant) -> BatteryState {
     plant.telemetry().unwrap().battery.unwrap()
 }
 
 /// All energy from the cells drives rotors and avionics or heats the battery.
 #[test]
 fn battery_energy_is_accounted_for() {
-    let battery = Battery { capacity_a_h: 0.01, ..Battery::THREE_CELLS };
+    let battery = BatteryModel { capacity_a_h: 0.01, ..BatteryModel::THREE_CELLS };
     let mut plant = plant(Rotors { battery: Some(battery), ..Rotors::default() });
     let (mut cells_j, mut heat_j, mut used_j, mut drawn_a_s) = (0.0, 0.0, 0.0, 0.0);
     for k in 0..5000_u32 {
@@ -179,7 +181,7 @@ fn battery_energy_is_accounted_for() {
 #[test]
 fn a_sagging_battery_lowers_the_ceiling_or_every_speed() {
     let sagging = |effect| {
-        let battery = Battery { initial_charge: 0.5, resistance_ohm: 0.0, effect, ..Battery::THREE_CELLS };
+        let battery = BatteryModel { initial_charge: 0.5, resistance_ohm: 0.0, effect, ..BatteryModel::THREE_CELLS };
         let mut plant = plant(Rotors { max_rad_s: 300.0, battery: Some(battery), ..Rotors::default() });
         let share = battery_of(&plant).voltage_v / battery.full_v;
         assert!((share - (0.5 * (9.9 + 12.6)) / 12.6).abs() < 1e-12);
@@ -196,20 +198,20 @@ fn a_sagging_battery_lowers_the_ceiling_or_every_speed() {
 
 #[test]
 fn more_than_a_battery_can_give_is_not_given() {
-    let battery = Battery { resistance_ohm: 1.0, avionics_w: 1000.0, ..Battery::THREE_CELLS };
+    let battery = BatteryModel { resistance_ohm: 1.0, avionics_w: 1000.0, ..BatteryModel::THREE_CELLS };
     let mut plant = plant(Rotors { battery: Some(battery), ..Rotors::default() });
     plant.step(&command(200.0), STEP_S);
     // A matched load: half of the voltage.
-    let Charge { voltage_v, current_a, .. } = battery_of(&plant);
+    let BatteryState { voltage_v, current_a, .. } = battery_of(&plant);
     assert!((voltage_v - 6.3).abs() < 1e-9 && (current_a - 6.3).abs() < 1e-9);
 }
 
 #[test]
 fn an_empty_battery_stops_the_rotors() {
-    let battery = Battery { capacity_a_h: 0.001, ..Battery::THREE_CELLS };
+    let battery = BatteryModel { capacity_a_h: 0.001, ..BatteryModel::THREE_CELLS };
     let mut plant = plant(Rotors { battery: Some(battery), time_constant_s: 0.02, ..Rotors::default() });
     (0..3000).for_each(|_| plant.step(&command(200.0), STEP_S));
-    assert_eq!(battery_of(&plant), Charge { voltage_v: 0.0, current_a: 0.0, charge: 0.0 });
+    assert_eq!(battery_of(&plant), BatteryState { voltage_v: 0.0, current_a: 0.0, charge: 0.0 });
     assert!(speeds(&plant).amax() < 1e-6);
 }
 
@@ -226,7 +228,7 @@ fn settings_out_of_range_are_refused_by_name() {
     assert_eq!(refused(Rotors { faults: fault(1, 1.5, 0.0), ..ok() }), "efficiency");
     assert_eq!(refused(Rotors { faults: fault(1, 0.5, f64::NAN), ..ok() }), "start_s");
     let battery = |battery| refused(Rotors { battery: Some(battery), ..ok() });
-    assert_eq!(battery(Battery { empty_v: 13.0, ..Battery::THREE_CELLS }), "empty_v");
-    assert_eq!(battery(Battery { resistance_ohm: -1.0, ..Battery::THREE_CELLS }), "resistance_ohm");
-    assert_eq!(battery(Battery { capacity_a_h: 0.0, ..Battery::THREE_CELLS }), "capacity_a_h");
+    assert_eq!(battery(BatteryModel { empty_v: 13.0, ..BatteryModel::THREE_CELLS }), "empty_v");
+    assert_eq!(battery(BatteryModel { resistance_ohm: -1.0, ..BatteryModel::THREE_CELLS }), "resistance_ohm");
+    assert_eq!(battery(BatteryModel { capacity_a_h: 0.0, ..BatteryModel::THREE_CELLS }), "capacity_a_h");
 }

@@ -148,7 +148,7 @@ proptest! {
     fn the_quaternion_stays_on_the_unit_sphere(start in motion()) {
         let v = rigid_body::vector(&start);
         let load = Load::new(&Parameters::PAPER, [0.0; 4], Vector3::zeros(), Vector3::zeros());
-        let f = |v: &rigid_body::Vector| rigid_body::derivative(v, &load);
+        let f = |v: &rigid_body::RigidBodyVector| rigid_body::derivative(v, &load);
         let (q, q_dot) = (v.fixed_rows::<4>(6), f(&v).fixed_rows::<4>(6).into_owned());
         prop_assert!(q.dot(&q_dot).abs() <= 1e-14 * (1.0 + q_dot.norm()));
         prop_assert!((q_dot.norm() - 0.5 * start.rates_rad_s.norm()).abs() <= 1e-14 * (1.0 + q_dot.norm()));

@@ -1,7 +1,8 @@
 //! Ground contact: standing, landing, sliding; and ground effect.
 
 use afbc_plant::{
-    Contact, Environment, GroundEffect, Motion, ParameterChange, Payload, Plant, PlantModel, PlantParameter, Realism,
+    Contact, Environment, GroundEffect, Motion, Payload, Plant, PlantModel, PlantParameter, PlantParameterChange,
+    Realism,
 };
 use afbc_types::{Parameters, RotorSpeeds};
 use nalgebra::{Rotation3, Vector3, Vector4};
@@ -260,7 +261,7 @@ fn a_wrong_sign_turns_one_moment_round() {
     let moments = [PlantParameter::RollMoment, PlantParameter::PitchMoment, PlantParameter::YawMoment];
     for (index, quantity) in moments.into_iter().enumerate() {
         for factor in [-1.0, 0.5, 2.0] {
-            let change = ParameterChange { quantity, factor, start_s: 0.0, end_s: f64::INFINITY };
+            let change = PlantParameterChange { quantity, factor, start_s: 0.0, end_s: f64::INFINITY };
             let (_, changed) = first_step(Environment::new(P, vec![change], Vec::new()).unwrap(), speeds);
             let mut expected: Vector3<f64> = intact;
             expected[index] *= factor;

@@ -1,6 +1,6 @@
 //! Gusts and parameter changes: size, exact onset and exact end.
 
-use afbc_plant::{Environment, Gust, GustKind, Motion, ParameterChange, Plant, PlantModel, PlantParameter};
+use afbc_plant::{Environment, Gust, GustKind, Motion, Plant, PlantModel, PlantParameter, PlantParameterChange};
 use afbc_types::{Axis, Parameters, RotorSpeeds};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
@@ -11,8 +11,8 @@ fn gust(axis: Axis, kind: GustKind, size: f64, start_s: f64, end_s: f64) -> Gust
     Gust { axis, kind, size, start_s, end_s }
 }
 
-fn change(quantity: PlantParameter, factor: f64, start_s: f64, end_s: f64) -> ParameterChange {
-    ParameterChange { quantity, factor, start_s, end_s }
+fn change(quantity: PlantParameter, factor: f64, start_s: f64, end_s: f64) -> PlantParameterChange {
+    PlantParameterChange { quantity, factor, start_s, end_s }
 }
 
 /// Returns velocities and rates of a level vehicle, before the first step and after each step.
@@ -194,7 +194,7 @@ fn a_parameter_change_acts_while_it_lasts() {
 #[test]
 fn a_change_that_leaves_the_range_is_refused_by_name() {
     let refused =
-        |changes: Vec<ParameterChange>| Environment::new(P, changes, vec![]).map(|_| ()).map_err(|e| e.range.name);
+        |changes: Vec<PlantParameterChange>| Environment::new(P, changes, vec![]).map(|_| ()).map_err(|e| e.range.name);
     assert_eq!(refused(vec![change(PlantParameter::Mass, 2.0, 1.0, 2.0)]), Ok(()));
     for factor in [0.0, -1.0, 1e9, f64::NAN, f64::INFINITY] {
         assert_eq!(refused(vec![change(PlantParameter::Mass, factor, 1.0, 2.0)]), Err("mass_kg"), "factor {factor}");

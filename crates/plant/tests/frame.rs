@@ -1,7 +1,7 @@
 //! Compares forces and moments of any frame with the sum of r x F, and a vehicle with the same vehicle turned about its
 //! z axis.
 
-use afbc_plant::{Drag, Environment, Frame, Motion, Plant, PlantModel, Realism, RotorFault, Rotors};
+use afbc_plant::{Drag, Environment, Motion, Plant, PlantModel, Realism, RotorFault, RotorLayout, Rotors};
 use afbc_types::{Parameters, Rotor, RotorSpeeds};
 use nalgebra::{SVector, Vector3};
 use proptest::prelude::*;
@@ -19,7 +19,7 @@ fn speeds(values: &[f64]) -> RotorSpeeds<8> {
 }
 
 fn plant(rotors: &[Rotor<f64>], initial: Motion, realism: Option<&Realism>) -> Plant {
-    let environment = Environment::calm(P).unwrap().with_frame(Frame::new(rotors).unwrap());
+    let environment = Environment::calm(P).unwrap().with_frame(RotorLayout::new(rotors).unwrap());
     match realism {
         None => Plant::new(PlantModel::RigidBody, initial, environment),
         Some(realism) => Plant::with_realism(PlantModel::RigidBody, initial, environment, realism, STEP_S).unwrap(),
@@ -88,7 +88,7 @@ proptest! {
 
 #[test]
 fn rotors_that_are_not_there_do_nothing() {
-    let four = Frame::default();
+    let four = RotorLayout::default();
     assert_eq!(four.count(), 4);
     let mut plant = plant(&afbc_types::PLUS.map(|rotor| rotor.to_f64()), Motion::default(), None);
     let mut alike = Plant::new(PlantModel::RigidBody, Motion::default(), Environment::calm(P).unwrap());
@@ -100,7 +100,7 @@ fn rotors_that_are_not_there_do_nothing() {
 #[test]
 fn too_few_too_many_and_too_far_are_refused() {
     let rotor = Rotor { x: 1.0, y: 0.0, pushes_left: true };
-    let refused = |rotors: &[Rotor<f64>]| Frame::new(rotors).unwrap_err().range.name;
+    let refused = |rotors: &[Rotor<f64>]| RotorLayout::new(rotors).unwrap_err().range.name;
     assert_eq!((refused(&[rotor; 3]), refused(&[rotor; 9])), ("rotors", "rotors"));
     assert_eq!(refused(&[rotor, rotor, rotor, Rotor { x: f64::NAN, ..rotor }]), "rotor_position");
     assert_eq!(refused(&[rotor, rotor, rotor, Rotor { y: 11.0, ..rotor }]), "rotor_position");
@@ -108,7 +108,7 @@ fn too_few_too_many_and_too_far_are_refused() {
     let fault = RotorFault { rotor: 5, efficiency: 0.5, start_s: 0.0 };
     let realism = Realism { rotors: Rotors { faults: vec![fault], ..Rotors::DEFAULT }, ..Realism::default() };
     let on = |count| {
-        let environment = Environment::calm(P).unwrap().with_frame(Frame::new(&vec![rotor; count]).unwrap());
+        let environment = Environment::calm(P).unwrap().with_frame(RotorLayout::new(&vec![rotor; count]).unwrap());
         Plant::with_realism(PlantModel::RigidBody, Motion::default(), environment, &realism, STEP_S)
     };
     assert_eq!(on(4).unwrap_err().range.name, "rotor");

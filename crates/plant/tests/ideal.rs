@@ -2,8 +2,8 @@
 
 use afbc_plant::integrate::rk4;
 use afbc_plant::{
-    Environment, Gust, GustKind, Load, Motion, ParameterChange, Plant, PlantModel, PlantParameter, Realism, rigid_body,
-    simplified,
+    Environment, Gust, GustKind, Load, Motion, Plant, PlantModel, PlantParameter, PlantParameterChange, Realism,
+    rigid_body, simplified,
 };
 use afbc_types::{Axis, Parameters, RotorSpeeds};
 use nalgebra::{Vector3, Vector4};
@@ -12,7 +12,7 @@ const STEP_S: f64 = 0.001;
 const STEPS: u16 = 2000;
 
 fn environment() -> Environment {
-    let change = |quantity, factor, start_s, end_s| ParameterChange { quantity, factor, start_s, end_s };
+    let change = |quantity, factor, start_s, end_s| PlantParameterChange { quantity, factor, start_s, end_s };
     let changes = vec![
         change(PlantParameter::Inertia, 1.75, 0.5, 1.5),
         change(PlantParameter::ThrustFactor, 0.6, 0.7, f64::INFINITY),

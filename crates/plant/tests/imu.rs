@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::float_cmp, missing_docs)] // tests
 
 use crate::common;
-use afbc_plant::instruments::{Accelerometer, Gyroscope, Imu, ImuReading};
+use afbc_plant::instruments::{AccelerometerModel, GyroscopeModel, ImuModel, ImuReading};
 use afbc_plant::{
     Drag, Environment, InstrumentSuite, Motion, Plant, PlantModel, Realism, Rotors, Truth, Turbulence, Wind,
 };
@@ -13,12 +13,12 @@ use nalgebra::{UnitQuaternion, Vector3, Vector4};
 
 const G: f64 = 9.81;
 
-fn with(imu: Imu) -> InstrumentSuite {
+fn with(imu: ImuModel) -> InstrumentSuite {
     InstrumentSuite { imu: Some(imu), ..InstrumentSuite::default() }
 }
 
-fn gyro(gyro: Gyroscope) -> InstrumentSuite {
-    with(Imu { gyro, ..Imu::DEFAULT })
+fn gyro(gyro: GyroscopeModel) -> InstrumentSuite {
+    with(ImuModel { gyro, ..ImuModel::DEFAULT })
 }
 
 fn samples(suite: InstrumentSuite, seed: u64, steps: u32, truth: impl Fn(u32) -> Truth) -> Vec<ImuReading> {
@@ -28,7 +28,7 @@ fn samples(suite: InstrumentSuite, seed: u64, steps: u32, truth: impl Fn(u32) ->
 #[test]
 fn a_perfect_one_reads_the_truth() {
     let truth = Truth { rates_rad_s: Vector3::new(0.1, -0.2, 0.3), ..rest() };
-    for (k, sample) in (0..).zip(samples(with(Imu::DEFAULT), 1, 10, |_| truth)) {
+    for (k, sample) in (0..).zip(samples(with(ImuModel::DEFAULT), 1, 10, |_| truth)) {
         assert_eq!(sample.at_s, f64::from(k) * STEP_S);
         assert_eq!(sample.rates_rad_s, truth.rates_rad_s);
         assert!((sample.specific_force_m_s2 - Vector3::z() * G).norm() < 1e-12);
@@ -45,22 +45,22 @@ fn allan(x: &[f64], m: usize) -> f64 {
 /// whose correlation time is far below tau.
 #[test]
 fn noise_has_the_declared_density() {
-    for preset in Imu::PRESETS {
+    for preset in ImuModel::PRESETS {
         for filtered in [false, true] {
-            let Imu { gyro, accel, .. } = preset.settings;
+            let ImuModel { gyro, accel, .. } = preset.settings;
             let cutoff = |hz| if filtered { hz } else { 0.0 };
-            let imu = Imu {
-                gyro: Gyroscope {
+            let imu = ImuModel {
+                gyro: GyroscopeModel {
                     noise_rad_s_rthz: gyro.noise_rad_s_rthz,
                     cutoff_hz: cutoff(gyro.cutoff_hz),
-                    ..Gyroscope::DEFAULT
+                    ..GyroscopeModel::DEFAULT
                 },
-                accel: Accelerometer {
+                accel: AccelerometerModel {
                     noise_m_s2_rthz: accel.noise_m_s2_rthz,
                     cutoff_hz: cutoff(accel.cutoff_hz),
-                    ..Accelerometer::DEFAULT
+                    ..AccelerometerModel::DEFAULT
                 },
-                ..Imu::DEFAULT
+                ..ImuModel::DEFAULT
             };
             let samples = samples(with(imu), 3, 400_000, |_| rest());
             let axis = |of: fn(&ImuReading) -> f64| samples.iter().map(of).collect::<Vec<f64>>();
@@ -93,11 +93,11 @@ fn noise_has_the_declared_density() {
 /// 1/e after the correlation time.
 #[test]
 fn instability_is_stationary_and_correlated() {
-    let gyro = Gyroscope { instability_rad_s: 0.01, instability_time_s: 0.05, ..Gyroscope::DEFAULT };
-    let accel = Accelerometer { instability_m_s2: 0.2, instability_time_s: 0.1, ..Accelerometer::DEFAULT };
+    let gyro = GyroscopeModel { instability_rad_s: 0.01, instability_time_s: 0.05, ..GyroscopeModel::DEFAULT };
+    let accel = AccelerometerModel { instability_m_s2: 0.2, instability_time_s: 0.1, ..AccelerometerModel::DEFAULT };
     let (mut slow, mut fast) = (Vec::new(), Vec::new());
     for seed in 0..3000 {
-        let mut instruments = instruments(with(Imu { gyro, accel, ..Imu::DEFAULT }), seed);
+        let mut instruments = instruments(with(ImuModel { gyro, accel, ..ImuModel::DEFAULT }), seed);
         let start = instruments.imu_bias().unwrap();
         for k in 0..100 {
             let sample = instruments.measure(&common::at(rest(), k)).imu.unwrap();
@@ -121,9 +121,9 @@ fn instability_is_stationary_and_correlated() {
 /// Constant errors have their spread over flights and none within one; the walk grows with the root of time.
 #[test]
 fn bias_scale_and_misalignment_are_drawn_once_and_the_walk_grows() {
-    let gyro = Gyroscope { bias_rad_s: 0.05, scale: 0.01, misalignment_rad: 0.003, ..Gyroscope::DEFAULT };
-    let accel = Accelerometer { bias_m_s2: 0.3, walk_m_s3_rthz: 0.1, ..Accelerometer::DEFAULT };
-    let suite = with(Imu { gyro, accel, ..Imu::DEFAULT });
+    let gyro = GyroscopeModel { bias_rad_s: 0.05, scale: 0.01, misalignment_rad: 0.003, ..GyroscopeModel::DEFAULT };
+    let accel = AccelerometerModel { bias_m_s2: 0.3, walk_m_s3_rthz: 0.1, ..AccelerometerModel::DEFAULT };
+    let suite = with(ImuModel { gyro, accel, ..ImuModel::DEFAULT });
     let (mut bias, mut scale, mut skew, mut walk, mut constant) = (vec![], vec![], vec![], vec![], vec![]);
     for seed in 0..3000 {
         let turning = |k: u32| Truth { rates_rad_s: if k == 0 { Vector3::zeros() } else { unit(k) }, ..rest() };
@@ -155,10 +155,11 @@ fn unit(k: u32) -> Vector3<f64> {
 
 #[test]
 fn output_is_quantised_and_clipped() {
-    let accel = Accelerometer { lsb_m_s2: 0.01, range_m_s2: 20.0, noise_m_s2_rthz: 0.02, ..Accelerometer::DEFAULT };
-    let gyro = Gyroscope { lsb_rad_s: 0.25, range_rad_s: 3.0, ..Gyroscope::DEFAULT };
+    let accel =
+        AccelerometerModel { lsb_m_s2: 0.01, range_m_s2: 20.0, noise_m_s2_rthz: 0.02, ..AccelerometerModel::DEFAULT };
+    let gyro = GyroscopeModel { lsb_rad_s: 0.25, range_rad_s: 3.0, ..GyroscopeModel::DEFAULT };
     let truth = |k: u32| Truth { rates_rad_s: Vector3::new(0.01, -0.01, 0.001) * f64::from(k), ..rest() };
-    let samples = samples(with(Imu { gyro, accel, ..Imu::DEFAULT }), 4, 1000, truth);
+    let samples = samples(with(ImuModel { gyro, accel, ..ImuModel::DEFAULT }), 4, 1000, truth);
     for (k, sample) in (0..).zip(&samples) {
         let expected = truth(k).rates_rad_s.map(|rate| (rate.clamp(-3.0, 3.0) / 0.25).round_ties_even() * 0.25);
         assert_eq!(sample.rates_rad_s, expected);
@@ -171,7 +172,7 @@ fn output_is_quantised_and_clipped() {
     assert!(different.collect::<std::collections::BTreeSet<_>>().len() > 50);
     // Clipped on either side, with or without noise.
     let falling = |_| Truth { acceleration_m_s2: Vector3::new(50.0, -50.0, 0.0), ..rest() };
-    let clipped = common::run(with(Imu { gyro, accel, ..Imu::DEFAULT }), 4, 10, falling);
+    let clipped = common::run(with(ImuModel { gyro, accel, ..ImuModel::DEFAULT }), 4, 10, falling);
     assert!(clipped.iter().all(|r| r.imu.unwrap().specific_force_m_s2.xy() == nalgebra::Vector2::new(20.0, -20.0)));
 }
 
@@ -180,7 +181,7 @@ fn output_is_quantised_and_clipped() {
 #[test]
 fn oscillations_above_the_cut_off_are_attenuated() {
     let cutoff_hz = 80.0;
-    let suite = gyro(Gyroscope { cutoff_hz, ..Gyroscope::DEFAULT });
+    let suite = gyro(GyroscopeModel { cutoff_hz, ..GyroscopeModel::DEFAULT });
     for frequency_hz in [0.0, 10.0, 40.0, 80.0, 120.0, 200.0, 400.0] {
         let phase = |k: u32| TAU * frequency_hz * f64::from(k) * STEP_S;
         let samples = samples(suite, 1, 3000, |k| Truth { rates_rad_s: Vector3::x() * phase(k).cos(), ..rest() });
@@ -209,8 +210,8 @@ fn a_mounted_sensor_feels_its_own_place() {
     let mut plant = Plant::new(PlantModel::RigidBody, initial, Environment::calm(Parameters::PAPER).unwrap());
     let lever_m = Vector3::new(-0.02, 0.01, 0.04);
     let told = Mounting { position_m: mounting.position_m - lever_m, ..mounting };
-    let imu = Imu { mounting: told, lever_m, ..Imu::DEFAULT };
-    let mut sensor = afbc_plant::Instruments::new(&with(imu), &[], 1, DT_S).unwrap();
+    let imu = ImuModel { mounting: told, lever_m, ..ImuModel::DEFAULT };
+    let mut sensor = afbc_plant::SimulatedInstruments::new(&with(imu), &[], 1, DT_S).unwrap();
     let axes = {
         let a = mounting.attitude_rad;
         UnitQuaternion::from_euler_angles(a.x, a.y, a.z)
@@ -265,7 +266,7 @@ fn a_perfect_one_navigates() {
         };
         let environment = Environment::calm(Parameters::PAPER).unwrap();
         let mut plant = Plant::with_realism(model, Motion::default(), environment, &realism, STEP_S).unwrap();
-        let mut sensor = instruments(with(Imu::DEFAULT), 1);
+        let mut sensor = instruments(with(ImuModel::DEFAULT), 1);
         let mut last = sensor.measure(&plant.truth()).imu.unwrap();
         let (mut q, mut v, mut p) = (UnitQuaternion::identity(), Vector3::zeros(), Vector3::zeros());
         let (mut travelled, mut tilt) = (0.0, 0.0_f64);
@@ -301,10 +302,10 @@ fn vibration_is_at_the_rotors_harmonics_and_grows_with_the_square_of_the_speed()
         let mut truth = rest();
         truth.rotor_speeds_rad_s.fill(0.0);
         speeds.iter().zip(truth.rotor_speeds_rad_s.iter_mut()).for_each(|(speed, lane)| *lane = *speed);
-        let accel = Accelerometer { vibration_m_s2: 2.0, cutoff_hz, ..Accelerometer::DEFAULT };
-        let gyro = Gyroscope { vibration_rad_s: 0.1, cutoff_hz, ..Gyroscope::DEFAULT };
+        let accel = AccelerometerModel { vibration_m_s2: 2.0, cutoff_hz, ..AccelerometerModel::DEFAULT };
+        let gyro = GyroscopeModel { vibration_rad_s: 0.1, cutoff_hz, ..GyroscopeModel::DEFAULT };
         let harmonics = Vector3::new(1.0, 0.5, 0.25);
-        let samples = samples(with(Imu { gyro, accel, harmonics, ..Imu::DEFAULT }), 5, STEPS, |_| truth);
+        let samples = samples(with(ImuModel { gyro, accel, harmonics, ..ImuModel::DEFAULT }), 5, STEPS, |_| truth);
         for (sensor, size) in [(0, 0.1), (1, 2.0)] {
             for axis in 0..3 {
                 let mut x: Vec<f64> = samples
@@ -332,16 +333,16 @@ fn vibration_is_at_the_rotors_harmonics_and_grows_with_the_square_of_the_speed()
     // Rotors that stand still shake nothing.
     let mut still = rest();
     still.rotor_speeds_rad_s.fill(0.0);
-    let accel = Accelerometer { vibration_m_s2: 2.0, ..Accelerometer::DEFAULT };
-    let quiet = samples(with(Imu { accel, ..Imu::DEFAULT }), 5, 10, |_| still);
+    let accel = AccelerometerModel { vibration_m_s2: 2.0, ..AccelerometerModel::DEFAULT };
+    let quiet = samples(with(ImuModel { accel, ..ImuModel::DEFAULT }), 5, 10, |_| still);
     assert!(quiet.iter().all(|s| s.specific_force_m_s2.xy().norm() == 0.0));
 }
 
 /// Vibration, bias and distortion do not change the drawn white noise.
 #[test]
 fn settings_do_not_change_the_noise() {
-    let noisy = Gyroscope { noise_rad_s_rthz: 1e-4, ..Gyroscope::DEFAULT };
-    let other = Gyroscope { vibration_rad_s: 0.1, bias_rad_s: 0.02, ..noisy };
+    let noisy = GyroscopeModel { noise_rad_s_rthz: 1e-4, ..GyroscopeModel::DEFAULT };
+    let other = GyroscopeModel { vibration_rad_s: 0.1, bias_rad_s: 0.02, ..noisy };
     let plain = samples(gyro(noisy), 6, 1000, |_| rest());
     let mut still = rest();
     still.rotor_speeds_rad_s.fill(0.0);

@@ -3,17 +3,18 @@
 
 use crate::common;
 use afbc_plant::instruments::{
-    Barometer, Failure, Gnss, Gyroscope, Imu, InstrumentFault, Magnetometer, Preset, TrackerModel,
+    BarometerModel, FailureKind, GnssModel, GyroscopeModel, ImuModel, InstrumentFault, MagnetometerModel, Preset,
+    TrackerModel,
 };
-use afbc_plant::{Dropouts, InstrumentReadings, InstrumentSuite, Instruments, Truth};
+use afbc_plant::{InstrumentReadings, InstrumentSuite, MeasurementDropouts, SimulatedInstruments, Truth};
 use afbc_types::{Declared, Mounting};
 use common::{STEP_S, rest, run, run_with};
 use nalgebra::{Quaternion, Vector3};
 
 /// Returns all instruments with every random property.
 fn all() -> InstrumentSuite {
-    let often = Dropouts { rate_hz: 2.0, mean_s: 0.1 };
-    let mut imu = Imu::MPU_6000;
+    let often = MeasurementDropouts { rate_hz: 2.0, mean_s: 0.1 };
+    let mut imu = ImuModel::MPU_6000;
     (imu.gyro.vibration_rad_s, imu.accel.vibration_m_s2) = (0.1, 2.0);
     InstrumentSuite {
         imu: Some(imu),
@@ -24,9 +25,9 @@ fn all() -> InstrumentSuite {
             freeze: often,
             ..TrackerModel::MOCAP_100
         }),
-        gnss: Some(Gnss { loss: often, ..Gnss::M10 }),
-        barometer: Some(Barometer { offset_m: 1.0, ..Barometer::BMP388 }),
-        magnetometer: Some(Magnetometer::IST8310),
+        gnss: Some(GnssModel { loss: often, ..GnssModel::M10 }),
+        barometer: Some(BarometerModel { offset_m: 1.0, ..BarometerModel::BMP388 }),
+        magnetometer: Some(MagnetometerModel::IST8310),
     }
 }
 
@@ -66,7 +67,7 @@ fn no_instrument_changes_another_ones_readings() {
         assert_eq!((&all.gnss, &all.barometer), (&gnss.gnss, &barometer.barometer));
         assert_eq!(all.magnetometer, magnetometer.magnetometer);
     }
-    let noisy = Failure::ImuNoisy { rates_rad_s: 1.0, specific_force_m_s2: 1.0 };
+    let noisy = FailureKind::ImuNoisy { rates_rad_s: 1.0, specific_force_m_s2: 1.0 };
     let failing = run_with(suite, &[fault(noisy)], 7, 3000, moving);
     assert!(together.iter().zip(&failing).all(|(a, b)| a.tracker == b.tracker && a.gnss == b.gnss));
 }
@@ -103,42 +104,45 @@ fn presets_are_accepted() {
         }
         presets.iter().map(|preset| preset.name).collect()
     }
-    assert_eq!(check(&Imu::PRESETS), ["icm-42688-p", "bmi270", "mpu-6000"]);
+    assert_eq!(check(&ImuModel::PRESETS), ["icm-42688-p", "bmi270", "mpu-6000"]);
     assert_eq!(check(&TrackerModel::PRESETS), ["mocap-100"]);
-    assert_eq!(check(&Gnss::PRESETS), ["m10"]);
-    assert_eq!(check(&Barometer::PRESETS), ["dps310", "bmp388"]);
-    assert_eq!(check(&Magnetometer::PRESETS), ["ist8310", "qmc5883l"]);
+    assert_eq!(check(&GnssModel::PRESETS), ["m10"]);
+    assert_eq!(check(&BarometerModel::PRESETS), ["dps310", "bmp388"]);
+    assert_eq!(check(&MagnetometerModel::PRESETS), ["ist8310", "qmc5883l"]);
 }
 
 #[test]
 fn settings_out_of_range_are_refused_by_name() {
-    let refused = |suite: InstrumentSuite| Instruments::new(&suite, &[], 1, STEP_S).unwrap_err().range.name;
+    let refused = |suite: InstrumentSuite| SimulatedInstruments::new(&suite, &[], 1, STEP_S).unwrap_err().range.name;
     let none = InstrumentSuite::default();
     let imu = |imu| refused(InstrumentSuite { imu: Some(imu), ..none });
-    assert_eq!(imu(Imu { gyro: Gyroscope { scale: 0.2, ..Gyroscope::DEFAULT }, ..Imu::DEFAULT }), "scale");
+    assert_eq!(
+        imu(ImuModel { gyro: GyroscopeModel { scale: 0.2, ..GyroscopeModel::DEFAULT }, ..ImuModel::DEFAULT }),
+        "scale"
+    );
     let far = Mounting { position_m: Vector3::repeat(20.0), ..Mounting::DEFAULT };
-    assert_eq!(imu(Imu { mounting: far, ..Imu::DEFAULT }), "position_m");
+    assert_eq!(imu(ImuModel { mounting: far, ..ImuModel::DEFAULT }), "position_m");
     assert_eq!(
         refused(InstrumentSuite { tracker: Some(TrackerModel { rate_hz: 0.0, ..TrackerModel::DEFAULT }), ..none }),
         "rate_hz"
     );
     assert_eq!(
-        refused(InstrumentSuite { gnss: Some(Gnss { reported: f64::NAN, ..Gnss::DEFAULT }), ..none }),
+        refused(InstrumentSuite { gnss: Some(GnssModel { reported: f64::NAN, ..GnssModel::DEFAULT }), ..none }),
         "reported"
     );
-    let washed = Barometer { wash_height_m: 0.0, ..Barometer::DEFAULT };
+    let washed = BarometerModel { wash_height_m: 0.0, ..BarometerModel::DEFAULT };
     assert_eq!(refused(InstrumentSuite { barometer: Some(washed), ..none }), "wash_height_m");
-    let steep = Magnetometer { inclination_rad: 2.0, ..Magnetometer::DEFAULT };
+    let steep = MagnetometerModel { inclination_rad: 2.0, ..MagnetometerModel::DEFAULT };
     assert_eq!(refused(InstrumentSuite { magnetometer: Some(steep), ..none }), "inclination_rad");
-    assert_eq!(Instruments::new(&none, &[], 1, 0.0).unwrap_err().range.name, "step_s");
-    let bad = fault(Failure::ImuClipped { rates_rad_s: -1.0, specific_force_m_s2: 1.0 });
-    assert_eq!(Instruments::new(&none, &[bad], 1, STEP_S).unwrap_err().range.name, "rates_rad_s");
-    let late = InstrumentFault { start_s: f64::NAN, ..fault(Failure::ImuDead) };
-    assert_eq!(Instruments::new(&none, &[late], 1, STEP_S).unwrap_err().range.name, "start_s");
+    assert_eq!(SimulatedInstruments::new(&none, &[], 1, 0.0).unwrap_err().range.name, "step_s");
+    let bad = fault(FailureKind::ImuClipped { rates_rad_s: -1.0, specific_force_m_s2: 1.0 });
+    assert_eq!(SimulatedInstruments::new(&none, &[bad], 1, STEP_S).unwrap_err().range.name, "rates_rad_s");
+    let late = InstrumentFault { start_s: f64::NAN, ..fault(FailureKind::ImuDead) };
+    assert_eq!(SimulatedInstruments::new(&none, &[late], 1, STEP_S).unwrap_err().range.name, "start_s");
 }
 
 /// Returns a fault from step 1000 to step 2000.
-fn fault(failure: Failure) -> InstrumentFault {
+fn fault(failure: FailureKind) -> InstrumentFault {
     InstrumentFault { failure, start_s: 1.0, end_s: 2.0, rise_s: 0.0 }
 }
 
@@ -148,13 +152,13 @@ fn acts(time_s: f64) -> bool {
 }
 
 /// Compares readings of perfect, immediate instruments without and with a failure, step by step.
-fn compare(failure: Failure, mut check: impl FnMut(u32, &InstrumentReadings, &InstrumentReadings)) {
+fn compare(failure: FailureKind, mut check: impl FnMut(u32, &InstrumentReadings, &InstrumentReadings)) {
     let suite = InstrumentSuite {
-        imu: Some(Imu::DEFAULT),
+        imu: Some(ImuModel::DEFAULT),
         tracker: Some(TrackerModel::DEFAULT),
-        gnss: Some(Gnss::DEFAULT),
-        barometer: Some(Barometer { noise_m: 0.1, ..Barometer::DEFAULT }),
-        magnetometer: Some(Magnetometer::DEFAULT),
+        gnss: Some(GnssModel::DEFAULT),
+        barometer: Some(BarometerModel { noise_m: 0.1, ..BarometerModel::DEFAULT }),
+        magnetometer: Some(MagnetometerModel::DEFAULT),
     };
     let turning = |k: u32| Truth {
         rates_rad_s: Vector3::new(0.001, 0.002, -0.003) * f64::from(k),
@@ -174,7 +178,7 @@ fn compare(failure: Failure, mut check: impl FnMut(u32, &InstrumentReadings, &In
 #[test]
 fn the_inertial_sensor_fails_as_declared() {
     let mut before = None;
-    compare(Failure::ImuStuck, |k, well, ill| {
+    compare(FailureKind::ImuStuck, |k, well, ill| {
         if k == 0 {
             before = well.imu;
         } else {
@@ -184,9 +188,9 @@ fn the_inertial_sensor_fails_as_declared() {
             assert_eq!(stuck.at_s, well.imu.unwrap().at_s);
         }
     });
-    compare(Failure::ImuDead, |k, _, ill| assert!(k == 0 || ill.imu.is_none()));
+    compare(FailureKind::ImuDead, |k, _, ill| assert!(k == 0 || ill.imu.is_none()));
     let (mut rates, mut force) = (Vec::new(), Vec::new());
-    compare(Failure::ImuNoisy { rates_rad_s: 0.5, specific_force_m_s2: 7.0 }, |k, well, ill| {
+    compare(FailureKind::ImuNoisy { rates_rad_s: 0.5, specific_force_m_s2: 7.0 }, |k, well, ill| {
         if k > 0 {
             let (well, ill) = (well.imu.unwrap(), ill.imu.unwrap());
             rates.push(ill.rates_rad_s - well.rates_rad_s);
@@ -195,7 +199,7 @@ fn the_inertial_sensor_fails_as_declared() {
     });
     common::assert_sigma(&common::coordinates(rates), 0.5, "rates");
     common::assert_sigma(&common::coordinates(force), 7.0, "force");
-    compare(Failure::ImuClipped { rates_rad_s: 2.0, specific_force_m_s2: 5.0 }, |k, well, ill| {
+    compare(FailureKind::ImuClipped { rates_rad_s: 2.0, specific_force_m_s2: 5.0 }, |k, well, ill| {
         if k > 0 {
             let (well, ill) = (well.imu.unwrap(), ill.imu.unwrap());
             assert_eq!(ill.rates_rad_s, well.rates_rad_s.map(|rate| rate.clamp(-2.0, 2.0)));
@@ -203,7 +207,7 @@ fn the_inertial_sensor_fails_as_declared() {
         }
     });
     let (rates_bias_rad_s, force_bias_m_s2) = (Vector3::new(0.1, 0.2, 0.3), Vector3::new(-1.0, 0.0, 2.0));
-    compare(Failure::ImuBiased { rates_bias_rad_s, force_bias_m_s2 }, |k, well, ill| {
+    compare(FailureKind::ImuBiased { rates_bias_rad_s, force_bias_m_s2 }, |k, well, ill| {
         if k > 0 {
             let (well, ill) = (well.imu.unwrap(), ill.imu.unwrap());
             assert_eq!(ill.rates_rad_s, well.rates_rad_s + rates_bias_rad_s);
@@ -214,9 +218,9 @@ fn the_inertial_sensor_fails_as_declared() {
 
 #[test]
 fn the_tracker_and_the_receiver_fail_as_declared() {
-    compare(Failure::TrackerLost, |k, _, ill| assert!(k == 0 || ill.tracker.is_empty()));
+    compare(FailureKind::TrackerLost, |k, _, ill| assert!(k == 0 || ill.tracker.is_empty()));
     let mut before = None;
-    compare(Failure::TrackerFrozen, |k, well, ill| {
+    compare(FailureKind::TrackerFrozen, |k, well, ill| {
         for (well, ill) in well.tracker.iter().zip(&ill.tracker) {
             if k == 0 {
                 before = Some(*well);
@@ -229,7 +233,7 @@ fn the_tracker_and_the_receiver_fail_as_declared() {
     });
     let by_m = Vector3::new(1.0, 2.0, 3.0);
     let mut seen = 0;
-    compare(Failure::TrackerJumped { by_m, yaw_rad: core::f64::consts::FRAC_PI_2 }, |k, well, ill| {
+    compare(FailureKind::TrackerJumped { by_m, yaw_rad: core::f64::consts::FRAC_PI_2 }, |k, well, ill| {
         for (well, ill) in well.tracker.iter().zip(&ill.tracker).filter(|_| k > 0) {
             seen += 1;
             let p = well.position_m;
@@ -240,8 +244,8 @@ fn the_tracker_and_the_receiver_fail_as_declared() {
         }
     });
     assert_eq!(seen, 100);
-    compare(Failure::GnssLost, |k, _, ill| assert!(k == 0 || ill.gnss.is_empty()));
-    compare(Failure::GnssJumped { by_m }, |k, well, ill| {
+    compare(FailureKind::GnssLost, |k, _, ill| assert!(k == 0 || ill.gnss.is_empty()));
+    compare(FailureKind::GnssJumped { by_m }, |k, well, ill| {
         for (well, ill) in well.gnss.iter().zip(&ill.gnss).filter(|_| k > 0) {
             assert_eq!(ill.position_m, well.position_m + by_m);
             assert_eq!(ill.velocity_m_s, well.velocity_m_s);
@@ -251,9 +255,9 @@ fn the_tracker_and_the_receiver_fail_as_declared() {
 
 #[test]
 fn barometer_and_magnetometer_fail_as_declared() {
-    compare(Failure::BarometerLost, |k, _, ill| assert!(k == 0 || ill.barometer.is_empty()));
+    compare(FailureKind::BarometerLost, |k, _, ill| assert!(k == 0 || ill.barometer.is_empty()));
     let mut before = 0.0;
-    compare(Failure::BarometerStuck, |k, well, ill| {
+    compare(FailureKind::BarometerStuck, |k, well, ill| {
         for (well, ill) in well.barometer.iter().zip(&ill.barometer) {
             if k == 0 {
                 before = well.height_m;
@@ -263,15 +267,15 @@ fn barometer_and_magnetometer_fail_as_declared() {
         }
     });
     let mut noise = Vec::new();
-    compare(Failure::BarometerBlocked, |k, _, ill| {
+    compare(FailureKind::BarometerBlocked, |k, _, ill| {
         for ill in ill.barometer.iter().filter(|_| k > 0) {
             noise.push(ill.height_m - moving(1000).position_m.z);
         }
     });
     common::assert_sigma(&noise, 0.1, "noise of a blocked one");
-    compare(Failure::MagnetometerLost, |k, _, ill| assert!(k == 0 || ill.magnetometer.is_empty()));
+    compare(FailureKind::MagnetometerLost, |k, _, ill| assert!(k == 0 || ill.magnetometer.is_empty()));
     let mut held = None;
-    compare(Failure::MagnetometerStuck, |k, well, ill| {
+    compare(FailureKind::MagnetometerStuck, |k, well, ill| {
         for (well, ill) in well.magnetometer.iter().zip(&ill.magnetometer) {
             if k == 0 {
                 held = Some(well.field_ut);
@@ -281,7 +285,7 @@ fn barometer_and_magnetometer_fail_as_declared() {
         }
     });
     let field_ut = Vector3::new(10.0, -20.0, 5.0);
-    compare(Failure::MagnetometerDisturbed { field_ut }, |k, well, ill| {
+    compare(FailureKind::MagnetometerDisturbed { field_ut }, |k, well, ill| {
         for (well, ill) in well.magnetometer.iter().zip(&ill.magnetometer).filter(|_| k > 0) {
             assert_eq!(ill.field_ut, well.field_ut + field_ut);
         }

@@ -1,8 +1,8 @@
 //! All effects together: reproducible by seed, and finite for any input.
 
 use afbc_plant::{
-    Battery, Contact, CosineGust, Deviations, Drag, Dropouts, Environment, GroundEffect, Motion, Plant, PlantModel,
-    Realism, RotorFault, Rotors, Sag, Sensing, Start, StateSensor, Turbulence, Wind,
+    BatteryModel, Contact, CosineGust, Deviations, Drag, Environment, GroundEffect, MeasurementDropouts, Motion, Plant,
+    PlantModel, Realism, RotorFault, RotorStart, Rotors, Sag, Sensing, StateSensor, Turbulence, Wind,
 };
 use afbc_types::{Parameters, RotorSpeeds};
 use nalgebra::{Vector3, Vector4};
@@ -14,10 +14,10 @@ fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
     (-size..size, -size..size, -size..size).prop_map(|(x, y, z)| Vector3::new(x, y, z))
 }
 
-fn battery() -> impl Strategy<Value = Battery> {
+fn battery() -> impl Strategy<Value = BatteryModel> {
     (0.0..1.0, 0.001..2.0, 0.0..1.0, any::<bool>()).prop_map(|(resistance_ohm, capacity_a_h, initial_charge, speed)| {
         let effect = if speed { Sag::Speed } else { Sag::Ceiling };
-        Battery { resistance_ohm, capacity_a_h, initial_charge, effect, ..Battery::THREE_CELLS }
+        BatteryModel { resistance_ohm, capacity_a_h, initial_charge, effect, ..BatteryModel::THREE_CELLS }
     })
 }
 
@@ -37,7 +37,7 @@ fn rotors() -> impl Strategy<Value = Rotors> {
         prop::option::of(battery()),
     )
         .prop_map(|(time_constant_s, min_rad_s, max_rad_s, delay_s, hover, faults, battery)| {
-            let start = if hover { Start::Hover } else { Start::Idle };
+            let start = if hover { RotorStart::Hover } else { RotorStart::Idle };
             Rotors { time_constant_s, min_rad_s, max_rad_s, delay_s, start, faults, battery }
         })
 }
@@ -97,7 +97,7 @@ fn sensing() -> Sensing {
         noise: Deviations::all(0.01),
         bias: Deviations::all(0.05),
         delay_s: 0.003,
-        dropouts: Some(Dropouts { rate_hz: 5.0, mean_s: 0.02 }),
+        dropouts: Some(MeasurementDropouts { rate_hz: 5.0, mean_s: 0.02 }),
         ..Sensing::DEFAULT
     }
 }
@@ -162,7 +162,7 @@ fn a_flight_with_everything_stays_what_it_is() {
         rotors: Rotors {
             time_constant_s: 0.02,
             delay_s: 0.002,
-            battery: Some(Battery::THREE_CELLS),
+            battery: Some(BatteryModel::THREE_CELLS),
             ..Rotors::default()
         },
         drag: Some(Drag::PAPER),

@@ -2,22 +2,22 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::float_cmp, missing_docs)] // tests
 
 use crate::common::{STEP_S, assert_correlation, assert_sigma_of, coordinates, rest, rotation, run, run_with};
-use afbc_plant::instruments::{Failure, Gnss, Imu, InstrumentFault, Magnetometer, TrackerModel};
-use afbc_plant::{InstrumentReadings, InstrumentSuite, Instruments};
+use afbc_plant::instruments::{FailureKind, GnssModel, ImuModel, InstrumentFault, MagnetometerModel, TrackerModel};
+use afbc_plant::{InstrumentReadings, InstrumentSuite, SimulatedInstruments};
 use nalgebra::{Quaternion, Vector3};
 
 fn suite() -> InstrumentSuite {
     InstrumentSuite {
-        imu: Some(Imu::DEFAULT),
+        imu: Some(ImuModel::DEFAULT),
         tracker: Some(TrackerModel::DEFAULT),
-        gnss: Some(Gnss::DEFAULT),
-        magnetometer: Some(Magnetometer::DEFAULT),
+        gnss: Some(GnssModel::DEFAULT),
+        magnetometer: Some(MagnetometerModel::DEFAULT),
         ..InstrumentSuite::default()
     }
 }
 
 /// Returns the readings of three seconds with a fault from 1 s on.
-fn flown(failure: Failure, rise_s: f64) -> Vec<InstrumentReadings> {
+fn flown(failure: FailureKind, rise_s: f64) -> Vec<InstrumentReadings> {
     let fault = InstrumentFault { failure, start_s: 1.0, end_s: f64::INFINITY, rise_s };
     run_with(suite(), &[fault], 1, 3000, |_| rest())
 }
@@ -33,21 +33,21 @@ fn a_fault_with_a_rise_grows_evenly_to_its_size() {
     let rates = Vector3::new(0.01, -0.02, 0.03);
     let near = |found: Vector3<f64>, wanted: Vector3<f64>| assert!((found - wanted).norm() < 1e-6, "{found} {wanted}");
     let at = |k: usize| k as f64 * STEP_S;
-    let fixes = flown(Failure::GnssJumped { by_m }, 0.5);
+    let fixes = flown(FailureKind::GnssJumped { by_m }, 0.5);
     for (k, fix) in (0..).zip(&fixes).flat_map(|(k, read)| read.gnss.iter().map(move |fix| (k, fix))) {
         near(fix.position_m, by_m * share(at(k)));
     }
-    let biased = Failure::ImuBiased { rates_bias_rad_s: rates, force_bias_m_s2: rates * 10.0 };
+    let biased = FailureKind::ImuBiased { rates_bias_rad_s: rates, force_bias_m_s2: rates * 10.0 };
     for (k, read) in flown(biased, 0.5).into_iter().enumerate() {
         let imu = read.imu.unwrap();
         near(imu.rates_rad_s, rates * share(at(k)));
         near(imu.specific_force_m_s2 - Vector3::z() * 9.81, rates * 10.0 * share(at(k)));
     }
-    let disturbed = flown(Failure::MagnetometerDisturbed { field_ut: by_m }, 0.5);
+    let disturbed = flown(FailureKind::MagnetometerDisturbed { field_ut: by_m }, 0.5);
     for (k, fix) in (0..).zip(&disturbed).flat_map(|(k, read)| read.magnetometer.iter().map(move |fix| (k, fix))) {
-        near(fix.field_ut - Magnetometer::DEFAULT.earth_field_ut(), by_m * share(at(k)));
+        near(fix.field_ut - MagnetometerModel::DEFAULT.earth_field_ut(), by_m * share(at(k)));
     }
-    let slipped = flown(Failure::TrackerJumped { by_m, yaw_rad }, 0.5);
+    let slipped = flown(FailureKind::TrackerJumped { by_m, yaw_rad }, 0.5);
     for (k, fix) in (0..).zip(&slipped).flat_map(|(k, read)| read.tracker.iter().map(move |fix| (k, fix))) {
         near(fix.position_m, by_m * share(at(k)));
         let half = 0.5 * yaw_rad * share(at(k));
@@ -59,17 +59,17 @@ fn a_fault_with_a_rise_grows_evenly_to_its_size() {
 #[test]
 fn without_a_rise_a_fault_is_there_at_once() {
     let by_m = Vector3::new(5.0, -3.0, 20.0);
-    let fixes = flown(Failure::GnssJumped { by_m }, 0.0);
+    let fixes = flown(FailureKind::GnssJumped { by_m }, 0.0);
     for (k, fix) in (0..).zip(&fixes).flat_map(|(k, read)| read.gnss.iter().map(move |fix| (k, fix))) {
         assert_eq!(fix.position_m, if k < 1000 { Vector3::zeros() } else { by_m });
     }
-    for failure in Failure::ALL {
+    for failure in FailureKind::ALL {
         assert!(failure.scaled(1.0).is_none_or(|whole| whole == failure), "{failure:?}");
     }
-    assert_eq!(Failure::ImuDead.scaled(0.5), None);
+    assert_eq!(FailureKind::ImuDead.scaled(0.5), None);
     let endless =
-        InstrumentFault { failure: Failure::GnssJumped { by_m }, start_s: 1.0, end_s: 2.0, rise_s: f64::INFINITY };
-    let refused = Instruments::new(&suite(), &[endless], 1, STEP_S).unwrap_err();
+        InstrumentFault { failure: FailureKind::GnssJumped { by_m }, start_s: 1.0, end_s: 2.0, rise_s: f64::INFINITY };
+    let refused = SimulatedInstruments::new(&suite(), &[endless], 1, STEP_S).unwrap_err();
     assert_eq!(refused.range.name, "rise_s");
 }
 
@@ -77,9 +77,10 @@ fn without_a_rise_a_fault_is_there_at_once() {
 /// time, and end with the fault.
 #[test]
 fn reflections_have_their_spread_and_correlation_and_end() {
-    let failure = Failure::GnssMultipath { deviation_m: 5.0, correlation_time_s: 0.5 };
+    let failure = FailureKind::GnssMultipath { deviation_m: 5.0, correlation_time_s: 0.5 };
     let fault = InstrumentFault { failure, start_s: 1.0, end_s: 2.0, rise_s: 0.0 };
-    let alone = InstrumentSuite { gnss: Some(Gnss { rate_hz: 4.0, ..Gnss::DEFAULT }), ..InstrumentSuite::default() };
+    let alone =
+        InstrumentSuite { gnss: Some(GnssModel { rate_hz: 4.0, ..GnssModel::DEFAULT }), ..InstrumentSuite::default() };
     let (mut first, mut later, mut pairs) = (Vec::new(), Vec::new(), Vec::new());
     for seed in 0..400 {
         let readings = run_with(alone, &[fault], seed, 3000, |_| rest());
@@ -103,8 +104,9 @@ fn reflections_have_their_spread_and_correlation_and_end() {
 #[test]
 fn a_receivers_stamps_are_late_by_what_is_stated() {
     let with = |stamp_s| {
-        let suite = InstrumentSuite { gnss: Some(Gnss { stamp_s, ..Gnss::M10 }), ..InstrumentSuite::default() };
-        let failure = Failure::GnssJumped { by_m: Vector3::x() };
+        let suite =
+            InstrumentSuite { gnss: Some(GnssModel { stamp_s, ..GnssModel::M10 }), ..InstrumentSuite::default() };
+        let failure = FailureKind::GnssJumped { by_m: Vector3::x() };
         let fault = InstrumentFault { failure, start_s: 1.0, end_s: 2.0, rise_s: 0.0 };
         let [well, ill] = [run(suite, 3, 3000, |_| rest()), run_with(suite, &[fault], 3, 3000, |_| rest())];
         [well, ill].map(|readings| readings.into_iter().flat_map(|read| read.gnss).collect::<Vec<_>>())

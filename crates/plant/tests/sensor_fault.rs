@@ -1,6 +1,6 @@
 //! Compares faults of the measured state with their descriptions.
 
-use afbc_plant::{Misreading, Motion, SensorFault, SensorFaults};
+use afbc_plant::{Motion, SensorFault, SensorFaultKind, SensorFaults};
 use afbc_types::Axis;
 use nalgebra::Vector3;
 
@@ -16,7 +16,7 @@ fn seen(faults: &[SensorFault]) -> Vec<Motion> {
 }
 
 /// Returns a fault in steps 3 to 6.
-fn fault(axis: Option<Axis>, misreading: Misreading) -> SensorFault {
+fn fault(axis: Option<Axis>, misreading: SensorFaultKind) -> SensorFault {
     SensorFault { axis, misreading, start_s: 0.3, end_s: 0.7 }
 }
 
@@ -36,15 +36,15 @@ fn coordinates(motion: &mut Motion, axis: Axis) -> [&mut f64; 2] {
 #[test]
 fn each_fault_changes_its_coordinate_for_its_time_and_nothing_else() {
     for axis in Axis::ALL {
-        for misreading in [Misreading::Factor(-1.0), Misreading::Offset(0.5), Misreading::Frozen] {
+        for misreading in [SensorFaultKind::Factor(-1.0), SensorFaultKind::Offset(0.5), SensorFaultKind::Frozen] {
             for (k, seen) in (0..).zip(seen(&[fault(Some(axis), misreading)])) {
                 let (mut expected, mut held) = (motion(k), motion(3));
                 if (3..7).contains(&k) {
                     let [coordinate, rate] = coordinates(&mut expected, axis);
                     match misreading {
-                        Misreading::Factor(_) => [*coordinate, *rate] = [-*coordinate, -*rate],
-                        Misreading::Offset(_) => *coordinate += 0.5,
-                        Misreading::Frozen => [*coordinate, *rate] = coordinates(&mut held, axis).map(|x| *x),
+                        SensorFaultKind::Factor(_) => [*coordinate, *rate] = [-*coordinate, -*rate],
+                        SensorFaultKind::Offset(_) => *coordinate += 0.5,
+                        SensorFaultKind::Frozen => [*coordinate, *rate] = coordinates(&mut held, axis).map(|x| *x),
                     }
                 }
                 assert_eq!(seen, expected, "{axis:?}, {misreading:?}, step {k}");
@@ -55,11 +55,11 @@ fn each_fault_changes_its_coordinate_for_its_time_and_nothing_else() {
 
 #[test]
 fn a_whole_state_freezes_and_faults_act_in_their_order() {
-    let frozen = fault(None, Misreading::Frozen);
+    let frozen = fault(None, SensorFaultKind::Frozen);
     for (k, seen) in (0..).zip(seen(&[frozen])) {
         assert_eq!(seen, motion(if (3..7).contains(&k) { 3 } else { k }));
     }
     // A state that freezes after an offset keeps the offset.
-    let both = seen(&[SensorFault { end_s: 0.5, ..fault(Some(Axis::Z), Misreading::Offset(1.0)) }, frozen]);
+    let both = seen(&[SensorFault { end_s: 0.5, ..fault(Some(Axis::Z), SensorFaultKind::Offset(1.0)) }, frozen]);
     assert_eq!(both.iter().map(|motion| motion.position_m.z).nth(6), Some(motion(3).position_m.z + 1.0));
 }

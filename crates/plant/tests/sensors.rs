@@ -1,6 +1,6 @@
 //! Compares the sensors with their settings.
 
-use afbc_plant::{Deviations, Dropouts, Motion, Sensing, StateMeasurement, StateSensor};
+use afbc_plant::{Deviations, MeasurementDropouts, Motion, Sensing, StateMeasurement, StateSensor};
 use nalgebra::Vector3;
 
 const STEP_S: f64 = 0.001;
@@ -117,7 +117,7 @@ fn samples_arrive_once_per_period_and_stand_in_between() {
 fn samples_have_the_noise_of_their_step_and_dropouts_lose_them() {
     let noisy = Sensing { noise: Deviations::all(0.01), ..Sensing::default() };
     let sampled = Sensing { period_s: 0.01, gyro: true, ..noisy };
-    let lossy = Sensing { dropouts: Some(Dropouts { rate_hz: 20.0, mean_s: 0.01 }), ..sampled };
+    let lossy = Sensing { dropouts: Some(MeasurementDropouts { rate_hz: 20.0, mean_s: 0.01 }), ..sampled };
     let run = |sensing| {
         let mut sensors = sensors(sensing, 3);
         (0..5000).map(|k| sensors.measure(&motion(k))).collect::<Vec<_>>()
@@ -145,7 +145,7 @@ fn samples_have_the_noise_of_their_step_and_dropouts_lose_them() {
 /// step.
 #[test]
 fn dropouts_are_as_frequent_and_as_long_as_asked() {
-    let dropouts = Dropouts { rate_hz: 2.0, mean_s: 0.05 };
+    let dropouts = MeasurementDropouts { rate_hz: 2.0, mean_s: 0.05 };
     let mut sensors = sensors(Sensing { dropouts: Some(dropouts), ..Sensing::default() }, 8);
     let n = 2_000_000_u32;
     let (mut lost, mut count, mut last_fresh, mut held) = (0_u32, 0_u32, true, Motion::default().measure());
@@ -173,7 +173,7 @@ fn dropouts_are_as_frequent_and_as_long_as_asked() {
 
 #[test]
 fn age_grows_in_a_dropout() {
-    let dropouts = Dropouts { rate_hz: 1000.0, mean_s: 0.01 };
+    let dropouts = MeasurementDropouts { rate_hz: 1000.0, mean_s: 0.01 };
     let mut sensors = sensors(Sensing { dropouts: Some(dropouts), delay_s: 0.003, ..Sensing::default() }, 2);
     assert!(sensors.measure(&motion(0)).fresh, "the first one arrives");
     let mut expected_s = 0.003;
@@ -189,7 +189,7 @@ fn age_grows_in_a_dropout() {
 #[test]
 fn the_same_seed_measures_the_same_and_dropouts_do_not_change_the_noise() {
     let sensing = Sensing { noise: Deviations::all(0.01), bias: Deviations::all(0.1), ..Sensing::default() };
-    let lossy = Sensing { dropouts: Some(Dropouts { rate_hz: 100.0, mean_s: 0.01 }), ..sensing };
+    let lossy = Sensing { dropouts: Some(MeasurementDropouts { rate_hz: 100.0, mean_s: 0.01 }), ..sensing };
     let run = |sensing, seed| {
         let mut sensors = sensors(sensing, seed);
         (0..1000).map(|_| sensors.measure(&Motion::default())).collect::<Vec<_>>()
@@ -215,6 +215,9 @@ fn settings_out_of_range_are_refused_by_name() {
     );
     assert_eq!(refused(Sensing { delay_s: 1.0, ..ok() }), "delay_s");
     assert_eq!(refused(Sensing { period_s: 1.0, ..ok() }), "period_s");
-    assert_eq!(refused(Sensing { dropouts: Some(Dropouts { rate_hz: -1.0, mean_s: 0.1 }), ..ok() }), "rate_hz");
+    assert_eq!(
+        refused(Sensing { dropouts: Some(MeasurementDropouts { rate_hz: -1.0, mean_s: 0.1 }), ..ok() }),
+        "rate_hz"
+    );
     assert_eq!(StateSensor::new(&ok(), 0, 0.0).unwrap_err().range.name, "step_s");
 }

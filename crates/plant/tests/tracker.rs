@@ -3,7 +3,7 @@
 
 use crate::common;
 use afbc_plant::instruments::{TrackerFix, TrackerModel};
-use afbc_plant::{Dropouts, InstrumentSuite, Truth};
+use afbc_plant::{InstrumentSuite, MeasurementDropouts, Truth};
 use common::{STEP_S, assert_sigma, coordinates, mean, rest, rotation, run};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -129,7 +129,7 @@ fn the_frame_is_shifted_and_turned() {
 #[test]
 fn dropouts_lose_fixes_and_freezes_repeat_them() {
     let noisy = TrackerModel { position_m: 0.001, ..TrackerModel::DEFAULT };
-    let chain = Dropouts { rate_hz: 0.5, mean_s: 0.2 };
+    let chain = MeasurementDropouts { rate_hz: 0.5, mean_s: 0.2 };
     let all = fixes(noisy, 6, 2_000_000);
     let share = |count: usize| {
         let (begins, ends) = (1.0 - (-0.5 * STEP_S).exp(), 1.0 - (-STEP_S / 0.2).exp());

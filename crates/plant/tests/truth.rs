@@ -1,10 +1,10 @@
 //! Compares the instruments' input with finite differences of the motion and with forces written out.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
-use afbc_plant::noise::{Noise, Stream};
+use afbc_plant::noise::{Noise, NoiseStream};
 use afbc_plant::{
-    Contact, Drag, Environment, GroundEffect, Gust, GustKind, Motion, Plant, PlantModel, Realism, Rotors, Start, Truth,
-    Turbulence, Wind,
+    Contact, Drag, Environment, GroundEffect, Gust, GustKind, Motion, Plant, PlantModel, Realism, RotorStart, Rotors,
+    Truth, Turbulence, Wind,
 };
 use afbc_types::{Axis, Parameters, RotorSpeeds};
 use nalgebra::{Quaternion, Vector3, Vector4};
@@ -38,7 +38,7 @@ fn calm() -> Environment {
 
 /// Visits random flights: tilted, turning, at heights from which some fall to the ground.
 fn flights(mut visit: impl FnMut(&mut Plant, &mut Noise)) {
-    let mut noise = Noise::new(11, Stream::Scenario);
+    let mut noise = Noise::new(11, NoiseStream::Scenario);
     for seed in 0..20 {
         for model in [PlantModel::RigidBody, PlantModel::Simplified] {
             let initial = Motion {
@@ -140,7 +140,7 @@ fn rest_is_felt_as_gravity_upward() {
     let rest = Contact::PAPER.foot_depth_m - Contact::PAPER.sink_m;
     let initial = Motion { position_m: Vector3::new(0.0, 0.0, rest), ..Motion::default() };
     let realism = Realism {
-        rotors: Rotors { start: Start::Idle, max_rad_s: 317.0, ..Rotors::default() },
+        rotors: Rotors { start: RotorStart::Idle, max_rad_s: 317.0, ..Rotors::default() },
         contact: Some(Contact::PAPER),
         ..Realism::default()
     };

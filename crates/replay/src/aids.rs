@@ -1,7 +1,7 @@
 //! Makes measurements for the estimator from the aiding sensors in a log, with assumed measurement errors.
 
 use crate::recording::{Aiding, SampleSource, Sensor, flip};
-use afbc_estimator::{Measurement, Origin, Stamped};
+use afbc_estimator::{GeodeticOrigin, Measurement, Stamped};
 use nalgebra::Vector3;
 
 /// Limits on the standard deviations of a receiver's position, height \[m\] and velocity \[m/s\]: smallest and largest.
@@ -38,7 +38,7 @@ impl Fix {
     pub(crate) fn is_place(&self) -> bool {
         let [latitude, longitude, altitude] = self.place;
         // A receiver without a fix reports latitude and longitude zero.
-        Origin::new(latitude, longitude, altitude).is_some() && (latitude, longitude) != (0.0, 0.0)
+        GeodeticOrigin::new(latitude, longitude, altitude).is_some() && (latitude, longitude) != (0.0, 0.0)
     }
 }
 
@@ -56,7 +56,7 @@ pub(crate) fn begin(fixes: &[Fix]) -> Option<&Fix> {
 }
 
 /// Returns the fixes as measurements; `delay_us` is the receiver's delay.
-pub(crate) fn gnss(fixes: &[Fix], origin: &Origin, delay_us: u64) -> Vec<Aiding> {
+pub(crate) fn gnss(fixes: &[Fix], origin: &GeodeticOrigin, delay_us: u64) -> Vec<Aiding> {
     let sigma = |stated: f64, (least, most): (f64, f64)| stated.max(least).min(most) as f32;
     let aiding = |fix: &Fix| {
         let [latitude, longitude, altitude] = fix.place;

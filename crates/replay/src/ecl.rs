@@ -5,7 +5,7 @@ use crate::aids::{self, Fix};
 use crate::order::rising;
 use crate::recording::{LoggedState, Recording, SampleSource, Sensor, flip, flip_rotation};
 use crate::{earth, states};
-use afbc_estimator::{ImuSample, Origin};
+use afbc_estimator::{GeodeticOrigin, ImuSample};
 use std::collections::HashMap;
 use std::ffi::OsString;
 use std::fs;
@@ -73,7 +73,7 @@ pub(crate) fn read(bytes: &[u8], path: &Path) -> Result<Recording, String> {
     }
     let first = aids::begin(&fixes).copied();
     if let Some(Fix { place: [latitude, longitude, altitude], .. }) = first {
-        recording.origin = Origin::new(latitude, longitude, altitude);
+        recording.origin = GeodeticOrigin::new(latitude, longitude, altitude);
     }
     if let Some(Fix { place: [latitude, longitude, altitude], .. }) = written {
         let field = earth::at(latitude, longitude, altitude, None);
@@ -107,7 +107,7 @@ fn are_exchanged(fixes: &[Fix]) -> bool {
     let Some(first) = fixes.first() else { return false };
     let local = |order: fn(&[f64; 3]) -> (f64, f64), fix: &Fix| {
         let (from, to) = (order(&first.place), order(&fix.place));
-        let origin = Origin::new(from.0, from.1, 0.0)?;
+        let origin = GeodeticOrigin::new(from.0, from.1, 0.0)?;
         let place = origin.local(to.0, to.1, 0.0);
         Some([f64::from(place.x), f64::from(-place.y)])
     };

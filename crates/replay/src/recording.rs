@@ -1,6 +1,6 @@
 //! The contents of a log, in this project's frames and units.
 
-use afbc_estimator::{ImuSample, Measurement, Origin, Settings, Stamped};
+use afbc_estimator::{GeodeticOrigin, ImuSample, Measurement, Settings, Stamped};
 use nalgebra::Vector3;
 
 /// A sensor, or a part of the log's own estimate.
@@ -104,7 +104,7 @@ pub struct Recording {
     /// Times \[us\] at which the log's disarmed flag has a new value, and that value.
     pub disarmed: Vec<(u64, bool)>,
     /// Origin of all positions, if there is one.
-    pub origin: Option<Origin>,
+    pub origin: Option<GeodeticOrigin>,
     /// True if the log's positions start at `origin`; false if they start at an origin that the log does not state.
     pub knows_origin: bool,
     /// Direction of magnetic north, positive to the east \[rad\].

@@ -2,7 +2,9 @@
 
 use crate::compare::{Figures, turn};
 use crate::recording::{LoggedState, Recording};
-use afbc_estimator::{Aids, Dropped, Estimate, Estimator, ImuHealth, Memory, Resets, Settings, Sigmas, Unready};
+use afbc_estimator::{
+    AidRecords, DroppedMeasurements, Estimate, Estimator, ImuHealth, Memory, Resets, Settings, Sigmas, Unready,
+};
 use afbc_types::{OutOfRange, State};
 use nalgebra::{Quaternion, Vector3};
 
@@ -72,9 +74,9 @@ pub struct Replayed {
     /// How the estimator started.
     pub start: EstimatorStart,
     /// Statistics of the fused measurements.
-    pub aids: Aids,
+    pub aids: AidRecords,
     /// Statistics of the measurements that were dropped before fusion.
-    pub dropped: Dropped,
+    pub dropped: DroppedMeasurements,
     /// Resets of our estimate.
     pub resets: Resets,
     /// Health of the IMU at the end.

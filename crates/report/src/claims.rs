@@ -2,9 +2,9 @@
 
 use afbc_scenario::contender::ControllerKind;
 use afbc_scenario::paper;
-use afbc_sim::flown::Flown;
+use afbc_sim::flown::ScenarioFlight;
 use afbc_sim::metrics::tracking_error;
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use nalgebra::Vector4;
 
 /// A claim of the paper's Section IV, and the result of checking it.
@@ -27,8 +27,8 @@ pub const TAIL_S: f64 = 5.0;
 
 /// Checks the three claims on the first scenario that both laws have flown. Returns an empty list if there is no such
 /// scenario, or if it is shorter than the paper's experiment. No claim holds if a vehicle was lost.
-pub fn claims(flown: &[Flown]) -> Vec<Claim> {
-    let find = |kind, of: &Flown| {
+pub fn claims(flown: &[ScenarioFlight]) -> Vec<Claim> {
+    let find = |kind, of: &ScenarioFlight| {
         let whole = of.scenario.duration_s >= paper::DURATION_S;
         flown.iter().find(|f| whole && f.run.contender.kind() == kind && f.scenario == of.scenario).map(|f| &f.run)
     };
@@ -46,17 +46,17 @@ pub fn claims(flown: &[Flown]) -> Vec<Claim> {
 }
 
 /// Returns the mean |error| over the last [`TAIL_S`].
-fn tail(run: &Run) -> Vector4<f64> {
+fn tail(run: &FlightResult) -> Vector4<f64> {
     let end_s = run.log.last().map_or(0.0, |last| last.time_s);
     let tail = run.log.iter().filter(|sample| sample.time_s >= end_s - TAIL_S);
     let (sum, count) = tail.fold((Vector4::zeros(), 0), |(sum, n), s| (sum + tracking_error(s).abs(), n + 1));
     sum / f64::from(count.max(1))
 }
 
-fn weigh(afbc: &Run, baseline: &Run) -> [(&'static str, bool, String); 3] {
+fn weigh(afbc: &FlightResult, baseline: &FlightResult) -> [(&'static str, bool, String); 3] {
     let (left, kept) = (tail(afbc), tail(baseline));
     let (close, far) = (afbc.metrics.rmse, baseline.metrics.rmse);
-    let chatter = |run: &Run| run.metrics.mean_abs_delta_u * 1000.0;
+    let chatter = |run: &FlightResult| run.metrics.mean_abs_delta_u * 1000.0;
     let (rough, smooth) = (chatter(afbc), chatter(baseline));
     [
         (

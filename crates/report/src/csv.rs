@@ -6,7 +6,7 @@ use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
 use afbc_sim::columns::{ESTIMATE, MOTION};
 use afbc_sim::flight::Sample;
-use afbc_sim::flown::Flown;
+use afbc_sim::flown::ScenarioFlight;
 use afbc_types::{Axis, PerAxis, State};
 use csv::ByteRecord;
 use nalgebra::Vector4;
@@ -187,7 +187,7 @@ fn real(scenario: &Scenario) -> Vec<Column> {
 }
 
 /// Returns every row of a flight's log.
-fn rows<'a>(Flown { scenario, run }: &'a Flown) -> impl Iterator<Item = Row<'a>> {
+fn rows<'a>(ScenarioFlight { scenario, run }: &'a ScenarioFlight) -> impl Iterator<Item = Row<'a>> {
     let model = ModelConstants::new(&scenario.vehicle.to_f32());
     let row =
         move |(sample, extremes): (&'a Sample, &'a _)| Row { sample, extremes, lyapunov: lyapunov(&model, sample) };
@@ -195,7 +195,7 @@ fn rows<'a>(Flown { scenario, run }: &'a Flown) -> impl Iterator<Item = Row<'a>>
 }
 
 /// Returns the columns of the flight's CSV file with their values. Names end in the unit; flags are 0 and 1.
-pub fn values(flown: &Flown) -> Vec<(String, Vec<f64>)> {
+pub fn values(flown: &ScenarioFlight) -> Vec<(String, Vec<f64>)> {
     let columns = columns(&flown.scenario, &flown.run.contender);
     let mut values = vec![Vec::with_capacity(flown.run.log.len()); columns.len()];
     for row in rows(flown) {
@@ -211,7 +211,7 @@ pub fn values(flown: &Flown) -> Vec<(String, Vec<f64>)> {
 }
 
 /// Writes the header and one line per logged step.
-pub(super) fn write(out: &mut dyn Write, flown: &Flown) -> io::Result<()> {
+pub(super) fn write(out: &mut dyn Write, flown: &ScenarioFlight) -> io::Result<()> {
     let columns = columns(&flown.scenario, &flown.run.contender);
     let mut writer = csv::Writer::from_writer(out);
     writer.write_record(columns.iter().map(|column| &column.name))?;

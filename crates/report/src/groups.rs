@@ -2,7 +2,7 @@
 
 use crate::words::{case_words, slug};
 use afbc_scenario::Scenario;
-use afbc_sim::flown::Flown;
+use afbc_sim::flown::ScenarioFlight;
 use std::collections::HashSet;
 
 /// The flights of one scenario, and their file names.
@@ -10,7 +10,7 @@ pub(super) struct Group<'a> {
     /// The scenario that all of them flew.
     pub(super) scenario: &'a Scenario,
     /// Flights in the order flown; never empty.
-    pub(super) flights: Vec<&'a Flown>,
+    pub(super) flights: Vec<&'a ScenarioFlight>,
     /// File name of each flight's log.
     pub(super) csv_names: Vec<String>,
     /// Prefix of `fig4-trajectory.svg` etc.
@@ -18,7 +18,7 @@ pub(super) struct Group<'a> {
 }
 
 /// Groups flights by scenario, in the order flown, and names their files.
-pub(super) fn groups(flown: &[Flown]) -> Vec<Group<'_>> {
+pub(super) fn groups(flown: &[ScenarioFlight]) -> Vec<Group<'_>> {
     let mut groups: Vec<Group<'_>> = Vec::new();
     for flight in flown {
         match groups.iter_mut().find(|group| group.scenario == &flight.scenario) {

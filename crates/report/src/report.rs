@@ -6,12 +6,12 @@ use crate::figures::Picture;
 use crate::groups::Group;
 use crate::{explore, reality, table, words};
 use afbc::reference::ReferenceModel;
-use afbc::{Limits, Settings};
+use afbc::{PositionControlLimits, Settings};
 use afbc_control::Smoothing;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::{Contender, ControllerKind, Law};
 use afbc_scenario::trajectory::Trajectory;
-use afbc_types::{Axis, Declared, PerAxis, Value};
+use afbc_types::{Axis, Declared, DeclaredValue, PerAxis};
 use core::convert::Infallible;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -324,7 +324,7 @@ fn gains(contender: &Contender) -> Markup {
         if feed_forward {
             settings += &format!(", corners fed forward at {forward_rad_s} rad/s");
         }
-        if limits != Limits::NONE {
+        if limits != PositionControlLimits::NONE {
             settings += &format!(
                 ", limits: tilt {} rad at {} rad/s, {} m/s², {} m/s, climb {} m/s",
                 limits.tilt_max_rad,
@@ -390,7 +390,7 @@ fn by_name(law: &Law) -> Markup {
 fn listed(gains: &impl Declared) -> Vec<(String, f32)> {
     let mut list = Vec::new();
     let Ok(()) = gains.visit(&mut |declaration, value| {
-        if let Value::Single([gain]) = value {
+        if let DeclaredValue::Single([gain]) = value {
             let dot = if declaration.group.is_empty() { "" } else { "." };
             list.push((format!("{}{dot}{}", declaration.group, declaration.range.name), *gain));
         }

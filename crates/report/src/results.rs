@@ -6,9 +6,9 @@ use afbc_plant::PlantModel;
 use afbc_scenario::Scenario;
 use afbc_scenario::case::{Case, Reading, Uncertainty};
 use afbc_scenario::paper::scenario;
-use afbc_sim::flown::Flown;
+use afbc_sim::flown::ScenarioFlight;
 use afbc_sim::metrics::Metrics;
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use afbc_types::OutOfRange;
 use core::fmt::Write;
 
@@ -54,12 +54,15 @@ pub fn scenarios() -> Result<Vec<(String, Scenario)>, OutOfRange> {
 ///
 /// # Errors
 /// Fails with the first parameter, gain or setting out of range.
-pub fn fly(scenarios: Vec<(String, Scenario)>, progress: &dyn Fn()) -> Result<Vec<(String, Flown)>, OutOfRange> {
+pub fn fly(
+    scenarios: Vec<(String, Scenario)>,
+    progress: &dyn Fn(),
+) -> Result<Vec<(String, ScenarioFlight)>, OutOfRange> {
     let mut flown = Vec::new();
     for (name, scenario) in scenarios {
         for contender in &scenario.contenders {
-            let run = Run::fly(&scenario, contender, u64::MAX)?;
-            flown.push((name.clone(), Flown { scenario: scenario.clone(), run }));
+            let run = FlightResult::fly(&scenario, contender, u64::MAX)?;
+            flown.push((name.clone(), ScenarioFlight { scenario: scenario.clone(), run }));
             progress();
         }
     }
@@ -67,14 +70,14 @@ pub fn fly(scenarios: Vec<(String, Scenario)>, progress: &dyn Fn()) -> Result<Ve
 }
 
 /// Formats the table as Markdown.
-pub fn markdown(flown: &[(String, Flown)]) -> String {
+pub fn markdown(flown: &[(String, ScenarioFlight)]) -> String {
     let mut table = String::from(
         "| scenario | plant | law | RMSE x | y | z | psi | max x | y | z | psi | final x | y | z | psi \
          | mean \\|dU1\\| | dU2 | dU3 | dU4 |\n|---|---|---|",
     );
     table.push_str(&"--:|".repeat(16));
     table.push('\n');
-    for (name, Flown { scenario, run }) in flown {
+    for (name, ScenarioFlight { scenario, run }) in flown {
         let figures = match run.lost {
             Some(lost) => format!("lost at {:.3} s: {}{}", lost.time_s, lost.reason, " |".repeat(16)),
             None => row(&run.metrics),

@@ -2,8 +2,8 @@
 
 use afbc::Profile;
 use afbc_scenario::case::{Reading, Sign};
-use afbc_sim::flown::Flown;
-use afbc_sim::metrics::{Aid, AidMetrics, EstimateMetrics, SETTLED_S};
+use afbc_sim::flown::ScenarioFlight;
+use afbc_sim::metrics::{AidMetrics, AidSource, EstimateMetrics, SETTLED_S};
 use nalgebra::Vector4;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -62,7 +62,7 @@ struct AidWords {
 impl From<EstimateMetrics> for Estimate {
     fn from(metrics: EstimateMetrics) -> Self {
         let EstimateMetrics { position_m, velocity_m_s, attitude_rad, nees, valid_ratio, aids } = metrics;
-        let heard = Aid::ALL.into_iter().zip(aids).filter(|(_, aid)| aid.fused + aid.rejected > 0);
+        let heard = AidSource::ALL.into_iter().zip(aids).filter(|(_, aid)| aid.fused + aid.rejected > 0);
         let aid = |(aid, AidMetrics { fused, rejected, nis, .. })| AidWords {
             name: name(aid),
             fused,
@@ -83,15 +83,15 @@ impl From<EstimateMetrics> for Estimate {
     }
 }
 
-const fn name(aid: Aid) -> &'static str {
+const fn name(aid: AidSource) -> &'static str {
     match aid {
-        Aid::TrackerPosition => "tracker-position",
-        Aid::TrackerAttitude => "tracker-attitude",
-        Aid::GnssPosition => "gnss-position",
-        Aid::GnssHeight => "gnss-height",
-        Aid::GnssVelocity => "gnss-velocity",
-        Aid::Height => "height",
-        Aid::Heading => "heading",
+        AidSource::TrackerPosition => "tracker-position",
+        AidSource::TrackerAttitude => "tracker-attitude",
+        AidSource::GnssPosition => "gnss-position",
+        AidSource::GnssHeight => "gnss-height",
+        AidSource::GnssVelocity => "gnss-velocity",
+        AidSource::Height => "height",
+        AidSource::Heading => "heading",
     }
 }
 
@@ -109,7 +109,7 @@ impl From<Vector4<f64>> for Outputs {
     }
 }
 
-fn summary(Flown { scenario, run }: &Flown) -> Summary<'_> {
+fn summary(ScenarioFlight { scenario, run }: &ScenarioFlight) -> Summary<'_> {
     let uncertainty = scenario.case.and_then(|case| case.uncertainty);
     let measured = |figures: Vector4<f64>| run.is_settled().then_some(figures);
     Summary {
@@ -140,7 +140,7 @@ fn summary(Flown { scenario, run }: &Flown) -> Summary<'_> {
 ///
 /// # Errors
 /// Fails if writing to `out` fails.
-pub fn write(out: &mut dyn Write, flown: &[Flown]) -> io::Result<()> {
+pub fn write(out: &mut dyn Write, flown: &[ScenarioFlight]) -> io::Result<()> {
     let summaries: Vec<_> = flown.iter().map(summary).collect();
     serde_json::to_writer_pretty(&mut *out, &summaries)?;
     writeln!(out)

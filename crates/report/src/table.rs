@@ -3,7 +3,7 @@
 use crate::claims::Claim;
 use crate::groups::{Group, groups};
 use crate::words;
-use afbc_sim::flown::Flown;
+use afbc_sim::flown::ScenarioFlight;
 use afbc_sim::metrics::{Metrics, SETTLED_S};
 use core::cell::Cell;
 use nalgebra::Vector4;
@@ -77,13 +77,13 @@ pub(super) const BLOCKS: [Block; 4] = [
 
 impl Block {
     /// Returns the flights that have a row in this block.
-    pub(super) fn rows<'a>(&self, group: &'a Group<'_>) -> impl Iterator<Item = &'a Flown> {
+    pub(super) fn rows<'a>(&self, group: &'a Group<'_>) -> impl Iterator<Item = &'a ScenarioFlight> {
         let all = self.first;
         group.flights.iter().copied().filter(move |flight| all || flight.run.lost.is_none())
     }
 
     /// Returns the four values of a run, or dashes if there was nothing to measure.
-    pub(super) fn cells(&self, flight: &Flown) -> [String; 4] {
+    pub(super) fn cells(&self, flight: &ScenarioFlight) -> [String; 4] {
         let values: [f64; 4] = (self.values)(&flight.run.metrics).into();
         if self.needs_settled && !flight.run.is_settled() {
             return values.map(|_| "-".into());
@@ -115,7 +115,7 @@ pub(super) fn legend() -> String {
 
 /// Formats flights and claims. For each scenario and law there are the RMSE, largest and final error of each axis, and
 /// the smoothness of each input.
-pub fn table(flown: &[Flown], claims: &[Claim]) -> String {
+pub fn table(flown: &[ScenarioFlight], claims: &[Claim]) -> String {
     let mut lines = Vec::new();
     let groups = groups(flown);
     for group in &groups {

@@ -2,14 +2,14 @@
 
 use afbc::Profile;
 use afbc_plant::{
-    CosineGust, Gust, GustKind, Misreading, ParameterChange, Payload, PlantParameter, Realism, RotorFault, Rotors,
-    Sensing, SensorFault, Wind,
+    CosineGust, Gust, GustKind, Payload, PlantParameter, PlantParameterChange, Realism, RotorFault, Rotors, Sensing,
+    SensorFault, SensorFaultKind, Wind,
 };
 use afbc_scenario::Scenario;
 use afbc_scenario::case::{Reading, Sign};
 use afbc_scenario::contender::Contender;
 use afbc_sim::metrics::{EstimateMetrics, Metrics};
-use afbc_sim::run::Tripped;
+use afbc_sim::run::MonitorTrip;
 use afbc_types::Axis;
 
 /// Returns a file name without extension: letters, digits and `_` of `name`, and `-` for every other character.
@@ -99,7 +99,7 @@ pub(super) fn fault(fault: &RotorFault) -> String {
 }
 
 /// Formats a parameter change: "inertia +75 %".
-pub(super) fn change(change: &ParameterChange) -> String {
+pub(super) fn change(change: &PlantParameterChange) -> String {
     let quantity = match change.quantity {
         PlantParameter::Mass => "mass",
         PlantParameter::Inertia => "inertia",
@@ -125,9 +125,9 @@ pub(super) fn sensor_fault(fault: &SensorFault) -> String {
         Some(axis) => (axis.name(), "rad"),
     };
     match fault.misreading {
-        Misreading::Factor(factor) => format!("{name} times {factor}"),
-        Misreading::Offset(offset) => format!("{name} off by {offset} {unit}"),
-        Misreading::Frozen => format!("{name} frozen"),
+        SensorFaultKind::Factor(factor) => format!("{name} times {factor}"),
+        SensorFaultKind::Offset(offset) => format!("{name} off by {offset} {unit}"),
+        SensorFaultKind::Frozen => format!("{name} frozen"),
     }
 }
 
@@ -236,7 +236,7 @@ pub(super) fn estimate(estimate: &EstimateMetrics) -> String {
 }
 
 /// Formats a trip: "the monitor switched to backstepping at t = 15.625 s: rotors stay saturated".
-pub(super) fn tripped(tripped: &Tripped) -> String {
+pub(super) fn tripped(tripped: &MonitorTrip) -> String {
     let reason = tripped.reason;
     let reason = reason.strip_prefix("AFBC off: ").unwrap_or(reason);
     format!("the monitor switched to backstepping at t = {:.3} s: {reason}", tripped.time_s)

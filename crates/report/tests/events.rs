@@ -3,7 +3,7 @@
 
 mod common;
 
-use afbc_plant::{Environment, ParameterChange, PlantParameter};
+use afbc_plant::{Environment, PlantParameter, PlantParameterChange};
 use afbc_report::flights;
 use common::{boxes, eventful, flown, folder, labels, number, open, svgs};
 use roxmltree::{Document, Node};
@@ -81,8 +81,8 @@ fn two_of_the_same_that_overlap_are_distinguished() {
     two.environment = Environment::new(
         two.vehicle,
         vec![
-            ParameterChange { quantity: PlantParameter::Mass, factor: 1.1, start_s: 1.0, end_s: 8.0 },
-            ParameterChange { quantity: PlantParameter::Mass, factor: 1.1, start_s: 2.0, end_s: 9.0 },
+            PlantParameterChange { quantity: PlantParameter::Mass, factor: 1.1, start_s: 1.0, end_s: 8.0 },
+            PlantParameterChange { quantity: PlantParameter::Mass, factor: 1.1, start_s: 2.0, end_s: 9.0 },
         ],
         Vec::new(),
     )

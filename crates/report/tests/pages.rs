@@ -7,14 +7,14 @@ use afbc_campaign::compare::Comparison;
 use afbc_campaign::random::{self, FlownDraw, Random, Seen};
 use afbc_campaign::suite::{SUITES, Suite};
 use afbc_campaign::{QUANTITIES, compare};
-use afbc_plant::{Environment, ParameterChange, PlantParameter, RotorFault};
+use afbc_plant::{Environment, PlantParameter, PlantParameterChange, RotorFault};
 use afbc_report::random::Judged;
 use afbc_report::{self as report, flights};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::{Scenario, built_in};
 use afbc_sim::flight::Lost;
-use afbc_sim::flown::Flown;
-use afbc_sim::run::Run;
+use afbc_sim::flown::ScenarioFlight;
+use afbc_sim::run::FlightResult;
 use afbc_vehicles::BUILT_IN;
 use common::{OWN, captions, eventful, flown, folder, gone_alike, hover, labels, named, open, page, svgs, words};
 use nalgebra::Vector4;
@@ -89,7 +89,7 @@ fn captions_explain_exactly_what_the_figure_shows() {
     let mut changed = eventful();
     changed.environment = Environment::new(
         changed.vehicle,
-        vec![ParameterChange { quantity: PlantParameter::Mass, factor: 1.1, start_s: 1.0, end_s: 8.0 }],
+        vec![PlantParameterChange { quantity: PlantParameter::Mass, factor: 1.1, start_s: 1.0, end_s: 8.0 }],
         Vec::new(),
     )
     .unwrap();
@@ -114,8 +114,8 @@ fn captions_explain_exactly_what_the_figure_shows() {
     let paper = Scenario { duration_s: 30.0, ..built_in("paper").unwrap().read().unwrap() };
     let chatter = folder("captions-chatter");
     let contender = paper.contenders.iter().find(|contender| contender.name == "afbc").unwrap().clone();
-    let run = Run::fly(&paper, &contender, 10).unwrap();
-    flights::write(&open(&chatter), &[Flown { scenario: paper, run }], &[]).unwrap();
+    let run = FlightResult::fly(&paper, &contender, 10).unwrap();
+    flights::write(&open(&chatter), &[ScenarioFlight { scenario: paper, run }], &[]).unwrap();
     let said = captions(&chatter);
     assert_eq!(said.iter().filter(|text| text.contains("chatter")).count(), 1, "{said:?}");
 

@@ -2,7 +2,7 @@
 
 use crate::FlownLaw;
 use crate::laws::{AnyController, AnyControllerMemory};
-use afbc::monitor::Norm;
+use afbc::monitor::EstimateNorms;
 use afbc::{AdaptiveEstimate, Guarded};
 use afbc_control::{Action, FlightController};
 use afbc_onboard::{AnyFlight, Configuration, ControlInputs, FlightLaw, Readings, Report};
@@ -40,7 +40,7 @@ impl<const N: usize> AnyControllerMemory<N> {
 }
 
 impl<const N: usize> FlightLaw<N> for AnyController<N> {
-    fn norms(memory: &AnyControllerMemory<N>) -> Option<(Axis, Norm)> {
+    fn norms(memory: &AnyControllerMemory<N>) -> Option<(Axis, EstimateNorms)> {
         match memory {
             AnyControllerMemory::Monitored(memory) => Guarded::norms(memory),
             _ => None,

@@ -4,13 +4,13 @@ pub use crate::laws::{ControllerKind, Law};
 
 use crate::AnyController;
 use crate::laws::law_gains;
-use afbc::monitor::Bounds;
+use afbc::monitor::MonitorBounds;
 use afbc::{Guarded, LAG_S, Profile, Safeguards, Settings, adaptive, by_rule, slowness};
 use afbc_control::FlightController;
 use afbc_files::read::FileError;
 use afbc_laws::slowed;
 use afbc_types::{
-    Airframe, Axis, Declaration, Declared, OutOfRange, Parameters, PerAxis, Rotor, ValueMut, with_rotors,
+    Airframe, Axis, Declaration, Declared, DeclaredValueMut, OutOfRange, Parameters, PerAxis, Rotor, with_rotors,
 };
 use afbc_vehicles::Vehicle;
 use core::convert::Infallible;
@@ -112,8 +112,8 @@ impl Contender {
         let limits = &mut self.settings.limits;
         limits.tilt_max_rad = limits.tilt_max_rad.max(tilt_max_rad);
         limits.acceleration_max_m_s2 = limits.acceleration_max_m_s2.max(G_M_S2 * libm::tanf(tilt_max_rad));
-        let Ok(()) = self.law.visit_mut(&mut |declaration: &Declaration, value: ValueMut<'_>| {
-            if let (TILT_MAX, ValueMut::Single([tilt])) = (declaration.range.name, value) {
+        let Ok(()) = self.law.visit_mut(&mut |declaration: &Declaration, value: DeclaredValueMut<'_>| {
+            if let (TILT_MAX, DeclaredValueMut::Single([tilt])) = (declaration.range.name, value) {
                 // No further than the law's range, or its controller would be refused.
                 *tilt = tilt.max(tilt_max_rad).min(declaration.range.max as f32);
             }
@@ -234,7 +234,7 @@ impl Contender {
         let vehicle = Airframe::<N>::new(parameters, rotors)?;
         match &self.law {
             Law::Afbc(gains) if self.monitored => {
-                let bounds = Bounds::new(gains, &vehicle.parameters, &self.settings);
+                let bounds = MonitorBounds::new(gains, &vehicle.parameters, &self.settings);
                 Ok(AnyController::Monitored(Guarded::new(vehicle, self.settings, *gains, bounds)?))
             }
             law => law.controller(vehicle, self.settings),

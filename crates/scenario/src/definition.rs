@@ -2,7 +2,7 @@
 
 use crate::case::Case;
 use crate::contender::{Contender, ControllerKind};
-use crate::told::{Told, stated};
+use crate::told::{AssumedInstruments, stated};
 use crate::trajectory::Trajectory;
 use afbc::Profile;
 use afbc_estimator::Settings;
@@ -10,10 +10,10 @@ use afbc_files::read::FileError;
 use afbc_files::read::words::out_of_range;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::Response;
-use afbc_plant::instruments::{Imu, InstrumentFault};
+use afbc_plant::instruments::{ImuModel, InstrumentFault};
 use afbc_plant::{
-    Deviations, Environment, Frame, InstrumentSuite, Instruments, Motion, Plant, PlantModel, Realism, Rotors, Sensing,
-    SensorFault, StateSensor,
+    Deviations, Environment, InstrumentSuite, Motion, Plant, PlantModel, Realism, RotorLayout, Rotors, Sensing,
+    SensorFault, SimulatedInstruments, StateSensor,
 };
 use afbc_types::{Mounting, OutOfRange, Parameters, Range, Rotor};
 use afbc_vehicles::{Vehicle, data_sheet};
@@ -70,7 +70,7 @@ pub struct Scenario {
     /// Instruments for the vehicle's estimator; their mounting is in the vehicle's file.
     pub instruments: InstrumentSuite,
     /// Instrument properties that the vehicle's software is told.
-    pub told: Told,
+    pub told: AssumedInstruments,
     /// Failures of the instruments.
     pub instrument_faults: Vec<InstrumentFault>,
     /// Outages of the link.
@@ -200,7 +200,7 @@ impl Scenario {
     /// # Errors
     /// The first setting that is out of range.
     pub fn plant(&self, step_s: f64) -> Result<Plant, OutOfRange> {
-        let environment = self.environment.clone().with_frame(Frame::new(&self.rotors)?);
+        let environment = self.environment.clone().with_frame(RotorLayout::new(&self.rotors)?);
         if self.is_ideal() {
             return Ok(Plant::new(self.model, self.initial, environment));
         }
@@ -221,9 +221,9 @@ impl Scenario {
 
     /// Returns the instrument properties that the vehicle is told before a campaign draws its variations.
     #[must_use]
-    pub fn told_before_draws(&self) -> Told {
+    pub fn told_before_draws(&self) -> AssumedInstruments {
         match &self.told {
-            Told::Stated => Told::Suite(Box::new(self.told())),
+            AssumedInstruments::Stated => AssumedInstruments::Suite(Box::new(self.told())),
             told => told.clone(),
         }
     }
@@ -234,9 +234,9 @@ impl Scenario {
     pub fn told(&self) -> InstrumentSuite {
         let there = &self.instruments;
         let told = match &self.told {
-            Told::Stated => stated(there, self.vehicle_file.as_ref()),
-            Told::Drawn => *there,
-            Told::Suite(told) => **told,
+            AssumedInstruments::Stated => stated(there, self.vehicle_file.as_ref()),
+            AssumedInstruments::Drawn => *there,
+            AssumedInstruments::Suite(told) => **told,
         };
         InstrumentSuite {
             imu: there.imu.map(|own| told.imu.unwrap_or(own)),
@@ -252,7 +252,7 @@ impl Scenario {
     #[must_use]
     pub fn estimation(&self, step_s: f64) -> Settings {
         let told = self.told();
-        let imu = told.imu.unwrap_or(Imu::DEFAULT);
+        let imu = told.imu.unwrap_or(ImuModel::DEFAULT);
         let settings = data_sheet::settings(&told, &imu, self.rotors.len(), self.vehicle.gravity_m_s2, step_s);
         self.vehicle_file.as_ref().map_or(settings, |vehicle| vehicle.stated_over(settings))
     }
@@ -273,13 +273,13 @@ impl Scenario {
     ///
     /// # Errors
     /// The first setting that is out of range.
-    pub fn instruments(&self, step_s: f64) -> Result<Option<Instruments>, OutOfRange> {
+    pub fn instruments(&self, step_s: f64) -> Result<Option<SimulatedInstruments>, OutOfRange> {
         if self.instruments == InstrumentSuite::default() {
             return Ok(None);
         }
         let mounting = self.mounting();
         let suite =
-            InstrumentSuite { imu: self.instruments.imu.map(|imu| Imu { mounting, ..imu }), ..self.instruments };
-        Instruments::new(&suite, &self.instrument_faults, self.seed, step_s).map(Some)
+            InstrumentSuite { imu: self.instruments.imu.map(|imu| ImuModel { mounting, ..imu }), ..self.instruments };
+        SimulatedInstruments::new(&suite, &self.instrument_faults, self.seed, step_s).map(Some)
     }
 }

@@ -26,5 +26,5 @@ pub use laws::{
     AnyController, AnyControllerMemory, OWN_GAINS_MAX, OwnController, OwnFlight, OwnGain, OwnGains, OwnKind, OwnLaw,
     OwnMemory, OwnVehicle,
 };
-pub use told::Told;
+pub use told::AssumedInstruments;
 pub use vehicle_named::{vehicle_named, vehicle_of};

@@ -3,11 +3,12 @@
 use crate::Scenario;
 use crate::case::{Case, Reading, Uncertainty};
 use crate::contender::{Contender, ControllerKind};
-use crate::told::Told;
+use crate::told::AssumedInstruments;
 use crate::trajectory::Trajectory;
 use afbc::Profile;
 use afbc_plant::{
-    Environment, Gust, GustKind, InstrumentSuite, Motion, ParameterChange, PlantModel, PlantParameter, Realism, Sensing,
+    Environment, Gust, GustKind, InstrumentSuite, Motion, PlantModel, PlantParameter, PlantParameterChange, Realism,
+    Sensing,
 };
 use afbc_types::{Axis, OutOfRange, PLUS, Parameters};
 use nalgebra::Vector3;
@@ -40,7 +41,7 @@ pub fn scenario(model: PlantModel, case: Case) -> Result<Scenario, OutOfRange> {
     });
     let changes = case.uncertainty.map_or(Vec::new(), |Uncertainty { inertia, thrust }| {
         let [start_s, end_s] = UNCERTAIN_S;
-        let change = |quantity, factor| ParameterChange { quantity, factor, start_s, end_s };
+        let change = |quantity, factor| PlantParameterChange { quantity, factor, start_s, end_s };
         vec![
             change(PlantParameter::Inertia, inertia.factor(0.75)),
             change(PlantParameter::ThrustFactor, thrust.factor(0.4)),
@@ -60,7 +61,7 @@ pub fn scenario(model: PlantModel, case: Case) -> Result<Scenario, OutOfRange> {
         sensing: Sensing::default(),
         sensor_faults: Vec::new(),
         instruments: InstrumentSuite::default(),
-        told: Told::Stated,
+        told: AssumedInstruments::Stated,
         instrument_faults: Vec::new(),
         outages: Vec::new(),
         flight_core: false,

@@ -5,7 +5,7 @@ use afbc_vehicles::Vehicle;
 
 /// Source of the instrument properties that a vehicle's software is told.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
-pub enum Told {
+pub enum AssumedInstruments {
     /// The IMU properties in the vehicle's file. All others, and the IMU without such an entry, are as in the
     /// scenario's file before a campaign draws variations.
     #[default]

@@ -103,7 +103,7 @@ fn files_know_it() {
     let scenario = afbc_scenario::parse("test.toml", text, "test").unwrap();
     let values = |law: &Law| {
         let mut values = Vec::new();
-        let Ok(()) = law.visit(&mut |_: &_, value: afbc_types::Value<'_>| {
+        let Ok(()) = law.visit(&mut |_: &_, value: afbc_types::DeclaredValue<'_>| {
             values.extend(value.numbers());
             Ok::<(), core::convert::Infallible>(())
         });

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
 use afbc_scenario::trajectory::minimum_snap::{PaceLimits, distance_m, minimum_snap};
-use afbc_scenario::trajectory::polynomial::{Coefficients, PolynomialPiece, peaks};
+use afbc_scenario::trajectory::polynomial::{PolynomialCoefficients, PolynomialPiece, peaks};
 use afbc_scenario::trajectory::{Reference, SAMPLES, Trajectory};
 use core::f64::consts::TAU;
 use proptest::prelude::*;
@@ -23,7 +23,7 @@ fn places() -> impl Strategy<Value = Vec<[f64; 4]>> {
 }
 
 /// Returns the derivative of this order at `s`, computed term by term.
-fn derivative(coefficients: &Coefficients, order: i32, s: f64) -> f64 {
+fn derivative(coefficients: &PolynomialCoefficients, order: i32, s: f64) -> f64 {
     let falling = |power: i32| (0..order).map(|k| f64::from(power - k)).product::<f64>();
     (order..8).map(|power| coefficients[power as usize] * falling(power) * s.powi(power - order)).sum()
 }
@@ -94,7 +94,7 @@ proptest! {
         // pieces is changed.
         prop_assume!(at + 1 < bumped.len());
         let [left, right] = [bumped[at].duration_s, bumped[at + 1].duration_s];
-        let knot = |t: f64| -> Coefficients {
+        let knot = |t: f64| -> PolynomialCoefficients {
             // A septic with velocity 1 at 0 and all other end conditions zero.
             [0.0, 1.0, 0.0, 0.0, -20.0 / t.powi(3), 45.0 / t.powi(4), -36.0 / t.powi(5), 10.0 / t.powi(6)]
         };

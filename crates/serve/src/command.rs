@@ -2,10 +2,10 @@
 
 use crate::hand::{Grip, SIDES};
 use afbc_files::read::words::{nearest, out_of_range};
-use afbc_plant::instruments::{Failure, limits as failure};
+use afbc_plant::instruments::{FailureKind, limits as failure};
 use afbc_plant::rotors::limits as rotor;
 use afbc_plant::wind::limits as gust;
-use afbc_plant::{Battery, GUST_SIZE, PAYLOAD_BELOW, PAYLOAD_MASS, PlantParameter, Turbulence, Wind};
+use afbc_plant::{BatteryModel, GUST_SIZE, PAYLOAD_BELOW, PAYLOAD_MASS, PlantParameter, Turbulence, Wind};
 use afbc_scenario::contender::ControllerKind;
 use afbc_types::Range;
 use nalgebra::Vector3;
@@ -85,7 +85,7 @@ pub enum WorldChange {
     /// A failure of an instrument.
     Fault {
         /// Kind of failure.
-        failure: Failure,
+        failure: FailureKind,
         /// Duration \[s\]; `None`: permanent.
         seconds: Option<f64>,
     },
@@ -241,7 +241,7 @@ fn change(word: &str, words: &mut Words<'_>) -> Result<WorldChange, String> {
             rotor: words.whole("the number of a rotor", rotor::ROTOR.max as u32)? as u8,
             efficiency: words.number(&rotor::EFFICIENCY)?,
         },
-        "battery" => WorldChange::Battery(words.number(&Battery::CHARGE.range)?),
+        "battery" => WorldChange::Battery(words.number(&BatteryModel::CHARGE.range)?),
         "hold" => WorldChange::Hold(grip(words)?),
         "clear" => WorldChange::Clear,
         _ => {
@@ -271,43 +271,43 @@ fn grip(words: &mut Words<'_>) -> Result<Grip, String> {
 }
 
 /// Parses how an instrument fails, such as `gnss jumped 5 0 0`.
-fn fault(words: &mut Words<'_>) -> Result<Failure, String> {
+fn fault(words: &mut Words<'_>) -> Result<FailureKind, String> {
     let instrument = words.word("an instrument, as in: fault gnss lost")?;
-    let of = |failure: &&Failure| failure.name().split_once('-').is_some_and(|(of, _)| of == instrument);
-    let known: Vec<Failure> = Failure::ALL.iter().filter(of).copied().collect();
+    let of = |failure: &&FailureKind| failure.name().split_once('-').is_some_and(|(of, _)| of == instrument);
+    let known: Vec<FailureKind> = FailureKind::ALL.iter().filter(of).copied().collect();
     if known.is_empty() {
         let wanted = "it must be imu, tracker, gnss, barometer or magnetometer";
         return Err(format!("fault: {} is no instrument; {wanted}", shown(instrument)));
     }
-    let kind = |failure: Failure| failure.name().split_once('-').map_or("", |(_, kind)| kind);
+    let kind = |failure: FailureKind| failure.name().split_once('-').map_or("", |(_, kind)| kind);
     let kinds = known.iter().map(|failure| kind(*failure)).collect::<Vec<_>>().join(", ");
     let how = words.word(&format!("what is wrong with the {instrument}: {kinds}"))?;
     let Some(failure) = known.iter().find(|failure| kind(**failure) == how) else {
         return Err(format!("fault {instrument}: {} is none of {kinds}", shown(how)));
     };
     Ok(match failure {
-        Failure::ImuNoisy { .. } => Failure::ImuNoisy {
+        FailureKind::ImuNoisy { .. } => FailureKind::ImuNoisy {
             rates_rad_s: words.number(&failure::RATES)?,
             specific_force_m_s2: words.number(&failure::FORCE)?,
         },
-        Failure::ImuClipped { .. } => Failure::ImuClipped {
+        FailureKind::ImuClipped { .. } => FailureKind::ImuClipped {
             rates_rad_s: words.number(&failure::RATES)?,
             specific_force_m_s2: words.number(&failure::FORCE)?,
         },
-        Failure::ImuBiased { .. } => Failure::ImuBiased {
+        FailureKind::ImuBiased { .. } => FailureKind::ImuBiased {
             rates_bias_rad_s: words.vector(&failure::RATES_BIAS)?,
             force_bias_m_s2: words.vector(&failure::FORCE_BIAS)?,
         },
-        Failure::TrackerJumped { .. } => {
-            Failure::TrackerJumped { by_m: words.vector(&failure::JUMP)?, yaw_rad: words.number(&failure::YAW)? }
+        FailureKind::TrackerJumped { .. } => {
+            FailureKind::TrackerJumped { by_m: words.vector(&failure::JUMP)?, yaw_rad: words.number(&failure::YAW)? }
         }
-        Failure::GnssJumped { .. } => Failure::GnssJumped { by_m: words.vector(&failure::JUMP)? },
-        Failure::GnssMultipath { .. } => Failure::GnssMultipath {
+        FailureKind::GnssJumped { .. } => FailureKind::GnssJumped { by_m: words.vector(&failure::JUMP)? },
+        FailureKind::GnssMultipath { .. } => FailureKind::GnssMultipath {
             deviation_m: words.number(&failure::DEVIATION)?,
             correlation_time_s: words.number(&failure::CORRELATION)?,
         },
-        Failure::MagnetometerDisturbed { .. } => {
-            Failure::MagnetometerDisturbed { field_ut: words.vector(&failure::FIELD)? }
+        FailureKind::MagnetometerDisturbed { .. } => {
+            FailureKind::MagnetometerDisturbed { field_ut: words.vector(&failure::FIELD)? }
         }
         plain => *plain,
     })

@@ -58,14 +58,14 @@ impl<'a> Frame<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use afbc_mavlink::{Address, Downlink, Key, SIGNED_FRAME_MAX, Sender, Stamp};
+    use afbc_mavlink::{Address, Downlink, Encoder, SIGNED_FRAME_MAX, SigningKey, Stamp};
 
     #[test]
     fn signed_frames_stay_whole() {
-        let mut sender = Sender::new(Address { system: 1, component: 1 });
+        let mut sender = Encoder::new(Address { system: 1, component: 1 });
         let beat = Downlink::Heartbeat { armed: false, failsafe: false, mode: 0 };
         let text = Downlink::Text { severity: afbc_mavlink::MavSeverity::MAV_SEVERITY_INFO, text: "on".into() };
-        let (key, stamp) = (Key([1; 32]), Stamp { link: 0, time_10us: 5 });
+        let (key, stamp) = (SigningKey([1; 32]), Stamp { link: 0, time_10us: 5 });
         let sent: Vec<Vec<u8>> = [(&beat, false), (&text, true), (&beat, true), (&text, false), (&beat, true)]
             .map(|(message, signed)| {
                 let signer = signed.then_some((&key, stamp));

@@ -5,7 +5,7 @@
 
 use crate::waypoint_file;
 use afbc_files::read::FileError;
-use afbc_mavlink::{MissionItem, Place};
+use afbc_mavlink::{GlobalPosition, MissionItem};
 use serde_json::Value;
 
 /// MAVLink frames MAV_FRAME_GLOBAL and MAV_FRAME_LOCAL_NED.
@@ -221,7 +221,7 @@ fn simple_item(item: &Part<'_>, number: u16, names: &[Option<u64>]) -> Result<Mi
     let units = if frame == LOCAL_NED { 1e4 } else { 1e7 };
     // Values out of range stay out of range. A missing coordinate must not become a place at 0.
     let in_units = |coordinate: f64| match coordinate {
-        left_out if left_out.is_nan() => Place::AS_IT_IS,
+        left_out if left_out.is_nan() => GlobalPosition::AS_IT_IS,
         coordinate => (coordinate * units).clamp(-2e9, 2e9).round() as i32,
     };
     Ok(MissionItem {

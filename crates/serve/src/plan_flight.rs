@@ -5,7 +5,7 @@ use crate::vehicle::ServedVehicle;
 use afbc_comms::services::modes::custom;
 use afbc_ground::{Client, CommandState, Patience, UploadEnd};
 use afbc_guidance::FlightMode;
-use afbc_mavlink::{Answer, Command, Downlink, Mission, MissionItem, Plan};
+use afbc_mavlink::{CommandResult, Downlink, MissionItem, MissionMessage, MissionType, VehicleCommand};
 
 /// Peer number of the station.
 const PEER: u32 = 0;
@@ -93,12 +93,12 @@ impl Station<'_> {
         }
         self.get_ready()?;
         // The fence comes first: the vehicle checks the mission against it.
-        self.upload(&plan.fence, Plan::FENCE, "geoFence")?;
-        self.upload(&plan.rally, Plan::RALLY, "rallyPoints")?;
-        self.upload(&plan.mission, Plan::MISSION, "mission")?;
-        self.order(Command::Arm)?;
+        self.upload(&plan.fence, MissionType::FENCE, "geoFence")?;
+        self.upload(&plan.rally, MissionType::RALLY, "rallyPoints")?;
+        self.upload(&plan.mission, MissionType::MISSION, "mission")?;
+        self.order(VehicleCommand::Arm)?;
         let begun_ms = self.now_ms;
-        self.order(Command::StartMission(0, None))?;
+        self.order(VehicleCommand::StartMission(0, None))?;
         let limit_ms = begun_ms + (limit_s * 1e3) as u64;
         while self.now_ms < limit_ms && self.armed() && !self.complete && !self.is_stopped() {
             self.step();
@@ -139,7 +139,7 @@ impl Station<'_> {
     fn get_ready(&mut self) -> Result<(), String> {
         let mut texts = Vec::new();
         while self.now_ms < READY_MS {
-            self.client.command(Command::CheckArming, Patience::ONCE);
+            self.client.command(VehicleCommand::CheckArming, Patience::ONCE);
             self.wait(HEARTBEAT_MS);
             texts = self.take_texts();
             if texts.iter().any(|text| text == "ready to arm") {
@@ -149,7 +149,7 @@ impl Station<'_> {
         Err(format!("the vehicle does not get ready: {}", texts.join(", ")))
     }
 
-    fn upload(&mut self, items: &[MissionItem], plan: Plan, part: &str) -> Result<(), String> {
+    fn upload(&mut self, items: &[MissionItem], plan: MissionType, part: &str) -> Result<(), String> {
         self.take_texts();
         self.client.upload([(plan, items.to_vec())], Patience::ONCE);
         loop {
@@ -167,14 +167,14 @@ impl Station<'_> {
         }
     }
 
-    fn order(&mut self, command: Command) -> Result<(), String> {
+    fn order(&mut self, command: VehicleCommand) -> Result<(), String> {
         self.take_texts();
         self.client.command(command, Patience::ONCE);
         while self.client.state(command) == Some(CommandState::Waiting) {
             self.step();
         }
         match self.client.answer(command) {
-            Some(Answer::Accepted) => {
+            Some(CommandResult::Accepted) => {
                 // Wait until the heartbeat shows the new state.
                 self.wait(HEARTBEAT_MS);
                 Ok(())
@@ -201,8 +201,10 @@ impl Station<'_> {
         let time_s = *now_ms as f64 * 1e-3;
         let bytes = vehicle.step(|text| log(&format!("{time_s:.3} {text}")));
         client.hear(&bytes, |_, message| match message {
-            Downlink::Mission { message: Mission::Reached(number), .. } => reached.push(*number),
-            Downlink::Mission { message: Mission::Current(current), .. } => *complete = current.state == COMPLETE,
+            Downlink::Mission { message: MissionMessage::Reached(number), .. } => reached.push(*number),
+            Downlink::Mission { message: MissionMessage::Current(current), .. } => {
+                *complete = current.state == COMPLETE
+            }
             _ => (),
         });
         let holds = client.vehicle().armed && client.vehicle().mode == custom(FlightMode::Hold);

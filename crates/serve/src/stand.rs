@@ -2,7 +2,7 @@
 
 use afbc_files::read::FileError;
 use afbc_files::read::words::out_of_range;
-use afbc_plant::{Motion, Realism, Rotors, Start};
+use afbc_plant::{Motion, Realism, RotorStart, Rotors};
 use afbc_scenario::Scenario;
 use nalgebra::Vector3;
 
@@ -47,7 +47,7 @@ fn standing(scenario: &Scenario) -> Result<Scenario, FileError> {
     let Realism { rotors, drag, contact, ground_effect, .. } = scenario.realism;
     // Disarmed motors stand still, even if the motors idle at some speed in flight.
     let rotors =
-        Rotors { start: Start::Idle, min_rad_s: 0.0, battery: rotors.battery.or(paper.rotors.battery), ..rotors };
+        Rotors { start: RotorStart::Idle, min_rad_s: 0.0, battery: rotors.battery.or(paper.rotors.battery), ..rotors };
     let contact = contact.or(paper.contact);
     scenario.realism = Realism { rotors, drag: drag.or(paper.drag), contact, ground_effect, ..scenario.realism };
     let height_m = contact.map_or(0.0, |contact| contact.foot_depth_m - contact.sink_m);

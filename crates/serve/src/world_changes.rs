@@ -4,7 +4,7 @@ use crate::command::WorldChange;
 use afbc_files::read::words::out_of_range;
 use afbc_plant::instruments::InstrumentFault;
 use afbc_plant::{
-    CosineGust, Environment, Gust, GustKind, InstrumentSuite, ParameterChange, Payload, RotorFault, Wind,
+    CosineGust, Environment, Gust, GustKind, InstrumentSuite, Payload, PlantParameterChange, RotorFault, Wind,
 };
 use afbc_scenario::Scenario;
 use afbc_sim::flight::World;
@@ -66,7 +66,7 @@ impl WorldChanges {
                 load(world, |gusts_now, _, _| gusts_now.extend(gusts.into_iter().filter(|gust| gust.size != 0.0)))
             }
             WorldChange::Change { quantity, factor, seconds } => load(world, |_, changes, _| {
-                changes.push(ParameterChange { quantity, factor, start_s: now_s, end_s: until(seconds) });
+                changes.push(PlantParameterChange { quantity, factor, start_s: now_s, end_s: until(seconds) });
             }),
             WorldChange::Payload { mass_kg, below_m } => load(world, |_, _, payloads| {
                 // Keep payloads that the scenario adds later.
@@ -154,12 +154,12 @@ impl WorldChanges {
 /// Changes gusts, parameter changes and payloads; removes those that are over.
 fn load(
     world: &mut World,
-    change: impl FnOnce(&mut Vec<Gust>, &mut Vec<ParameterChange>, &mut Vec<Payload>),
+    change: impl FnOnce(&mut Vec<Gust>, &mut Vec<PlantParameterChange>, &mut Vec<Payload>),
 ) -> Result<(), String> {
     let now_s = world.plant().time_s();
     let old = world.plant().environment();
     let mut gusts: Vec<Gust> = old.gusts().iter().filter(|gust| gust.end_s > now_s).copied().collect();
-    let mut changes: Vec<ParameterChange> = old.changes().iter().filter(|it| it.end_s > now_s).copied().collect();
+    let mut changes: Vec<PlantParameterChange> = old.changes().iter().filter(|it| it.end_s > now_s).copied().collect();
     let mut payloads = old.payloads().to_vec();
     change(&mut gusts, &mut changes, &mut payloads);
     bounded(gusts.len().max(changes.len()))?;

@@ -4,7 +4,7 @@
 use afbc::Trip;
 use afbc_comms::services::modes;
 use afbc_guidance::FlightMode;
-use afbc_mavlink::{Address, AttitudeAndThrust, Command, ExternalTarget, FRAME_MAX, Sender, Uplink};
+use afbc_mavlink::{Address, AttitudeAndThrust, Encoder, ExternalTarget, FRAME_MAX, Uplink, VehicleCommand};
 use afbc_plant::Motion;
 use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
@@ -20,7 +20,7 @@ struct Flown {
 
 impl Flown {
     fn hear(&mut self, message: Uplink) {
-        self.server.hear(0, 1, Sender::new(STATION).send(&message, &mut [0; FRAME_MAX]));
+        self.server.hear(0, 1, Encoder::new(STATION).send(&message, &mut [0; FRAME_MAX]));
     }
 
     fn run(&mut self, milliseconds: u32) {
@@ -39,9 +39,9 @@ impl Flown {
         let scenario = built_in(scenario).unwrap().read().unwrap();
         let mut flown = Flown { server: Server::new(&fleet(&scenario, 1).unwrap(), 1).unwrap(), lines: Vec::new() };
         flown.run(15_000);
-        flown.hear(Uplink::Command(Command::Arm));
+        flown.hear(Uplink::Command(VehicleCommand::Arm));
         flown.run(100);
-        flown.hear(Uplink::Command(Command::SelectMode(modes::custom(FlightMode::Takeoff))));
+        flown.hear(Uplink::Command(VehicleCommand::SelectMode(modes::custom(FlightMode::Takeoff))));
         flown.run(10_000);
         flown
     }
@@ -57,7 +57,7 @@ impl Flown {
                 })));
             }
             if time_ms == 50 {
-                self.hear(Uplink::Command(Command::SelectMode(modes::custom(FlightMode::Offboard))));
+                self.hear(Uplink::Command(VehicleCommand::SelectMode(modes::custom(FlightMode::Offboard))));
             }
             self.run(1);
         }
@@ -74,7 +74,7 @@ impl Flown {
                 self.hear(Uplink::Target(ExternalTarget::Attitude(target)));
             }
             if time_ms == 20 {
-                self.hear(Uplink::Command(Command::SelectMode(modes::custom(FlightMode::Offboard))));
+                self.hear(Uplink::Command(VehicleCommand::SelectMode(modes::custom(FlightMode::Offboard))));
             }
             if time_ms % 100 == 0 {
                 motions.push(self.motion());
@@ -137,7 +137,7 @@ fn a_return_ends_on_the_ground_without_a_trip() {
     for name in ["mocap", "outdoor"] {
         let mut flown = Flown::hovering(name);
         flown.fly([4.0, 3.0, 0.0], 4000);
-        flown.hear(Uplink::Command(Command::Return));
+        flown.hear(Uplink::Command(VehicleCommand::Return));
         flown.run(60_000);
         assert!(flown.lines.last().unwrap().contains("disarmed"), "{name}: {:?}", flown.lines);
         flown.has_not_tripped(name);

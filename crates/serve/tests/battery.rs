@@ -5,8 +5,10 @@
 use afbc_comms::services::modes::custom;
 use afbc_comms::services::origin::EarthOrigin;
 use afbc_guidance::FlightMode;
-use afbc_mavlink::{Address, Command, Datum, Decoder, Downlink, FRAME_MAX, Height, Place, Sender, Uplink};
-use afbc_plant::Battery;
+use afbc_mavlink::{
+    Address, Datum, Decoder, Downlink, Encoder, FRAME_MAX, GlobalPosition, Height, Uplink, VehicleCommand,
+};
+use afbc_plant::BatteryModel;
 use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
 use nalgebra::Vector3;
@@ -32,21 +34,21 @@ struct Moment {
 fn an_empty_battery_warns_returns_and_lands() {
     let mut scenario = fleet(&built_in("outdoor").unwrap().read().unwrap(), 1).unwrap().pop().unwrap();
     let battery = scenario.realism.rotors.battery.unwrap();
-    scenario.realism.rotors.battery = Some(Battery { initial_charge: 0.2, capacity_a_h: 0.9, ..battery });
-    let (mut server, mut sender) = (Server::new(&[scenario], 1).unwrap(), Sender::new(STATION));
+    scenario.realism.rotors.battery = Some(BatteryModel { initial_charge: 0.2, capacity_a_h: 0.9, ..battery });
+    let (mut server, mut sender) = (Server::new(&[scenario], 1).unwrap(), Encoder::new(STATION));
     let mut decoder = Decoder::<Downlink>::new(STATION);
     let origin = EarthOrigin::new(EarthOrigin::SIMULATED).unwrap();
     let [latitude_e7, longitude_e7] = origin.global(&Vector3::from(FAR)).e7();
-    let place = Place { latitude_e7, longitude_e7, height: Height { metres: FAR[2], above: Datum::Home } };
-    let go = Command::Reposition { place, yaw_rad: f32::NAN, speed_m_s: Some(10.0), changes_mode: true };
+    let place = GlobalPosition { latitude_e7, longitude_e7, height: Height { metres: FAR[2], above: Datum::Home } };
+    let go = VehicleCommand::Reposition { place, yaw_rad: f32::NAN, speed_m_s: Some(10.0), changes_mode: true };
 
     // Collect every change of mode with its state, and every line about the battery.
     let (mut modes, mut lines) = (Vec::<(u32, Moment)>::new(), Vec::<(String, Moment)>::new());
     let mut has_landed = false;
     for ms in 0..END {
         let message = match ms {
-            ARM => Some(Uplink::Command(Command::Arm)),
-            TAKE_OFF => Some(Uplink::Command(Command::TakeOff(Height { metres: f32::NAN, above: Datum::Home }))),
+            ARM => Some(Uplink::Command(VehicleCommand::Arm)),
+            TAKE_OFF => Some(Uplink::Command(VehicleCommand::TakeOff(Height { metres: f32::NAN, above: Datum::Home }))),
             GO => Some(Uplink::Command(go)),
             _ if ms % 1_000 == 0 => Some(Uplink::Heartbeat),
             _ => None,

@@ -2,9 +2,11 @@
 //! parse them, the parameters, and the sensors' true errors.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
-use afbc_mavlink::{Address, Answer, CalibrationRequest, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
+use afbc_mavlink::{
+    Address, CalibrationRequest, CommandResult, Decoder, Downlink, Encoder, FRAME_MAX, Uplink, VehicleCommand,
+};
 use afbc_plant::InstrumentSuite;
-use afbc_plant::instruments::{Imu, Magnetometer};
+use afbc_plant::instruments::{ImuModel, MagnetometerModel};
 use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
 use afbc_types::nalgebra::Vector3;
@@ -55,7 +57,7 @@ struct Served {
     server: Server,
     decoder: Decoder<Downlink>,
     texts: Vec<String>,
-    answers: Vec<Answer>,
+    answers: Vec<CommandResult>,
     parameters: BTreeMap<String, f32>,
 }
 
@@ -82,7 +84,7 @@ impl Served {
             let hear = |_: usize, bytes: &[u8]| {
                 decoder.feed(bytes, |_, message| match message {
                     Downlink::Text { text, .. } => texts.push(text.to_str().unwrap_or_default().into()),
-                    Downlink::Answer { command: CALIBRATE | 400, answer, .. } => answers.push(answer),
+                    Downlink::CommandAck { command: CALIBRATE | 400, answer, .. } => answers.push(answer),
                     Downlink::Parameter(value) => {
                         let name: String =
                             value.name.iter().take_while(|it| **it != 0).map(|it| char::from(*it)).collect();
@@ -95,16 +97,16 @@ impl Served {
         }
     }
 
-    fn ask(&mut self, command: Command) {
-        self.server.hear(0, 1, Sender::new(STATION).send(&Uplink::Command(command), &mut [0; FRAME_MAX]));
+    fn ask(&mut self, command: VehicleCommand) {
+        self.server.hear(0, 1, Encoder::new(STATION).send(&Uplink::Command(command), &mut [0; FRAME_MAX]));
         self.answers.clear();
         self.run(20);
     }
 
     fn begin(&mut self, what: CalibrationRequest) {
         self.texts.clear();
-        self.ask(Command::Calibrate(what));
-        assert_eq!(self.answers, [Answer::Accepted]);
+        self.ask(VehicleCommand::Calibrate(what));
+        assert_eq!(self.answers, [CommandResult::Accepted]);
     }
 
     fn line(&mut self, line: &str) {
@@ -122,8 +124,8 @@ impl Served {
 }
 
 fn cheap(suite: InstrumentSuite) -> InstrumentSuite {
-    let magnetometer = Magnetometer { hard_iron_ut: 20.0, soft_iron: 0.03, ..Magnetometer::QMC5883L };
-    InstrumentSuite { imu: Some(Imu::MPU_6000), magnetometer: Some(magnetometer), ..suite }
+    let magnetometer = MagnetometerModel { hard_iron_ut: 20.0, soft_iron: 0.03, ..MagnetometerModel::QMC5883L };
+    InstrumentSuite { imu: Some(ImuModel::MPU_6000), magnetometer: Some(magnetometer), ..suite }
 }
 
 fn instruction(text: &str) -> Status {
@@ -195,8 +197,8 @@ fn a_new_vehicle_is_set_up() {
 
     // After a new alignment, the heading is the true one.
     served.run(15_000);
-    served.ask(Command::Arm);
-    assert_eq!(served.answers, [Answer::Accepted], "{:?}", served.texts);
+    served.ask(VehicleCommand::Arm);
+    assert_eq!(served.answers, [CommandResult::Accepted], "{:?}", served.texts);
 }
 
 /// Calibration is refused while armed, and arming while calibrating. Calibrations can be cancelled, and only one runs
@@ -206,29 +208,29 @@ fn calibration_and_flight_exclude_each_other() {
     let mut served = Served::new(cheap, 12);
     served.run(15_000);
     served.begin(CalibrationRequest::Accelerometer);
-    served.ask(Command::Arm);
-    assert!(matches!(served.answers[..], [Answer::Refused(_)]));
+    served.ask(VehicleCommand::Arm);
+    assert!(matches!(served.answers[..], [CommandResult::Refused(_)]));
     assert_eq!(served.texts.last().map(String::as_str), Some("arming refused: calibrating"));
-    served.ask(Command::Calibrate(CalibrationRequest::Gyroscope));
-    assert!(matches!(served.answers[..], [Answer::Refused(_)]));
-    served.ask(Command::Calibrate(CalibrationRequest::Cancel));
-    assert_eq!(served.answers, [Answer::Accepted]);
+    served.ask(VehicleCommand::Calibrate(CalibrationRequest::Gyroscope));
+    assert!(matches!(served.answers[..], [CommandResult::Refused(_)]));
+    served.ask(VehicleCommand::Calibrate(CalibrationRequest::Cancel));
+    assert_eq!(served.answers, [CommandResult::Accepted]);
     assert_eq!(served.statuses().last(), Some(&Status::Cancelled));
     // MAVSDK sends the cancellation twice.
     let told = served.statuses();
-    served.ask(Command::Calibrate(CalibrationRequest::Cancel));
-    assert_eq!((served.answers.as_slice(), served.statuses()), ([Answer::Accepted].as_slice(), told));
+    served.ask(VehicleCommand::Calibrate(CalibrationRequest::Cancel));
+    assert_eq!((served.answers.as_slice(), served.statuses()), ([CommandResult::Accepted].as_slice(), told));
 
-    served.ask(Command::Arm);
-    assert_eq!(served.answers, [Answer::Accepted], "{:?}", served.texts);
+    served.ask(VehicleCommand::Arm);
+    assert_eq!(served.answers, [CommandResult::Accepted], "{:?}", served.texts);
     for what in [
         CalibrationRequest::Gyroscope,
         CalibrationRequest::Accelerometer,
         CalibrationRequest::Level,
         CalibrationRequest::Magnetometer,
     ] {
-        served.ask(Command::Calibrate(what));
-        assert!(matches!(served.answers[..], [Answer::Refused(_)]));
+        served.ask(VehicleCommand::Calibrate(what));
+        assert!(matches!(served.answers[..], [CommandResult::Refused(_)]));
     }
     assert!(served.parameters.is_empty());
 }
@@ -260,6 +262,6 @@ fn reasons_are_told() {
     served.run(1_500);
     assert_eq!(failed(&served), "no magnetometer readings");
     assert!(served.parameters.is_empty());
-    served.ask(Command::Denied(CALIBRATE));
-    assert_eq!(served.answers, [Answer::Denied]);
+    served.ask(VehicleCommand::Denied(CALIBRATE));
+    assert_eq!(served.answers, [CommandResult::Denied]);
 }

@@ -5,8 +5,8 @@ use afbc_comms::services::modes;
 use afbc_comms::services::origin::EarthOrigin;
 use afbc_guidance::FlightMode;
 use afbc_mavlink::{
-    Address, Command, Datum, Decoder, Downlink, ExternalTarget, FRAME_MAX, Height, ManualControl, Mission, MissionItem,
-    MissionResult, Place, Plan, PositionTarget, Sender, Uplink,
+    Address, Datum, Decoder, Downlink, Encoder, ExternalTarget, FRAME_MAX, GlobalPosition, Height, ManualControl,
+    MissionItem, MissionMessage, MissionResult, MissionType, PositionTarget, Uplink, VehicleCommand,
 };
 use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
@@ -112,10 +112,10 @@ impl Flown {
     }
 
     fn hear(&mut self, message: Uplink) {
-        self.server.hear(0, 1, Sender::new(STATION).send(&message, &mut [0; FRAME_MAX]));
+        self.server.hear(0, 1, Encoder::new(STATION).send(&message, &mut [0; FRAME_MAX]));
     }
 
-    fn command(&mut self, command: Command) {
+    fn command(&mut self, command: VehicleCommand) {
         self.hear(Uplink::Command(command));
     }
 
@@ -126,7 +126,7 @@ impl Flown {
                 |_, bytes| {
                     decoder.feed(bytes, |_, message| match message {
                         Downlink::Position { position_m, .. } => *estimate = position_m.xy(),
-                        Downlink::Mission { message: Mission::Ack(result, _), .. } => acks.push(result),
+                        Downlink::Mission { message: MissionMessage::Ack(result, _), .. } => acks.push(result),
                         _ => (),
                     });
                 },
@@ -145,10 +145,10 @@ impl Flown {
     fn upload(&mut self, areas: Vec<(Shape, bool)>) {
         let items: Vec<_> = areas.iter().flat_map(|(shape, included)| shape.items(*included)).collect();
         self.acks.clear();
-        self.hear(Uplink::Mission(Mission::Count(items.len() as u16, Plan::FENCE)));
+        self.hear(Uplink::Mission(MissionMessage::Count(items.len() as u16, MissionType::FENCE)));
         self.run(5);
         for (item, number) in items.into_iter().zip(0..) {
-            self.hear(Uplink::Mission(Mission::Item(MissionItem { number, ..item }, Plan::FENCE)));
+            self.hear(Uplink::Mission(MissionMessage::Item(MissionItem { number, ..item }, MissionType::FENCE)));
             self.run(5);
         }
         assert_eq!(self.acks, [MissionResult::ACCEPTED], "{:?}", self.lines);
@@ -158,9 +158,9 @@ impl Flown {
     /// Takes off and holds some metres above the ground.
     fn take_off(&mut self, rest_ms: u32) {
         self.run(rest_ms);
-        self.command(Command::Arm);
+        self.command(VehicleCommand::Arm);
         self.run(100);
-        self.command(Command::SelectMode(modes::custom(FlightMode::Takeoff)));
+        self.command(VehicleCommand::SelectMode(modes::custom(FlightMode::Takeoff)));
         self.run(6_000);
     }
 
@@ -169,12 +169,12 @@ impl Flown {
         let origin = EarthOrigin::new(EarthOrigin::SIMULATED).unwrap();
         let to = Vector3::new(random.within(-60.0, 60.0), random.within(-60.0, 60.0), random.within(3.0, 12.0));
         let [latitude_e7, longitude_e7] = origin.global(&to).e7();
-        let place = Place { latitude_e7, longitude_e7, height: Height { metres: to.z, above: Datum::Home } };
+        let place = GlobalPosition { latitude_e7, longitude_e7, height: Height { metres: to.z, above: Datum::Home } };
         let full = |random: &mut Random| [-1.0, 0.0, 1.0, random.within(-1.0, 1.0)][random.below(4) as usize];
         let last_ms = 1000 + random.below(6000) as u32;
         match random.below(6) {
             0 => {
-                self.command(Command::Reposition {
+                self.command(VehicleCommand::Reposition {
                     place,
                     yaw_rad: f32::NAN,
                     speed_m_s: Some(12.0),
@@ -184,11 +184,11 @@ impl Flown {
             }
             1 => {
                 let (radius_m, speed_m_s) = (random.within(2.0, 20.0), f32::NAN);
-                self.command(Command::Orbit { place, radius_m, speed_m_s, angle_deg: 0, heading: 0 });
+                self.command(VehicleCommand::Orbit { place, radius_m, speed_m_s, angle_deg: 0, heading: 0 });
                 self.run(last_ms);
             }
             2 => {
-                self.command(Command::Return);
+                self.command(VehicleCommand::Return);
                 self.run(last_ms);
             }
             3 => {
@@ -220,7 +220,7 @@ impl Flown {
                 self.hear(Uplink::Target(target));
             }
             if time_ms % 1000 == 100 {
-                self.command(Command::SelectMode(modes::custom(mode)));
+                self.command(VehicleCommand::SelectMode(modes::custom(mode)));
             }
             self.run(1);
         }

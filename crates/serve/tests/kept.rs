@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc_mavlink::{
-    Address, Command, Decoder, Downlink, FRAME_MAX, Key, ParameterName, ParameterRequest, Reboot, ReceivedFrame,
-    SIGNED_FRAME_MAX, Sender, SetupSigning, Stamp, Storage, Uplink,
+    Address, Decoder, Downlink, Encoder, FRAME_MAX, ParameterName, ParameterRequest, Reboot, ReceivedFrame,
+    SIGNED_FRAME_MAX, SetupSigning, SigningKey, Stamp, Storage, Uplink, VehicleCommand,
 };
 use afbc_scenario::built_in;
 use afbc_serve::{ParameterFile, Server, fleet};
@@ -30,7 +30,7 @@ fn served(file: &Path) -> Server {
 
 /// Sends a message; returns the messages and lines of the next tenth of a second.
 fn exchange(server: &mut Server, message: Uplink) -> (Vec<Downlink>, Vec<String>) {
-    server.hear(0, 1, Sender::new(STATION).send(&message, &mut [0; FRAME_MAX]));
+    server.hear(0, 1, Encoder::new(STATION).send(&message, &mut [0; FRAME_MAX]));
     let (mut messages, mut lines) = (Vec::new(), Vec::new());
     let mut decoder = Decoder::<Downlink>::new(STATION);
     for _ in 0..100 {
@@ -78,7 +78,7 @@ fn what_is_set_is_there_after_a_restart() {
 
     let mut server = served(&file);
     assert_eq!(["MIS_TAKEOFF_ALT", "RTL_RETURN_ALT"].map(|text| get(&mut server, text)), [4.0, 22.0]);
-    exchange(&mut server, Uplink::Command(Command::Storage(Storage::Reset)));
+    exchange(&mut server, Uplink::Command(VehicleCommand::Storage(Storage::Reset)));
     drop(server);
     assert_eq!(get(&mut served(&file), "MIS_TAKEOFF_ALT"), default);
 }
@@ -88,8 +88,8 @@ fn what_is_set_is_there_after_a_restart() {
 fn a_reboot_restarts_the_vehicle() {
     let mut server = served(&fresh("reboot"));
     set(&mut server, "MIS_TAKEOFF_ALT", 4.0);
-    let (messages, lines) = exchange(&mut server, Uplink::Command(Command::Reboot(Reboot::Program)));
-    assert!(messages.iter().any(|message| matches!(message, Downlink::Answer { command: 246, .. })));
+    let (messages, lines) = exchange(&mut server, Uplink::Command(VehicleCommand::Reboot(Reboot::Program)));
+    assert!(messages.iter().any(|message| matches!(message, Downlink::CommandAck { command: 246, .. })));
     assert!(lines.iter().any(|line| line.ends_with("vehicle 1: restarted")), "{lines:?}");
     assert_eq!(get(&mut server, "MIS_TAKEOFF_ALT"), 4.0);
     // It restarts only once.
@@ -102,7 +102,7 @@ fn a_reboot_restarts_the_vehicle() {
     let default = get(&mut server, "MIS_TAKEOFF_ALT");
     set(&mut server, "MIS_TAKEOFF_ALT", 4.0);
     assert_eq!(get(&mut server, "MIS_TAKEOFF_ALT"), 4.0);
-    exchange(&mut server, Uplink::Command(Command::Reboot(Reboot::Program)));
+    exchange(&mut server, Uplink::Command(VehicleCommand::Reboot(Reboot::Program)));
     assert_eq!(get(&mut server, "MIS_TAKEOFF_ALT"), default);
 }
 
@@ -134,7 +134,7 @@ fn the_system_id_is_a_parameter() {
     assert_eq!(whole(&mut server, "MAV_SYS_ID"), 1);
     set(&mut server, "MAV_SYS_ID", 42.0);
     assert_eq!((heartbeat_of(&mut server, 0), server.systems()), (1, vec![1]));
-    exchange(&mut server, Uplink::Command(Command::Reboot(Reboot::Program)));
+    exchange(&mut server, Uplink::Command(VehicleCommand::Reboot(Reboot::Program)));
     assert_eq!((heartbeat_of(&mut server, 0), server.systems()), (42, vec![42]));
     // The vehicle answers to its new id, and commands know it by that id.
     assert_eq!(whole(&mut server, "MAV_SYS_ID"), 42);
@@ -150,7 +150,7 @@ fn the_system_id_is_a_parameter() {
     let mut server = Server::kept(&scenarios, 5, keepers()).unwrap();
     assert_eq!((server.systems(), server.ambiguous()), (vec![5, 6, 7], None));
     set(&mut server, "MAV_SYS_ID", 7.0);
-    let (_, lines) = exchange(&mut server, Uplink::Command(Command::Reboot(Reboot::Program)));
+    let (_, lines) = exchange(&mut server, Uplink::Command(VehicleCommand::Reboot(Reboot::Program)));
     assert!(lines.iter().any(|line| line.contains("several vehicles have the system id 7")), "{lines:?}");
     assert_eq!((server.systems(), server.ambiguous()), (vec![7, 6, 7], Some(7)));
     drop(server);
@@ -158,7 +158,7 @@ fn the_system_id_is_a_parameter() {
 }
 
 /// Returns the number of messages in a tenth of a second, and how many of them are signed with this key.
-fn signed(server: &mut Server, key: &Key) -> [usize; 2] {
+fn signed(server: &mut Server, key: &SigningKey) -> [usize; 2] {
     let (mut count, mut genuine) = (0, 0);
     let mut decoder = Decoder::<Downlink>::new(STATION);
     for _ in 0..100 {
@@ -177,7 +177,7 @@ fn signed(server: &mut Server, key: &Key) -> [usize; 2] {
 /// The signing key survives a restart of the server, and a restart of the vehicle by a signed command.
 #[test]
 fn a_key_of_signatures_is_kept() {
-    let (file, key) = (fresh("signing"), Key([7; 32]));
+    let (file, key) = (fresh("signing"), SigningKey([7; 32]));
     let mut server = served(&file);
     server.set_wired(true);
     let setup = SetupSigning { key: Some(key), time_10us: 37_000_000_000_000 };
@@ -190,9 +190,9 @@ fn a_key_of_signatures_is_kept() {
     let [count, genuine] = signed(&mut server, &key);
     assert!(count > 0 && genuine == count, "after a restart: {genuine} of {count}");
     let stamp = Stamp { link: 0, time_10us: 37_000_100_000_000 };
-    let reboot = Uplink::Command(Command::Reboot(Reboot::Program));
+    let reboot = Uplink::Command(VehicleCommand::Reboot(Reboot::Program));
     let mut buffer = [0; SIGNED_FRAME_MAX];
-    server.hear(0, 1, Sender::new(STATION).send_signed(&reboot, Some((&key, stamp)), &mut buffer));
+    server.hear(0, 1, Encoder::new(STATION).send_signed(&reboot, Some((&key, stamp)), &mut buffer));
     let mut lines = Vec::new();
     for _ in 0..300 {
         let _ = server.step(|_, _| (), |line| lines.push(line.to_owned()));

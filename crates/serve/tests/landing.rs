@@ -1,7 +1,7 @@
 //! Landings in weather: contact with the ground must not be mistaken for a failing law.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
-use afbc_mavlink::{Address, Command, Datum, FRAME_MAX, Height, Sender, Uplink};
+use afbc_mavlink::{Address, Datum, Encoder, FRAME_MAX, Height, Uplink, VehicleCommand};
 use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
 
@@ -15,13 +15,13 @@ const LAND: u64 = 16_000;
 fn land(number: u8) -> Vec<String> {
     let outdoor = built_in("outdoor").unwrap().read().unwrap();
     let scenario = fleet(&outdoor, number + 1).unwrap().swap_remove(usize::from(number));
-    let (mut server, mut sender) = (Server::new(&[scenario], 1).unwrap(), Sender::new(STATION));
+    let (mut server, mut sender) = (Server::new(&[scenario], 1).unwrap(), Encoder::new(STATION));
     let mut lines = Vec::new();
     for ms in 0..26_000 {
         let message = match ms {
-            ARM => Some(Uplink::Command(Command::Arm)),
-            TAKE_OFF => Some(Uplink::Command(Command::TakeOff(Height { metres: f32::NAN, above: Datum::Home }))),
-            LAND => Some(Uplink::Command(Command::Land)),
+            ARM => Some(Uplink::Command(VehicleCommand::Arm)),
+            TAKE_OFF => Some(Uplink::Command(VehicleCommand::TakeOff(Height { metres: f32::NAN, above: Datum::Home }))),
+            LAND => Some(Uplink::Command(VehicleCommand::Land)),
             _ if ms % 1_000 == 0 => Some(Uplink::Heartbeat),
             _ => None,
         };

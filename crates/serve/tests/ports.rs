@@ -1,7 +1,7 @@
 //! Tests of the ports, on loopback at free ports. No test depends on the speed of the machine.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
-use afbc_mavlink::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
+use afbc_mavlink::{Address, Decoder, Downlink, Encoder, FRAME_MAX, Uplink, VehicleCommand};
 use afbc_scenario::built_in;
 use afbc_serve::{Addresses, Lines, Ports, RunEnd, Server, TimeRate, fleet, run};
 use std::io::{Cursor, ErrorKind, Read, Write};
@@ -57,11 +57,11 @@ fn messages(datagrams: &[Vec<u8>]) -> Vec<Downlink> {
 }
 
 fn command() -> Vec<u8> {
-    Sender::new(STATION).send(&Uplink::Command(Command::Other(31_999)), &mut [0; FRAME_MAX]).to_vec()
+    Encoder::new(STATION).send(&Uplink::Command(VehicleCommand::Other(31_999)), &mut [0; FRAME_MAX]).to_vec()
 }
 
 fn answers(messages: &[Downlink]) -> usize {
-    messages.iter().filter(|message| matches!(message, Downlink::Answer { .. })).count()
+    messages.iter().filter(|message| matches!(message, Downlink::CommandAck { .. })).count()
 }
 
 /// Stations get heartbeats without asking. A client that sends a frame gets everything, until it has been silent too

@@ -1,7 +1,7 @@
 //! Whole flights with bad sensors: a tracker whose frame jumps, GNSS that comes back, vibrating rotors.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
-use afbc_mavlink::{Address, Command, Datum, FRAME_MAX, Height, Sender, Uplink};
+use afbc_mavlink::{Address, Datum, Encoder, FRAME_MAX, Height, Uplink, VehicleCommand};
 use afbc_scenario::{Scenario, built_in};
 use afbc_serve::{Server, fleet};
 use nalgebra::Vector3;
@@ -17,7 +17,7 @@ const MOVES_M: f64 = 0.5;
 /// A vehicle that takes off, and its logged lines.
 struct Session {
     server: Server,
-    sender: Sender,
+    sender: Encoder,
     ms: u64,
     lines: Vec<String>,
 }
@@ -25,14 +25,14 @@ struct Session {
 impl Session {
     fn new(scenario: Scenario) -> Self {
         let server = Server::new(&fleet(&scenario, 1).unwrap(), 1).unwrap();
-        Session { server, sender: Sender::new(STATION), ms: 0, lines: Vec::new() }
+        Session { server, sender: Encoder::new(STATION), ms: 0, lines: Vec::new() }
     }
 
     fn named(name: &str, seed: u64) -> Self {
         Session::new(Scenario { seed, ..built_in(name).unwrap().read().unwrap() })
     }
 
-    fn say(&mut self, command: Command) {
+    fn say(&mut self, command: VehicleCommand) {
         let message = Uplink::Command(command);
         self.server.hear(0, 1, self.sender.send(&message, &mut [0; FRAME_MAX]));
     }
@@ -46,8 +46,8 @@ impl Session {
         let (from_m, mut off_m) = (self.true_m(), 0.0_f64);
         while self.ms < until_ms {
             match self.ms {
-                ARM => self.say(Command::Arm),
-                TAKE_OFF => self.say(Command::TakeOff(Height { metres: 6.0, above: Datum::Here })),
+                ARM => self.say(VehicleCommand::Arm),
+                TAKE_OFF => self.say(VehicleCommand::TakeOff(Height { metres: 6.0, above: Datum::Here })),
                 _ if self.ms.is_multiple_of(1_000) => {
                     self.server.hear(0, 1, self.sender.send(&Uplink::Heartbeat, &mut [0; FRAME_MAX]));
                 }
@@ -96,7 +96,7 @@ fn gnss_that_comes_back_gives_back_what_was_flown() {
     session.line("fault gnss lost 5.5");
     session.run(HOLDS + 9_000 + 5_800);
     // GNSS is back, but the descent has not ended yet: it continues for another second.
-    session.say(Command::Return);
+    session.say(VehicleCommand::Return);
     session.run(HOLDS + 9_000 + 7_000);
     assert!(session.says("return: ordered") && !session.says("refused"), "{:#?}", session.lines);
     assert!(!session.says("AFBC off"), "{:#?}", session.lines);
@@ -114,7 +114,7 @@ fn vibration_does_not_hand_afbc_over() {
         (imu.gyro.vibration_rad_s, imu.accel.vibration_m_s2) = (gyro_rad_s, accel_m_s2);
         let mut session = Session::new(scenario);
         session.run(HOLDS + 4_000);
-        session.say(Command::Land);
+        session.say(VehicleCommand::Land);
         session.run(HOLDS + 24_000);
         assert!(!session.says("AFBC off"), "{name} {gyro_rad_s}: {:#?}", session.lines);
         assert!(session.says("disarmed"), "{name} {gyro_rad_s}: {:#?}", session.lines);

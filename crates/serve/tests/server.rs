@@ -1,7 +1,7 @@
 //! Tests of the server in lockstep, without clock and sockets.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
-use afbc_mavlink::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
+use afbc_mavlink::{Address, Decoder, Downlink, Encoder, FRAME_MAX, Uplink, VehicleCommand};
 use afbc_plant::InstrumentSuite;
 use afbc_scenario::{Scenario, built_in};
 use afbc_serve::{Server, Then, fleet};
@@ -44,12 +44,12 @@ fn read(bytes: &[u8]) -> Vec<(Address, Downlink)> {
 }
 
 fn frame(from: Address, message: Uplink) -> Vec<u8> {
-    Sender::new(from).send(&message, &mut [0; FRAME_MAX]).to_vec()
+    Encoder::new(from).send(&message, &mut [0; FRAME_MAX]).to_vec()
 }
 
 fn answers(bytes: &[u8]) -> Vec<(u8, u16)> {
     let answer = |message: &(Address, Downlink)| match message.1 {
-        Downlink::Answer { command, to, .. } => Some((to.system, command)),
+        Downlink::CommandAck { command, to, .. } => Some((to.system, command)),
         _ => None,
     };
     read(bytes).iter().filter_map(answer).collect()
@@ -104,7 +104,7 @@ fn the_same_session_twice_is_the_same_to_the_bit() {
         let mut all = vec![run(&mut server, 1000)];
         ok(&mut server, "fault magnetometer lost 0.5");
         ok(&mut server, "wind 4 -1 0");
-        server.hear(0, 1, &frame(STATION, Uplink::Command(Command::Arm)));
+        server.hear(0, 1, &frame(STATION, Uplink::Command(VehicleCommand::Arm)));
         server.hear(1, 9, b"noise \xfd\x09");
         all.push(run(&mut server, 1500));
         ok(&mut server, "turbulence severe");
@@ -122,7 +122,7 @@ fn the_same_session_twice_is_the_same_to_the_bit() {
 fn the_streams_of_peers_do_not_mix() {
     let mut server = served("outdoor", 1);
     run(&mut server, 10);
-    let command = Uplink::Command(Command::Other(UNKNOWN));
+    let command = Uplink::Command(VehicleCommand::Other(UNKNOWN));
     let (here, there) = (frame(STATION, command), frame(COMPANION, command));
     let mut heard = Vec::new();
     for place in 0..here.len().max(there.len()) {
@@ -146,7 +146,7 @@ fn the_streams_of_peers_do_not_mix() {
 fn what_is_sent_to_one_vehicle_reaches_no_other() {
     let mut server = served("mocap", 3);
     run(&mut server, 10);
-    server.hear(1, 1, &frame(STATION, Uplink::Command(Command::Other(UNKNOWN))));
+    server.hear(1, 1, &frame(STATION, Uplink::Command(VehicleCommand::Other(UNKNOWN))));
     let said = run(&mut server, 50);
     let counts: Vec<usize> = said.bytes.iter().map(|bytes| answers(bytes).len()).collect();
     assert_eq!(counts, [0, 1, 0]);

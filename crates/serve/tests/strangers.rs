@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_mavlink::{
-    Address, Command, Decoder, Downlink, FRAME_MAX, Key, ReceivedFrame, SIGNED_FRAME_MAX, Sender, SetupSigning, Stamp,
-    Uplink,
+    Address, Decoder, Downlink, Encoder, FRAME_MAX, ReceivedFrame, SIGNED_FRAME_MAX, SetupSigning, SigningKey, Stamp,
+    Uplink, VehicleCommand,
 };
 use afbc_scenario::built_in;
 use afbc_serve::{Addresses, Ports, Server, fleet};
@@ -12,7 +12,7 @@ use std::net::{SocketAddr, TcpStream, UdpSocket};
 use std::time::Duration;
 
 const STATION: Address = Address { system: 255, component: 190 };
-const KEY: Key = Key([7; 32]);
+const KEY: SigningKey = SigningKey([7; 32]);
 const SIGNED_10US: u64 = 37_000_000_000_000;
 /// Most peers per protocol, and most bytes read and written in a step, as docs/serve.md says.
 const PEERS: usize = 32;
@@ -95,7 +95,7 @@ impl Served {
 }
 
 fn frame(message: &Uplink) -> Vec<u8> {
-    Sender::new(STATION).send(message, &mut [0; FRAME_MAX]).to_vec()
+    Encoder::new(STATION).send(message, &mut [0; FRAME_MAX]).to_vec()
 }
 
 fn beat() -> Vec<u8> {
@@ -105,7 +105,7 @@ fn beat() -> Vec<u8> {
 /// Returns a heartbeat signed with the key, with a time stamp this many 10 us after the key was set.
 fn signed_beat(from: Address, later_10us: u64) -> Vec<u8> {
     let stamp = Stamp { link: 3, time_10us: SIGNED_10US + later_10us };
-    Sender::new(from).send_signed(&Uplink::Heartbeat, Some((&KEY, stamp)), &mut [0; SIGNED_FRAME_MAX]).to_vec()
+    Encoder::new(from).send_signed(&Uplink::Heartbeat, Some((&KEY, stamp)), &mut [0; SIGNED_FRAME_MAX]).to_vec()
 }
 
 fn sockets(count: usize) -> Vec<UdpSocket> {
@@ -154,7 +154,7 @@ fn messages(bytes: &[u8]) -> [usize; 2] {
 /// A browser that is tricked into sending frames sends an HTTP header first; other protocols begin differently, too.
 #[test]
 fn a_stream_that_begins_as_another_protocol_is_dropped() {
-    let commands = [frame(&Uplink::Heartbeat), frame(&Uplink::Command(Command::Arm))].concat();
+    let commands = [frame(&Uplink::Heartbeat), frame(&Uplink::Command(VehicleCommand::Arm))].concat();
     let heads: [&[u8]; 8] = [
         b"POST / HTTP/1.1\r\nHost: 127.0.0.1:5760\r\nContent-Type: text/plain\r\nContent-Length: 80\r\n\r\n",
         b"GET /",
@@ -250,10 +250,10 @@ fn with_a_key_only_an_accepted_frame_makes_a_peer() {
     let strangers = sockets(2 * PEERS);
     let wrong_key = {
         let stamp = Stamp { link: 3, time_10us: SIGNED_10US + 50 };
-        let signer = Some((&Key([8; 32]), stamp));
-        Sender::new(STATION).send_signed(&Uplink::Heartbeat, signer, &mut [0; SIGNED_FRAME_MAX]).to_vec()
+        let signer = Some((&SigningKey([8; 32]), stamp));
+        Encoder::new(STATION).send_signed(&Uplink::Heartbeat, signer, &mut [0; SIGNED_FRAME_MAX]).to_vec()
     };
-    let elsewhere = frame(&Uplink::Command(Command::Other(31_999)));
+    let elsewhere = frame(&Uplink::Command(VehicleCommand::Other(31_999)));
     for (place, stranger) in strangers.iter().enumerate() {
         stranger.send_to([&beat(), &wrong_key, &elsewhere][place % 3], served.udp).unwrap();
         served.steps(3);

@@ -1,6 +1,6 @@
 //! Columns that every flight log has.
 
-use crate::flight::{Estimated, Sample};
+use crate::flight::{EstimateErrors, Sample};
 
 /// A column's name, which ends in the unit, and the function that reads its value from a sample.
 pub type SampleColumn = (&'static str, fn(&Sample) -> f64);
@@ -35,7 +35,7 @@ pub const MOTION: [SampleColumn; 25] = [
 ];
 
 /// A column's name and the function that reads its value from the vehicle's own estimate.
-pub type EstimateColumn = (&'static str, fn(&Estimated) -> f32);
+pub type EstimateColumn = (&'static str, fn(&EstimateErrors) -> f32);
 
 /// Columns of the estimate's errors, truth minus estimate, and of their standard deviations. `rx`, `ry` and `rz` are
 /// rotations about the axes of the earth frame.

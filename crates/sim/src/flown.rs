@@ -1,13 +1,13 @@
 //! A flight together with its scenario.
 
-use crate::run::Run;
+use crate::run::FlightResult;
 use afbc_scenario::Scenario;
 
 /// One contender's flight of one scenario.
 #[derive(Clone, Debug)]
-pub struct Flown {
+pub struct ScenarioFlight {
     /// The scenario that was flown.
     pub scenario: Scenario,
     /// The flight.
-    pub run: Run,
+    pub run: FlightResult,
 }

@@ -1,7 +1,7 @@
 //! Figures of merit of one flight.
 
-use crate::flight::{Estimated, Innovation, Sample};
-pub use afbc_estimator::Aid;
+use crate::flight::{EstimateErrors, Innovation, Sample};
+pub use afbc_estimator::AidSource;
 
 use nalgebra::{Vector3, Vector4};
 
@@ -41,7 +41,7 @@ pub struct EstimateMetrics {
     /// Share of the time in which the estimate was valid.
     pub valid_ratio: f64,
     /// Agreement of the measurements with the estimate, in the order of [`Aid::ALL`].
-    pub aids: [AidMetrics; Aid::ALL.len()],
+    pub aids: [AidMetrics; AidSource::ALL.len()],
 }
 
 /// Agreement of one kind of measurements with the estimate.
@@ -132,7 +132,7 @@ impl Accumulator {
     }
 
     #[inline(never)]
-    fn add_estimate(&mut self, estimated: &Estimated) {
+    fn add_estimate(&mut self, estimated: &EstimateErrors) {
         let square = |error: &Vector3<f32>| error.cast::<f64>().map(|x| x * x);
         self.estimates += 1;
         self.estimate.position_m += square(&estimated.position_error_m);
@@ -144,7 +144,7 @@ impl Accumulator {
     }
 
     fn add_innovation(&mut self, innovation: &Innovation) {
-        let of_aid = Aid::ALL.iter().zip(&mut self.estimate.aids).find(|(aid, _)| **aid == innovation.aid);
+        let of_aid = AidSource::ALL.iter().zip(&mut self.estimate.aids).find(|(aid, _)| **aid == innovation.aid);
         let Some((_, metrics)) = of_aid else { return };
         if innovation.fused {
             metrics.fused += 1;

@@ -13,13 +13,13 @@ pub const LOOK_STEPS: u64 = 1024;
 
 /// A flight of a scenario under one contender.
 #[derive(Clone, Debug)]
-pub struct Run {
+pub struct FlightResult {
     /// Contender that flew.
     pub contender: Contender,
     /// When and why the vehicle was lost, if it was.
     pub lost: Option<Lost>,
     /// When and why AFBC's monitor switched to the fallback law, if it did.
-    pub tripped: Option<Tripped>,
+    pub tripped: Option<MonitorTrip>,
     /// Figures of merit, evaluated over every step.
     pub metrics: Metrics,
     /// Samples of every `log_every`-th step and of the last step.
@@ -30,14 +30,14 @@ pub struct Run {
 
 /// A trip of the monitor.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tripped {
+pub struct MonitorTrip {
     /// Time \[s\].
     pub time_s: f64,
     /// Reason in words.
     pub reason: &'static str,
 }
 
-impl Run {
+impl FlightResult {
     /// Returns true if the flight reached the time from which errors are evaluated.
     pub fn is_settled(&self) -> bool {
         self.metrics.settled
@@ -48,13 +48,13 @@ impl Run {
     /// # Errors
     /// Returns the first parameter, gain or setting that is out of range; nothing is flown then.
     pub fn fly(scenario: &Scenario, contender: &Contender, log_every: u64) -> Result<Self, OutOfRange> {
-        Run::fly_unless(scenario, contender, log_every, || false)
+        FlightResult::fly_unless(scenario, contender, log_every, || false)
     }
 
-    /// Flies like [`Run::fly`], but ends early once `is_over` returns true. It is called every [`LOOK_STEPS`].
+    /// Flies like [`FlightResult::fly`], but ends early once `is_over` returns true. It is called every [`LOOK_STEPS`].
     ///
     /// # Errors
-    /// The same as for [`Run::fly`].
+    /// The same as for [`FlightResult::fly`].
     pub fn fly_unless(
         scenario: &Scenario,
         contender: &Contender,
@@ -69,7 +69,7 @@ impl Run {
         let lost = fly_until(scenario, contender, |sample| {
             metrics.add(sample);
             if let Some(reason) = sample.action.health.fallback {
-                tripped.get_or_insert(Tripped { time_s: sample.time_s, reason });
+                tripped.get_or_insert(MonitorTrip { time_s: sample.time_s, reason });
             }
             let u = inputs(sample);
             let extremes = match unlogged.take() {
@@ -89,6 +89,6 @@ impl Run {
             log.push(last);
             input_extremes.push(extremes);
         }
-        Ok(Run { contender: contender.clone(), lost, tripped, metrics: metrics.finish(), log, input_extremes })
+        Ok(FlightResult { contender: contender.clone(), lost, tripped, metrics: metrics.finish(), log, input_extremes })
     }
 }

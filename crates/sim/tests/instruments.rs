@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, missing_docs)] // tests
 
 use afbc_files::read::FileError;
-use afbc_plant::instruments::{Barometer, Gnss, Imu, TrackerModel};
-use afbc_plant::{Dropouts, InstrumentSuite, Truth};
+use afbc_plant::instruments::{BarometerModel, GnssModel, ImuModel, TrackerModel};
+use afbc_plant::{InstrumentSuite, MeasurementDropouts, Truth};
 use afbc_scenario::{Scenario, parse};
 use nalgebra::Vector3;
 
@@ -19,17 +19,17 @@ fn instruments_are_parts_or_tables() {
     let read = |text: &str| example(text).unwrap().instruments;
     assert_eq!(read(""), InstrumentSuite::default());
     let named = read("[instruments]\nimu = \"bmi270\"\ntracker = \"mocap-100\"\nbarometer = \"bmp388\"");
-    let (imu, tracker) = (Some(Imu::BMI270), Some(TrackerModel::MOCAP_100));
+    let (imu, tracker) = (Some(ImuModel::BMI270), Some(TrackerModel::MOCAP_100));
     assert_eq!(
         named,
-        InstrumentSuite { imu, tracker, barometer: Some(Barometer::BMP388), ..InstrumentSuite::default() }
+        InstrumentSuite { imu, tracker, barometer: Some(BarometerModel::BMP388), ..InstrumentSuite::default() }
     );
     let changed = "[instruments.imu]\npart = \"mpu-6000\"\ngyro.bias_rad_s = 0.5\naccel = { vibration_m_s2 = 3 }\n\
                    [instruments.gnss]\nrate_hz = 5\nloss = { rate_hz = 0.1, mean_s = 2 }";
-    let mut imu = Imu::MPU_6000;
+    let mut imu = ImuModel::MPU_6000;
     (imu.gyro.bias_rad_s, imu.accel.vibration_m_s2) = (0.5, 3.0);
-    let loss = Dropouts { rate_hz: 0.1, mean_s: 2.0 };
-    let gnss = Gnss { rate_hz: 5.0, loss, ..Gnss::DEFAULT };
+    let loss = MeasurementDropouts { rate_hz: 0.1, mean_s: 2.0 };
+    let gnss = GnssModel { rate_hz: 5.0, loss, ..GnssModel::DEFAULT };
     assert_eq!(read(changed), InstrumentSuite { imu: Some(imu), gnss: Some(gnss), ..InstrumentSuite::default() });
 }
 

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, missing_docs)] // a flight that cannot begin must stop the test
 
 use afbc::Profile;
-use afbc_plant::Start;
+use afbc_plant::RotorStart;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::trajectory::{Trajectory, Waypoint};
 use afbc_scenario::{Scenario, built_in};
@@ -33,7 +33,7 @@ fn there_and_back(vehicle: &Vehicle, kind: ControllerKind) -> Scenario {
     scenario.contenders = vec![Contender::of(kind, Profile::Flight).monitored()];
     scenario.realism.wind.steady_m_s = Vector3::new(1.0, 1.0, 0.0);
     let mut scenario = scenario.on(vehicle, Profile::Flight).unwrap();
-    scenario.realism.rotors.start = Start::Idle;
+    scenario.realism.rotors.start = RotorStart::Idle;
     scenario
 }
 

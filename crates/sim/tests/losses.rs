@@ -5,7 +5,7 @@ use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::{Scenario, parse};
 use afbc_sim::flight::{GROUNDED_S, LawOnly, Lost, OFF_S, World, fly, lockstep};
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use afbc_types::{Inputs, Parameters, Setpoint, State};
 use core::ops::{ControlFlow, Range};
 
@@ -149,7 +149,7 @@ fn motors_off_in_the_air() {
 fn a_flight_over_before_errors_count_has_no_figures() {
     for (duration_s, settled) in [(4.0, false), (6.0, true)] {
         let scenario = scenario(&format!("duration_s = {duration_s:?}\n{HOVER}[initial]\nposition_m = [0, 0, 1]\n"));
-        let run = Run::fly(&scenario, &Contender::of(ControllerKind::Afbc, afbc::Profile::Flight), 1).unwrap();
+        let run = FlightResult::fly(&scenario, &Contender::of(ControllerKind::Afbc, afbc::Profile::Flight), 1).unwrap();
         assert_eq!((run.is_settled(), run.metrics.measured(1.0)), (settled, settled.then_some(1.0)), "{duration_s} s");
     }
 }

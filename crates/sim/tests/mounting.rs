@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, missing_docs)] // tests
 
 use afbc_estimator::{ImuCalibration, ImuSample};
-use afbc_plant::instruments::Imu;
-use afbc_plant::{Environment, InstrumentSuite, Instruments, Motion, Plant, PlantModel, Truth};
+use afbc_plant::instruments::ImuModel;
+use afbc_plant::{Environment, InstrumentSuite, Motion, Plant, PlantModel, SimulatedInstruments, Truth};
 use afbc_types::{Mounting, Parameters};
 use nalgebra::Vector3;
 
@@ -13,8 +13,8 @@ fn a_calibrated_sensor_is_at_the_centre_of_mass() {
     const STEP_S: f64 = 0.001;
     let plant = Plant::new(PlantModel::RigidBody, Motion::default(), Environment::calm(Parameters::PAPER).unwrap());
     let mounting = Mounting { position_m: Vector3::new(0.2, -0.1, 0.05), attitude_rad: Vector3::new(3.0, -0.4, 1.2) };
-    let suite = InstrumentSuite { imu: Some(Imu { mounting, ..Imu::DEFAULT }), ..InstrumentSuite::default() };
-    let mut instruments = Instruments::new(&suite, &[], 1, STEP_S).unwrap();
+    let suite = InstrumentSuite { imu: Some(ImuModel { mounting, ..ImuModel::DEFAULT }), ..InstrumentSuite::default() };
+    let mut instruments = SimulatedInstruments::new(&suite, &[], 1, STEP_S).unwrap();
     let (calibration, mut last) = (ImuCalibration::new(&mounting.to_f32()), None);
     let spin = Vector3::new(20.0, -30.0, 10.0);
     for step in 0..100_u32 {

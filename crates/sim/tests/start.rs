@@ -5,7 +5,7 @@ use afbc::Profile;
 use afbc_plant::Motion;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::parse;
-use afbc_sim::flight::{Estimated, FlightStart, Sample, fly};
+use afbc_sim::flight::{EstimateErrors, FlightStart, Sample, fly};
 use core::ops::ControlFlow;
 
 const FLIGHT: &str = r#"
@@ -32,7 +32,7 @@ fn contenders_do_not_feel_who_flew_before() {
         for kind in [ControllerKind::Afbc, ControllerKind::Pid, ControllerKind::Afbc] {
             let contender = Contender::of(kind, Profile::Flight);
             let (mut alone, mut after): (Vec<_>, Vec<_>) = (Vec::new(), Vec::new());
-            let of = |motion: Motion, estimated: Option<Estimated>| (motion, estimated);
+            let of = |motion: Motion, estimated: Option<EstimateErrors>| (motion, estimated);
             fly(&scenario, &contender, |sample| alone.push(of(sample.motion, sample.estimated))).unwrap();
             let mut observe = |sample: &Sample| {
                 after.push(of(sample.motion, sample.estimated));

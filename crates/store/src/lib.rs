@@ -32,4 +32,4 @@ mod store;
 
 pub use ram::Ram;
 pub use record::{NAME_MAX, RecordName, hash};
-pub use store::{Error, Found, Store};
+pub use store::{Error, Store, StoreCondition};

@@ -70,7 +70,7 @@ impl fmt::Debug for RecordName {
 
 /// Content of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Record {
+pub(crate) enum RecordContent {
     /// First record of a sector, written last. The sector with the largest `sequence` is active.
     Header { sequence: u32 },
     /// Makes all earlier values void; later values belong to `owner`.
@@ -85,14 +85,14 @@ const BEGIN: u16 = 0x4232;
 const VALUE: u16 = 0x5633;
 const NOTHING: u16 = 0x4E34;
 
-impl Record {
+impl RecordContent {
     /// Returns the record's bytes: name, value, edition, kind, checksum; little-endian.
     pub(crate) fn to_bytes(self) -> [u8; RECORD] {
         let (name, bits, edition, kind) = match self {
-            Record::Header { sequence } => (RecordName::NONE, sequence, 0, HEADER),
-            Record::Begin { owner } => (RecordName::NONE, owner, 0, BEGIN),
-            Record::Value { name, edition, bits: Some(bits) } => (name, bits, edition, VALUE),
-            Record::Value { name, edition, bits: None } => (name, 0, edition, NOTHING),
+            RecordContent::Header { sequence } => (RecordName::NONE, sequence, 0, HEADER),
+            RecordContent::Begin { owner } => (RecordName::NONE, owner, 0, BEGIN),
+            RecordContent::Value { name, edition, bits: Some(bits) } => (name, bits, edition, VALUE),
+            RecordContent::Value { name, edition, bits: None } => (name, 0, edition, NOTHING),
         };
         let fields = [bits.to_le_bytes(), (u32::from(edition) | u32::from(kind) << 16).to_le_bytes()];
         let mut bytes = [0; RECORD];
@@ -117,10 +117,10 @@ impl Record {
         let (name, bits, edition) = (RecordName(*name), u32::from_le_bytes(*bits), u16::from_le_bytes(*edition));
         let is_name = RecordName::new(name.as_str()) == Some(name);
         match kind {
-            HEADER => Some(Record::Header { sequence: bits }),
-            BEGIN => Some(Record::Begin { owner: bits }),
-            VALUE if is_name => Some(Record::Value { name, edition, bits: Some(bits) }),
-            NOTHING if is_name => Some(Record::Value { name, edition, bits: None }),
+            HEADER => Some(RecordContent::Header { sequence: bits }),
+            BEGIN => Some(RecordContent::Begin { owner: bits }),
+            VALUE if is_name => Some(RecordContent::Value { name, edition, bits: Some(bits) }),
+            NOTHING if is_name => Some(RecordContent::Value { name, edition, bits: None }),
             _ => None,
         }
     }

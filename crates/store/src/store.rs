@@ -1,6 +1,6 @@
 //! The store: two sectors of records.
 
-use crate::record::{RECORD, Record, RecordName};
+use crate::record::{RECORD, RecordContent, RecordName};
 use core::fmt;
 use embedded_storage::nor_flash::NorFlash;
 
@@ -48,7 +48,7 @@ impl<E: fmt::Debug> core::error::Error for Error<E> {}
 
 /// State of the flash when the store was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Found {
+pub struct StoreCondition {
     /// Number of places that are neither blank nor a valid record: the result of a power cut, or data of another
     /// program.
     pub damaged: u32,
@@ -60,12 +60,12 @@ pub struct Found {
 
 /// Active sector, which holds the current records.
 #[derive(Clone, Copy, Debug)]
-struct Active {
+struct ActiveSector {
     sector: u32,
     sequence: u32,
     /// First place after the last one that is not blank.
     next: u32,
-    /// First place whose values count: after the last [`Record::Begin`].
+    /// First place whose values count: after the last [`RecordContent::Begin`].
     first: u32,
     /// Owner of the values.
     owner: Option<u32>,
@@ -80,27 +80,27 @@ pub struct Store<F> {
     /// Offset of the first sector \[bytes\].
     start: u32,
     owner: u32,
-    active: Option<Active>,
-    found: Found,
+    active: Option<ActiveSector>,
+    found: StoreCondition,
 }
 
 /// Sector that is being filled and is not active yet.
-struct Filling {
+struct FillingSector {
     sector: u32,
     owner: u32,
-    /// Places `next` and `first` as in [`Active`].
+    /// Places `next` and `first` as in [`ActiveSector`].
     next: u32,
     first: u32,
 }
 
 /// Name, edition and bits of a value.
-type Held = (RecordName, u16, u32);
+type HeldValue = (RecordName, u16, u32);
 
 /// Content of one place of a sector.
-enum Place {
+enum SlotContent {
     Blank,
     Damaged,
-    Holds(Record),
+    Holds(RecordContent),
 }
 
 impl<F: NorFlash> Store<F> {
@@ -123,13 +123,13 @@ impl<F: NorFlash> Store<F> {
     /// # Errors
     /// Returns an error if the flash cannot be read.
     pub fn open(flash: F, start: u32, owner: u32) -> Result<Self, Error<F::Error>> {
-        let mut store = Store { flash, start, owner, active: None, found: Found::default() };
+        let mut store = Store { flash, start, owner, active: None, found: StoreCondition::default() };
         store.find()?;
         Ok(store)
     }
 
     /// Returns the state of the flash when the store was opened.
-    pub fn found(&self) -> Found {
+    pub fn found(&self) -> StoreCondition {
         self.found
     }
 
@@ -187,12 +187,12 @@ impl<F: NorFlash> Store<F> {
     /// Returns an error of the flash.
     /// Of the flash.
     pub fn get(&mut self, name: RecordName) -> Result<Option<(u16, u32)>, Error<F::Error>> {
-        let mine = |active: &Active| name.outlasts() || active.owner == Some(self.owner);
+        let mine = |active: &ActiveSector| name.outlasts() || active.owner == Some(self.owner);
         let Some(active) = self.active.filter(mine) else { return Ok(None) };
         let first = if name.outlasts() { 1 } else { active.first };
         for place in (first..active.next).rev() {
             match self.read(active.sector, place)? {
-                Place::Holds(Record::Value { name: at, edition, bits }) if at == name => {
+                SlotContent::Holds(RecordContent::Value { name: at, edition, bits }) if at == name => {
                     return Ok(bits.map(|bits| (edition, bits)));
                 }
                 _ => (),
@@ -220,7 +220,7 @@ impl<F: NorFlash> Store<F> {
         if held.is_none() && might_be_full && self.live()? >= Self::NAMES_MAX {
             return Err(Error::Full);
         }
-        self.add(Record::Value { name, edition, bits })
+        self.add(RecordContent::Value { name, edition, bits })
     }
 
     /// Deletes all values with one record, except the board's ([`RecordName::outlasts`]).
@@ -229,7 +229,7 @@ impl<F: NorFlash> Store<F> {
     /// Returns an error if the record was not written. All values then still count.
     pub fn reset(&mut self) -> Result<(), Error<F::Error>> {
         let is_empty = self.active.is_some_and(|it| it.first >= it.next && it.owner == Some(self.owner));
-        if is_empty { Ok(()) } else { self.add(Record::Begin { owner: self.owner }) }
+        if is_empty { Ok(()) } else { self.add(RecordContent::Begin { owner: self.owner }) }
     }
 
     /// Finds the active sector and its content.
@@ -237,10 +237,10 @@ impl<F: NorFlash> Store<F> {
         let mut blank = true;
         for sector in 0..SECTORS {
             match self.read(sector, 0)? {
-                Place::Holds(Record::Header { sequence }) => {
+                SlotContent::Holds(RecordContent::Header { sequence }) => {
                     if self.active.is_none_or(|active| sequence > active.sequence) {
                         self.active =
-                            Some(Active { sector, sequence, next: 1, first: 1, owner: None, is_damaged: false });
+                            Some(ActiveSector { sector, sequence, next: 1, first: 1, owner: None, is_damaged: false });
                     }
                 }
                 _ => blank = blank && self.is_blank(sector)?,
@@ -252,13 +252,15 @@ impl<F: NorFlash> Store<F> {
         };
         for place in 1..Self::PLACES {
             let held = self.read(active.sector, place)?;
-            if !matches!(held, Place::Blank) {
+            if !matches!(held, SlotContent::Blank) {
                 // After the last place that is not blank, damaged or not: flash is written only once between erases.
                 active.next = place + 1;
             }
             match held {
-                Place::Damaged => self.found.damaged += 1,
-                Place::Holds(Record::Begin { owner }) => (active.first, active.owner) = (place + 1, Some(owner)),
+                SlotContent::Damaged => self.found.damaged += 1,
+                SlotContent::Holds(RecordContent::Begin { owner }) => {
+                    (active.first, active.owner) = (place + 1, Some(owner))
+                }
                 _ => (),
             }
         }
@@ -269,7 +271,7 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Appends a record, in the other sector if this one is full.
-    fn add(&mut self, record: Record) -> Result<(), Error<F::Error>> {
+    fn add(&mut self, record: RecordContent) -> Result<(), Error<F::Error>> {
         let mut active = self.active.ok_or(Error::NeedsErase)?;
         while active.next < Self::PLACES {
             let place = active.next;
@@ -277,7 +279,7 @@ impl<F: NorFlash> Store<F> {
             active.next += 1;
             self.active = Some(active);
             if self.write(active.sector, place, record)? {
-                if let Record::Begin { owner } = record {
+                if let RecordContent::Begin { owner } = record {
                     (active.first, active.owner) = (active.next, Some(owner));
                     self.active = Some(active);
                 }
@@ -288,25 +290,25 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Copies the current records and `record` to the other sector, and makes that sector active.
-    fn move_on(&mut self, record: Option<Record>) -> Result<(), Error<F::Error>> {
+    fn move_on(&mut self, record: Option<RecordContent>) -> Result<(), Error<F::Error>> {
         let active = self.active.ok_or(Error::NeedsErase)?;
         if !self.is_blank(other(active.sector))? {
             return Err(Error::NeedsErase);
         }
         let sector = other(active.sector);
         let begins = match record {
-            Some(Record::Begin { owner }) => Some(owner),
+            Some(RecordContent::Begin { owner }) => Some(owner),
             _ => None,
         };
         let mut filling = self.begin(sector, begins.or(active.owner).unwrap_or(self.owner))?;
         for place in 1..active.next {
             let Some((name, edition, bits)) = self.counts(active, place)? else { continue };
             let stays = name.outlasts() || place >= active.first && begins.is_none();
-            if stays && !matches!(record, Some(Record::Value { name: new, .. }) if new == name) {
-                self.append(&mut filling, Record::Value { name, edition, bits: Some(bits) })?;
+            if stays && !matches!(record, Some(RecordContent::Value { name: new, .. }) if new == name) {
+                self.append(&mut filling, RecordContent::Value { name, edition, bits: Some(bits) })?;
             }
         }
-        if let Some(record @ Record::Value { .. }) = record {
+        if let Some(record @ RecordContent::Value { .. }) = record {
             self.append(&mut filling, record)?;
         }
         // The sequence does not wrap in a flash's life: each step costs an erase, and a sector endures some 10,000.
@@ -314,15 +316,15 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Starts to fill the blank `sector`.
-    fn begin(&mut self, sector: u32, owner: u32) -> Result<Filling, Error<F::Error>> {
-        let mut filling = Filling { sector, owner, next: 1, first: 1 };
-        self.append(&mut filling, Record::Begin { owner })?;
+    fn begin(&mut self, sector: u32, owner: u32) -> Result<FillingSector, Error<F::Error>> {
+        let mut filling = FillingSector { sector, owner, next: 1, first: 1 };
+        self.append(&mut filling, RecordContent::Begin { owner })?;
         filling.first = filling.next;
         Ok(filling)
     }
 
     /// Appends a record to a sector that is not active yet.
-    fn append(&mut self, filling: &mut Filling, record: Record) -> Result<(), Error<F::Error>> {
+    fn append(&mut self, filling: &mut FillingSector, record: RecordContent) -> Result<(), Error<F::Error>> {
         while filling.next < Self::PLACES {
             filling.next += 1;
             if self.write(filling.sector, filling.next - 1, record)? {
@@ -333,13 +335,13 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Writes the header, which makes the sector active.
-    fn finish(&mut self, filling: Filling, sequence: u32) -> Result<(), Error<F::Error>> {
-        let Filling { sector, owner, next, first } = filling;
+    fn finish(&mut self, filling: FillingSector, sequence: u32) -> Result<(), Error<F::Error>> {
+        let FillingSector { sector, owner, next, first } = filling;
         // If the header cannot be written, the other sector stays active and this one must be erased.
-        if !self.write(sector, 0, Record::Header { sequence })? {
+        if !self.write(sector, 0, RecordContent::Header { sequence })? {
             return Err(Error::NeedsErase);
         }
-        self.active = Some(Active { sector, sequence, next, first, owner: Some(owner), is_damaged: false });
+        self.active = Some(ActiveSector { sector, sequence, next, first, owner: Some(owner), is_damaged: false });
         Ok(())
     }
 
@@ -355,13 +357,15 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// Returns the value at `place`, if no later record has the same name.
-    fn counts(&mut self, active: Active, place: u32) -> Result<Option<Held>, Error<F::Error>> {
-        let Place::Holds(Record::Value { name, edition, bits: Some(bits) }) = self.read(active.sector, place)? else {
+    fn counts(&mut self, active: ActiveSector, place: u32) -> Result<Option<HeldValue>, Error<F::Error>> {
+        let SlotContent::Holds(RecordContent::Value { name, edition, bits: Some(bits) }) =
+            self.read(active.sector, place)?
+        else {
             return Ok(None);
         };
         for later in place + 1..active.next {
             match self.read(active.sector, later)? {
-                Place::Holds(Record::Value { name: again, .. }) if again == name => return Ok(None),
+                SlotContent::Holds(RecordContent::Value { name: again, .. }) if again == name => return Ok(None),
                 _ => (),
             }
         }
@@ -372,20 +376,20 @@ impl<F: NorFlash> Store<F> {
         self.start + sector * F::ERASE_SIZE as u32 + place * RECORD as u32
     }
 
-    fn read(&mut self, sector: u32, place: u32) -> Result<Place, Error<F::Error>> {
+    fn read(&mut self, sector: u32, place: u32) -> Result<SlotContent, Error<F::Error>> {
         let mut bytes = [0; RECORD];
         self.flash.read(self.address(sector, place), &mut bytes)?;
-        Ok(match Record::from_bytes(&bytes) {
-            Some(record) => Place::Holds(record),
-            None if bytes.iter().all(|byte| *byte == 0xFF) => Place::Blank,
-            None => Place::Damaged,
+        Ok(match RecordContent::from_bytes(&bytes) {
+            Some(record) => SlotContent::Holds(record),
+            None if bytes.iter().all(|byte| *byte == 0xFF) => SlotContent::Blank,
+            None => SlotContent::Damaged,
         })
     }
 
     /// Writes a record. Returns false if it does not read back as written.
-    fn write(&mut self, sector: u32, place: u32, record: Record) -> Result<bool, Error<F::Error>> {
+    fn write(&mut self, sector: u32, place: u32, record: RecordContent) -> Result<bool, Error<F::Error>> {
         self.flash.write(self.address(sector, place), &record.to_bytes())?;
-        Ok(matches!(self.read(sector, place)?, Place::Holds(held) if held == record))
+        Ok(matches!(self.read(sector, place)?, SlotContent::Holds(held) if held == record))
     }
 
     fn is_blank(&mut self, sector: u32) -> Result<bool, Error<F::Error>> {

@@ -1,7 +1,7 @@
 //! Parts of the store: names, owner numbers, layout of records in flash, and the flash in RAM.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
-use afbc_store::{Error, Found, NAME_MAX, Ram, RecordName, Store, hash};
+use afbc_store::{Error, NAME_MAX, Ram, RecordName, Store, StoreCondition, hash};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use proptest::prelude::*;
 
@@ -100,7 +100,7 @@ proptest! {
         bytes.resize(2 * SECTOR, 0xFF);
         let mut flash = Large([vec![0xA5; SECTOR], bytes, vec![0x5A; SECTOR]].concat());
         let mut store = Store::open(flash.clone(), SECTOR as u32, owner).unwrap();
-        prop_assert_eq!(store.found(), Found::default());
+        prop_assert_eq!(store.found(), StoreCondition::default());
         for (name, (bits, edition)) in &values {
             let wanted = (name != taken_back).then_some((*edition, *bits));
             prop_assert_eq!(store.get(RecordName::new(name).unwrap()), Ok(wanted));
@@ -157,7 +157,7 @@ proptest! {
         prop_assert!(is_held(&mut store));
         store.make_room().unwrap();
         let mut store = Store::open(store.into_flash(), 0, 1).unwrap();
-        prop_assert!(is_held(&mut store) && store.found() == Found::default());
+        prop_assert!(is_held(&mut store) && store.found() == StoreCondition::default());
     }
 
     /// The flash in RAM clears bits on a write, sets them on an erase, and refuses addresses outside of it and

@@ -3,7 +3,7 @@
 
 mod common;
 
-use afbc_store::{Error, Found, Ram, RecordName, Store, hash};
+use afbc_store::{Error, Ram, RecordName, Store, StoreCondition, hash};
 use common::{Cuttable, Erasing};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
@@ -115,10 +115,13 @@ fn values_of_another_vehicle_do_not_count_and_are_not_lost_by_reading() {
     store.set(name(0), 0, Some(9)).unwrap();
     let mut other = Store::open(store.into_flash(), 0, 2).unwrap();
     other.make_room().unwrap();
-    assert_eq!((other.found(), other.get(name(0))), (Found { of_another: true, ..Found::default() }, Ok(None)));
+    assert_eq!(
+        (other.found(), other.get(name(0))),
+        (StoreCondition { of_another: true, ..StoreCondition::default() }, Ok(None))
+    );
     // Back on the first vehicle, its value is there.
     let mut store = Store::open(other.into_flash(), 0, 1).unwrap();
-    assert_eq!((store.found(), store.get(name(0))), (Found::default(), Ok(Some((0, 9)))));
+    assert_eq!((store.found(), store.get(name(0))), (StoreCondition::default(), Ok(Some((0, 9)))));
     // Until the other vehicle sets something.
     let mut other = Store::open(store.into_flash(), 0, 2).unwrap();
     other.set(name(1), 0, Some(5)).unwrap();
@@ -129,7 +132,7 @@ fn values_of_another_vehicle_do_not_count_and_are_not_lost_by_reading() {
 }
 
 /// Opens a store in `bytes`, checks that it works, and returns its content.
-fn works(bytes: Vec<u8>) -> (Found, Vec<(RecordName, u32)>) {
+fn works(bytes: Vec<u8>) -> (StoreCondition, Vec<(RecordName, u32)>) {
     let mut store = Store::open(Cuttable { bytes, ..blank::<480>() }, 0, 1).unwrap();
     let (found, mut held) = (store.found(), Vec::new());
     store.visit(|name, _, bits| held.push((name, bits))).unwrap();
@@ -150,7 +153,7 @@ proptest! {
     #[test]
     fn garbage_is_no_store(bytes in prop::collection::vec(any::<u8>(), 960), zeros in any::<bool>()) {
         let bytes = if zeros { bytes.iter().map(|byte| byte & (byte >> 1)).collect() } else { bytes };
-        prop_assert_eq!(works(bytes), (Found { foreign: true, ..Found::default() }, vec![]));
+        prop_assert_eq!(works(bytes), (StoreCondition { foreign: true, ..StoreCondition::default() }, vec![]));
     }
 
     /// A store finds only values that were written, for any flipped bits in its flash.

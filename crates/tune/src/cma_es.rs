@@ -7,7 +7,7 @@
 //! Libraries use the platform's logarithms and exponentials, and a difference in the last bit soon changes the whole
 //! search. With this implementation the same seed gives the same search on every machine.
 
-use afbc_plant::noise::{Noise, Stream};
+use afbc_plant::noise::{Noise, NoiseStream};
 use libm::{exp, log, sqrt};
 
 /// A search for the minimum of a function of several numbers.
@@ -36,7 +36,7 @@ impl Search {
     /// Starts a search at `start` with the initial step size `step` in every coordinate.
     pub(super) fn new(start: &[f64], step: f64, seed: u64) -> Self {
         let at = |&mean: &f64| Coordinate { mean, variance: 1.0, step_path: 0.0, path: 0.0 };
-        let noise = Noise::new(seed, Stream::Scenario);
+        let noise = Noise::new(seed, NoiseStream::Scenario);
         Search { coordinates: start.iter().map(at).collect(), step, generation: 0, noise }
     }
 

@@ -5,12 +5,12 @@ use crate::fast;
 use crate::maker::{self, Maker, TrainingFlight};
 use crate::scale::Scale;
 use afbc::Profile;
-use afbc_plant::noise::{Noise, Stream};
-use afbc_plant::{Drag, Environment, ParameterChange, PlantParameter, Sensing, Turbulence};
+use afbc_plant::noise::{Noise, NoiseStream};
+use afbc_plant::{Drag, Environment, PlantParameter, PlantParameterChange, Sensing, Turbulence};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::trajectory::{Sine, Trajectory};
 use afbc_scenario::{Scenario, built_in};
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use afbc_types::OutOfRange;
 use afbc_vehicles::Vehicle;
 use nalgebra::{Vector3, Vector4};
@@ -130,7 +130,7 @@ pub fn conditions_on(vehicle: &Vehicle) -> Result<Vec<Condition>, Box<dyn Error>
 /// Returns a random flight in turbulence on a vehicle that differs from the law's model. The flights resemble the
 /// campaign `robustness`, but never ask for more than the rotors can carry.
 fn drawn(maker: &Maker<'_>, index: u64, time: f64) -> Result<Scenario, Box<dyn Error>> {
-    let mut noise = Noise::new(SEED + index, Stream::Scenario);
+    let mut noise = Noise::new(SEED + index, NoiseStream::Scenario);
     let mut between = |low: f64, high: f64| low + (high - low) * noise.uniform();
     let scale = &maker.scale;
     // Only one of thrust and mass may be at its worst.
@@ -141,7 +141,7 @@ fn drawn(maker: &Maker<'_>, index: u64, time: f64) -> Result<Scenario, Box<dyn E
         (PlantParameter::ThrustFactor, thrust),
         (PlantParameter::Inertia, between(0.7, 1.3)),
     ];
-    let change = |(quantity, factor)| ParameterChange { quantity, factor, start_s: 0.0, end_s: f64::INFINITY };
+    let change = |(quantity, factor)| PlantParameterChange { quantity, factor, start_s: 0.0, end_s: f64::INFINITY };
     let from_m = Vector3::new(0.0, 0.0, 3.0);
     let by_m = Vector3::new(between(-1.0, 1.0), between(-1.0, 1.0), between(-0.5, 0.5)) * scale.length;
     let trajectory = match index % 3 {
@@ -263,7 +263,7 @@ impl Condition {
             Some(vehicle) if self.by_rule => contender.clone().by_rule(vehicle),
             _ => contender.clone(),
         };
-        let run = Run::fly(&self.scenario, &fast::free(&self.scenario, &contender), u64::MAX)?;
+        let run = FlightResult::fly(&self.scenario, &fast::free(&self.scenario, &contender), u64::MAX)?;
         if run.lost.is_some() || run.tripped.is_some() {
             return Ok(FAILED);
         }

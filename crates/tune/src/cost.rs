@@ -5,7 +5,7 @@ use crate::scale::Scale;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
 use afbc_sim::metrics::Metrics;
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use afbc_types::OutOfRange;
 use rayon::prelude::*;
 
@@ -22,7 +22,7 @@ pub const LOST: f64 = 1000.0;
 
 /// Returns the cost of one flight. On a vehicle from a file, distances are divided by the length scale of its flights,
 /// and inputs by its weight relative to the paper's vehicle.
-pub fn cost(scenario: &Scenario, run: &Run) -> f64 {
+pub fn cost(scenario: &Scenario, run: &FlightResult) -> f64 {
     let tripped_s = run.tripped.map(|tripped| tripped.time_s);
     if let Some(end_s) = run.lost.map(|lost| lost.time_s).or(tripped_s) {
         return LOST * (2.0 - end_s / scenario.duration_s);
@@ -40,7 +40,7 @@ pub fn cost(scenario: &Scenario, run: &Run) -> f64 {
 /// # Errors
 /// The first parameter, gain or setting out of range.
 pub(crate) fn flown(scenario: &Scenario, contender: &Contender) -> Result<f64, OutOfRange> {
-    Ok(cost(scenario, &Run::fly(scenario, &fast::free(scenario, contender), u64::MAX)?))
+    Ok(cost(scenario, &FlightResult::fly(scenario, &fast::free(scenario, contender), u64::MAX)?))
 }
 
 /// Returns the cost of each of `scenarios` under `contender`, whose tilt limit is 1.2 rad in fast flights.

@@ -12,10 +12,10 @@
 use crate::fast;
 use crate::maker::{Maker, ONSET_S, TrainingFlight, read};
 use crate::scale::Scale;
-use afbc_plant::instruments::{Barometer, Gnss, Imu, Magnetometer, TrackerModel};
+use afbc_plant::instruments::{BarometerModel, GnssModel, ImuModel, MagnetometerModel, TrackerModel};
 use afbc_plant::{
-    Battery, Contact, Environment, GroundEffect, Gust, GustKind, InstrumentSuite, Payload, PlantParameter, RotorFault,
-    Sensing, Turbulence,
+    BatteryModel, Contact, Environment, GroundEffect, Gust, GustKind, InstrumentSuite, Payload, PlantParameter,
+    RotorFault, Sensing, Turbulence,
 };
 use afbc_scenario::trajectory::{Sine, Trajectory, Waypoint};
 use afbc_scenario::{Outage, Scenario};
@@ -154,11 +154,12 @@ impl Maker<'_> {
             self.rotor("rotor", fast("", None), 0.8)?,
             self.payload("payload", fast("", None), -0.06)?,
             self.sensed("mocap", fast("", None), |suite| {
-                suite.imu = suite.imu.map(|imu| Imu { gyro: Imu::MPU_6000.gyro, ..imu });
+                suite.imu = suite.imu.map(|imu| ImuModel { gyro: ImuModel::MPU_6000.gyro, ..imu });
                 suite.tracker = Some(TrackerModel { delay_s: 0.03, ..TrackerModel::MOCAP_100 });
             })?,
             self.sensed("outdoor", fast("", None), |suite| {
-                (suite.barometer, suite.magnetometer) = (Some(Barometer::BMP388), Some(Magnetometer::QMC5883L));
+                (suite.barometer, suite.magnetometer) =
+                    (Some(BarometerModel::BMP388), Some(MagnetometerModel::QMC5883L));
             })?,
             lemniscate,
             circle,
@@ -345,7 +346,7 @@ impl Maker<'_> {
 fn instruments(name: &str, change: impl FnOnce(&mut InstrumentSuite)) -> Result<InstrumentSuite, Box<dyn Error>> {
     let mut suite = read(name)?.instruments;
     change(&mut suite);
-    let steady = |gnss| Gnss { horizontal_m: 0.0, vertical_m: 0.0, ..gnss };
+    let steady = |gnss| GnssModel { horizontal_m: 0.0, vertical_m: 0.0, ..gnss };
     suite.gnss = suite.gnss.map(steady);
     Ok(suite)
 }
@@ -363,11 +364,11 @@ fn blind(scenario: Scenario, starts_s: &[f64]) -> Scenario {
 }
 
 /// Returns the battery with the charge at which the rotors give the fraction `thrust` of their largest thrust.
-fn low_battery(battery: Battery, thrust: f64) -> Battery {
+fn low_battery(battery: BatteryModel, thrust: f64) -> BatteryModel {
     // Thrust grows with the square of the voltage.
     let voltage_v = battery.full_v * libm::sqrt(thrust);
     let charge = (voltage_v - battery.empty_v) / (battery.full_v - battery.empty_v).max(1e-9);
-    Battery { initial_charge: charge.clamp(0.05, 1.0), ..battery }
+    BatteryModel { initial_charge: charge.clamp(0.05, 1.0), ..battery }
 }
 
 /// Differences from the sensors and rotors of `hardware`.

@@ -4,7 +4,7 @@ use afbc::Profile;
 use afbc_files::read::words;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::{Contender, ControllerKind, Law};
-use afbc_types::{Axis, Declaration, Declared, Range, Value, ValueMut};
+use afbc_types::{Axis, Declaration, Declared, DeclaredValue, DeclaredValueMut, Range};
 use afbc_vehicles::{CASCADE, Vehicle};
 use core::convert::Infallible;
 use core::fmt::Write;
@@ -50,7 +50,7 @@ fn each_of_group(law: &mut Law, group: &[Axis], visit: Visit) {
 /// Visits every gain of one axis.
 fn each_of_axis(law: &mut Law, axis: Axis, mut show: impl FnMut(&mut f32)) {
     let Ok(()) = law.visit_mut(&mut |declaration, value| {
-        if let (true, ValueMut::Single([gain])) = (declaration.group == axis.name(), value) {
+        if let (true, DeclaredValueMut::Single([gain])) = (declaration.group == axis.name(), value) {
             show(gain);
         }
         Ok::<(), Infallible>(())
@@ -60,7 +60,7 @@ fn each_of_axis(law: &mut Law, axis: Axis, mut show: impl FnMut(&mut f32)) {
 /// Visits every parameter that is `wanted`, tuned and not 0.
 fn each_tuned(place: &str, parameters: &mut impl Declared, wanted: impl Fn(&Declaration) -> bool, visit: Visit) {
     let Ok(()) = parameters.visit_mut(&mut |declaration, value| {
-        if let (true, ValueMut::Single([gain])) = (declaration.tuned && wanted(declaration), value)
+        if let (true, DeclaredValueMut::Single([gain])) = (declaration.tuned && wanted(declaration), value)
             && *gain > 0.0
         {
             visit(place, &declaration.range, gain);
@@ -206,7 +206,7 @@ fn quoted(name: &str) -> String {
 fn keys(contender: &Contender) -> Vec<Key> {
     let mut keys = Vec::new();
     // Groups of a law's gains are subtables of `gains`. The settings are tables beside it.
-    let mut put = |table: String, key, value: Value<'_>, tuned| {
+    let mut put = |table: String, key, value: DeclaredValue<'_>, tuned| {
         keys.push(Key { table, key, value: words::value(&value), tuned });
         Ok::<(), Infallible>(())
     };

@@ -3,7 +3,7 @@
 use crate::scale::Scale;
 use afbc::Profile;
 use afbc_files::read::FileError;
-use afbc_plant::{Drag, Environment, Gust, Motion, ParameterChange, PlantParameter, Turbulence};
+use afbc_plant::{Drag, Environment, Gust, Motion, PlantParameter, PlantParameterChange, Turbulence};
 use afbc_scenario::trajectory::Trajectory;
 use afbc_scenario::{Scenario, built_in};
 use afbc_types::Axis;
@@ -50,8 +50,10 @@ impl<'a> Maker<'a> {
             Gust { size: gust.size * if turns { 1.0 / (time * time) } else { acceleration }, ..*gust }
         };
         let gusts = scenario.environment.gusts().iter().map(gust).collect();
-        let change = |change: &ParameterChange| match change.quantity {
-            PlantParameter::ThrustFactor => ParameterChange { factor: self.scale.thrust(change.factor), ..*change },
+        let change = |change: &PlantParameterChange| match change.quantity {
+            PlantParameter::ThrustFactor => {
+                PlantParameterChange { factor: self.scale.thrust(change.factor), ..*change }
+            }
             _ => *change,
         };
         let changes = scenario.environment.changes().iter().map(change).collect();
@@ -82,7 +84,7 @@ impl<'a> Maker<'a> {
 
     pub(crate) fn scenario(&self, flight: TrainingFlight) -> Result<Scenario, Box<dyn Error>> {
         let base = self.base()?;
-        let change = |(quantity, factor)| ParameterChange {
+        let change = |(quantity, factor)| PlantParameterChange {
             quantity,
             factor,
             start_s: ONSET_S,

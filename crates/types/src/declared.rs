@@ -65,7 +65,7 @@ impl fmt::Display for Name {
 
 /// Value of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Value<'a> {
+pub enum DeclaredValue<'a> {
     /// One number, or the three numbers of a vector, in `f32`.
     Single(&'a [f32]),
     /// One number, or the three numbers of a vector, in `f64`.
@@ -81,27 +81,27 @@ pub enum Value<'a> {
 
 /// Mutable access to a parameter's value.
 #[derive(Debug, PartialEq)]
-pub enum ValueMut<'a> {
-    /// See [`Value::Single`].
+pub enum DeclaredValueMut<'a> {
+    /// See [`DeclaredValue::Single`].
     Single(&'a mut [f32]),
-    /// See [`Value::Double`].
+    /// See [`DeclaredValue::Double`].
     Double(&'a mut [f64]),
-    /// See [`Value::Whole`].
+    /// See [`DeclaredValue::Whole`].
     Whole(&'a mut u32),
-    /// See [`Value::Switch`].
+    /// See [`DeclaredValue::Switch`].
     Switch(&'a mut bool),
-    /// See [`Value::Choice`]. An index beyond the words changes nothing.
+    /// See [`DeclaredValue::Choice`]. An index beyond the words changes nothing.
     Choice(&'a mut usize, &'static [&'static str]),
 }
 
-impl Value<'_> {
+impl DeclaredValue<'_> {
     /// Returns the number, or the three numbers of a vector; nothing for a switch or a choice.
     pub fn numbers(&self) -> impl Iterator<Item = f64> {
         let (single, double, whole): (&[f32], &[f64], _) = match *self {
-            Value::Single(numbers) => (numbers, &[], None),
-            Value::Double(numbers) => (&[], numbers, None),
-            Value::Whole(number) => (&[], &[], Some(f64::from(number))),
-            Value::Switch(_) | Value::Choice(..) => (&[], &[], None),
+            DeclaredValue::Single(numbers) => (numbers, &[], None),
+            DeclaredValue::Double(numbers) => (&[], numbers, None),
+            DeclaredValue::Whole(number) => (&[], &[], Some(f64::from(number))),
+            DeclaredValue::Switch(_) | DeclaredValue::Choice(..) => (&[], &[], None),
         };
         single.iter().map(|&number| f64::from(number)).chain(double.iter().copied()).chain(whole)
     }
@@ -109,19 +109,23 @@ impl Value<'_> {
 
 /// Action on each visited parameter. An error ends the visit. Closures implement it and are called statically, so that
 /// the firmware's stack analysis can follow the call.
-pub trait Visit<E>: FnMut(&Declaration, Value<'_>) -> Result<(), E> {}
+pub trait Visitor<E>: FnMut(&Declaration, DeclaredValue<'_>) -> Result<(), E> {}
 
-impl<E, F: FnMut(&Declaration, Value<'_>) -> Result<(), E>> Visit<E> for F {}
+impl<E, F: FnMut(&Declaration, DeclaredValue<'_>) -> Result<(), E>> Visitor<E> for F {}
 
-/// As [`Visit`], with mutable access.
-pub trait VisitMut<E>: FnMut(&Declaration, ValueMut<'_>) -> Result<(), E> {}
+/// As [`Visitor`], with mutable access.
+pub trait VisitorMut<E>: FnMut(&Declaration, DeclaredValueMut<'_>) -> Result<(), E> {}
 
-impl<E, F: FnMut(&Declaration, ValueMut<'_>) -> Result<(), E>> VisitMut<E> for F {}
+impl<E, F: FnMut(&Declaration, DeclaredValueMut<'_>) -> Result<(), E>> VisitorMut<E> for F {}
 
 /// Checks the range of a parameter. Out of line, with the error stored in `refused`, so that the code exists only once
 /// instead of once per parameter.
 #[inline(never)]
-fn in_range(declaration: &Declaration, value: &Value<'_>, refused: &mut Result<(), OutOfRange>) -> Result<(), ()> {
+fn in_range(
+    declaration: &Declaration,
+    value: &DeclaredValue<'_>,
+    refused: &mut Result<(), OutOfRange>,
+) -> Result<(), ()> {
     *refused = value.numbers().try_for_each(|number| declaration.range.check(number));
     if refused.is_ok() { Ok(()) } else { Err(()) }
 }
@@ -135,8 +139,8 @@ fn in_range(declaration: &Declaration, value: &Value<'_>, refused: &mut Result<(
 pub fn show_in_group<E>(
     group: &'static str,
     declaration: &Declaration,
-    value: Value<'_>,
-    visit: &mut impl Visit<E>,
+    value: DeclaredValue<'_>,
+    visit: &mut impl Visitor<E>,
 ) -> Result<(), E> {
     visit(&declaration.in_group(group), value)
 }
@@ -147,13 +151,13 @@ pub trait Declared {
     ///
     /// # Errors
     /// The first error that `visit` returns.
-    fn visit<E>(&self, visit: &mut impl Visit<E>) -> Result<(), E>;
+    fn visit<E>(&self, visit: &mut impl Visitor<E>) -> Result<(), E>;
 
     /// As [`visit`](Self::visit), to change parameters.
     ///
     /// # Errors
     /// The first error that `visit` returns.
-    fn visit_mut<E>(&mut self, visit: &mut impl VisitMut<E>) -> Result<(), E>;
+    fn visit_mut<E>(&mut self, visit: &mut impl VisitorMut<E>) -> Result<(), E>;
 
     /// Checks parameters that limit each other. Each must already be in its own range.
     ///
@@ -175,17 +179,17 @@ pub trait Declared {
 }
 
 impl<G: Declared> Declared for PerAxis<G> {
-    fn visit<E>(&self, visit: &mut impl Visit<E>) -> Result<(), E> {
+    fn visit<E>(&self, visit: &mut impl Visitor<E>) -> Result<(), E> {
         Axis::ALL.into_iter().try_for_each(|axis| {
-            self[axis].visit(&mut |declaration: &Declaration, value: Value<'_>| {
+            self[axis].visit(&mut |declaration: &Declaration, value: DeclaredValue<'_>| {
                 show_in_group(axis.name(), declaration, value, visit)
             })
         })
     }
 
-    fn visit_mut<E>(&mut self, visit: &mut impl VisitMut<E>) -> Result<(), E> {
+    fn visit_mut<E>(&mut self, visit: &mut impl VisitorMut<E>) -> Result<(), E> {
         Axis::ALL.into_iter().try_for_each(|axis| {
-            self[axis].visit_mut(&mut |declaration: &Declaration, value: ValueMut<'_>| {
+            self[axis].visit_mut(&mut |declaration: &Declaration, value: DeclaredValueMut<'_>| {
                 visit(&declaration.in_group(axis.name()), value)
             })
         })
@@ -197,59 +201,59 @@ impl<G: Declared> Declared for PerAxis<G> {
 }
 
 /// A type that a declared parameter may have.
-pub trait Field {
+pub trait ParameterType {
     /// Calls `visit` with the parameter, once per axis if it has several.
     ///
     /// # Errors
     /// The first error that `visit` returns.
-    fn show<E>(&self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E>;
+    fn show<E>(&self, declaration: &Declaration, visit: &mut impl Visitor<E>) -> Result<(), E>;
 
     /// As [`show`](Self::show), with mutable access.
     ///
     /// # Errors
     /// The first error that `visit` returns.
-    fn show_mut<E>(&mut self, declaration: &Declaration, visit: &mut impl VisitMut<E>) -> Result<(), E>;
+    fn show_mut<E>(&mut self, declaration: &Declaration, visit: &mut impl VisitorMut<E>) -> Result<(), E>;
 }
 
 /// Number type of a parameter: `f32` in the controller, `f64` in the plant model.
-pub trait Number: nalgebra::Scalar + Copy + Into<f64> + Mul<Output = Self> + Div<Output = Self> {
-    /// Wraps one number, or the three numbers of a vector, as a [`Value`].
-    fn value(numbers: &[Self]) -> Value<'_>;
+pub trait ParameterNumber: nalgebra::Scalar + Copy + Into<f64> + Mul<Output = Self> + Div<Output = Self> {
+    /// Wraps one number, or the three numbers of a vector, as a [`DeclaredValue`].
+    fn value(numbers: &[Self]) -> DeclaredValue<'_>;
 
-    /// Wraps one number, or the three numbers of a vector, as a [`ValueMut`].
-    fn value_mut(numbers: &mut [Self]) -> ValueMut<'_>;
+    /// Wraps one number, or the three numbers of a vector, as a [`DeclaredValueMut`].
+    fn value_mut(numbers: &mut [Self]) -> DeclaredValueMut<'_>;
 }
 
-impl Number for f32 {
-    fn value(numbers: &[Self]) -> Value<'_> {
-        Value::Single(numbers)
+impl ParameterNumber for f32 {
+    fn value(numbers: &[Self]) -> DeclaredValue<'_> {
+        DeclaredValue::Single(numbers)
     }
 
-    fn value_mut(numbers: &mut [Self]) -> ValueMut<'_> {
-        ValueMut::Single(numbers)
-    }
-}
-
-impl Number for f64 {
-    fn value(numbers: &[Self]) -> Value<'_> {
-        Value::Double(numbers)
-    }
-
-    fn value_mut(numbers: &mut [Self]) -> ValueMut<'_> {
-        ValueMut::Double(numbers)
+    fn value_mut(numbers: &mut [Self]) -> DeclaredValueMut<'_> {
+        DeclaredValueMut::Single(numbers)
     }
 }
 
-/// Implements [`Field`] for a type, given its value and mutable value.
+impl ParameterNumber for f64 {
+    fn value(numbers: &[Self]) -> DeclaredValue<'_> {
+        DeclaredValue::Double(numbers)
+    }
+
+    fn value_mut(numbers: &mut [Self]) -> DeclaredValueMut<'_> {
+        DeclaredValueMut::Double(numbers)
+    }
+}
+
+/// Implements [`ParameterType`] for a type, given its value and mutable value.
 macro_rules! field {
     ([$($T:ident)?] $Type:ty, |$this:ident| $value:expr, $value_mut:expr) => {
-        impl $(<$T: Number>)? Field for $Type {
-            fn show<E>(&self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E> {
+        impl $(<$T: ParameterNumber>)? ParameterType for $Type {
+            fn show<E>(&self, declaration: &Declaration, visit: &mut impl Visitor<E>) -> Result<(), E> {
                 let $this = self;
                 visit(declaration, $value)
             }
 
-            fn show_mut<E>(&mut self, declaration: &Declaration, visit: &mut impl VisitMut<E>) -> Result<(), E> {
+            fn show_mut<E>(&mut self, declaration: &Declaration, visit: &mut impl VisitorMut<E>) -> Result<(), E> {
                 let $this = self;
                 visit(declaration, $value_mut)
             }
@@ -259,15 +263,15 @@ macro_rules! field {
 
 field!([T] T, |this| T::value(slice::from_ref(this)), T::value_mut(slice::from_mut(this)));
 field!([T] Vector3<T>, |this| T::value(this.as_slice()), T::value_mut(this.as_mut_slice()));
-field!([] u32, |this| Value::Whole(*this), ValueMut::Whole(this));
-field!([] bool, |this| Value::Switch(*this), ValueMut::Switch(this));
+field!([] u32, |this| DeclaredValue::Whole(*this), DeclaredValueMut::Whole(this));
+field!([] bool, |this| DeclaredValue::Switch(*this), DeclaredValueMut::Switch(this));
 
-impl<T: Field> Field for PerAxis<T> {
-    fn show<E>(&self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E> {
+impl<T: ParameterType> ParameterType for PerAxis<T> {
+    fn show<E>(&self, declaration: &Declaration, visit: &mut impl Visitor<E>) -> Result<(), E> {
         Axis::ALL.into_iter().try_for_each(|axis| self[axis].show(&declaration.in_group(axis.name()), visit))
     }
 
-    fn show_mut<E>(&mut self, declaration: &Declaration, visit: &mut impl VisitMut<E>) -> Result<(), E> {
+    fn show_mut<E>(&mut self, declaration: &Declaration, visit: &mut impl VisitorMut<E>) -> Result<(), E> {
         Axis::ALL.into_iter().try_for_each(|axis| self[axis].show_mut(&declaration.in_group(axis.name()), visit))
     }
 }
@@ -287,21 +291,21 @@ pub trait Choice: Copy + PartialEq + 'static {
         Self::ALL.iter().position(|one| *one == self).unwrap_or_default()
     }
 
-    /// See [`Field::show`].
+    /// See [`ParameterType::show`].
     ///
     /// # Errors
     /// The first error that `visit` returns.
-    fn show<E>(self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E> {
-        visit(declaration, Value::Choice(self.index(), Self::WORDS))
+    fn show<E>(self, declaration: &Declaration, visit: &mut impl Visitor<E>) -> Result<(), E> {
+        visit(declaration, DeclaredValue::Choice(self.index(), Self::WORDS))
     }
 
-    /// See [`Field::show_mut`].
+    /// See [`ParameterType::show_mut`].
     ///
     /// # Errors
     /// The first error that `visit` returns.
-    fn show_mut<E>(&mut self, declaration: &Declaration, visit: &mut impl VisitMut<E>) -> Result<(), E> {
+    fn show_mut<E>(&mut self, declaration: &Declaration, visit: &mut impl VisitorMut<E>) -> Result<(), E> {
         let mut index = self.index();
-        let shown = visit(declaration, ValueMut::Choice(&mut index, Self::WORDS));
+        let shown = visit(declaration, DeclaredValueMut::Choice(&mut index, Self::WORDS));
         *self = Self::ALL.get(index).copied().unwrap_or(*self);
         shown
     }
@@ -393,21 +397,21 @@ macro_rules! parameters {
             }
         }
 
-        impl $(<$T: $crate::Number>)? $crate::Declared for $Group $(<$T>)? {
-            fn visit<E>(&self, visit: &mut impl $crate::Visit<E>) -> Result<(), E> {
+        impl $(<$T: $crate::ParameterNumber>)? $crate::Declared for $Group $(<$T>)? {
+            fn visit<E>(&self, visit: &mut impl $crate::Visitor<E>) -> Result<(), E> {
                 $(
-                    $( $crate::Field::show(&self.$field, &Self::$id, visit)?; )?
-                    $( $crate::Field::show(&self.$field, &Self::$switch, visit)?; )?
+                    $( $crate::ParameterType::show(&self.$field, &Self::$id, visit)?; )?
+                    $( $crate::ParameterType::show(&self.$field, &Self::$switch, visit)?; )?
                     $( $crate::Choice::show(self.$field, &Self::$choice, visit)?; )?
                     $( $crate::parameters!(@group $group, visit, &self.$field, visit); )?
                 )*
                 Ok(())
             }
 
-            fn visit_mut<E>(&mut self, visit: &mut impl $crate::VisitMut<E>) -> Result<(), E> {
+            fn visit_mut<E>(&mut self, visit: &mut impl $crate::VisitorMut<E>) -> Result<(), E> {
                 $(
-                    $( $crate::Field::show_mut(&mut self.$field, &Self::$id, visit)?; )?
-                    $( $crate::Field::show_mut(&mut self.$field, &Self::$switch, visit)?; )?
+                    $( $crate::ParameterType::show_mut(&mut self.$field, &Self::$id, visit)?; )?
+                    $( $crate::ParameterType::show_mut(&mut self.$field, &Self::$switch, visit)?; )?
                     $( $crate::Choice::show_mut(&mut self.$field, &Self::$choice, visit)?; )?
                     $( $crate::parameters!(@group $group, visit_mut, &mut self.$field, visit); )?
                 )*
@@ -427,13 +431,13 @@ macro_rules! parameters {
         $crate::Declared::$visit($field, $visitor)?;
     };
     (@group $group:literal, visit, $field:expr, $visitor:ident) => {
-        let within = &mut |declaration: &$crate::Declaration, value: $crate::Value<'_>| {
+        let within = &mut |declaration: &$crate::Declaration, value: $crate::DeclaredValue<'_>| {
             $crate::show_in_group($group, declaration, value, $visitor)
         };
         $crate::Declared::visit($field, within)?;
     };
     (@group $group:literal, visit_mut, $field:expr, $visitor:ident) => {
-        let within = &mut |declaration: &$crate::Declaration, value: $crate::ValueMut<'_>| {
+        let within = &mut |declaration: &$crate::Declaration, value: $crate::DeclaredValueMut<'_>| {
             $visitor(&declaration.in_group($group), value)
         };
         $crate::Declared::visit_mut($field, within)?;

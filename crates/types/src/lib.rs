@@ -43,7 +43,10 @@ mod trigonometry;
 pub use actuation::{Inputs, RotorForces, RotorSpeeds};
 pub use attitude::euler_angles;
 pub use axes::{Axis, PerAxis};
-pub use declared::{Choice, Declaration, Declared, Field, Name, Number, Value, ValueMut, Visit, VisitMut};
+pub use declared::{
+    Choice, Declaration, Declared, DeclaredValue, DeclaredValueMut, Name, ParameterNumber, ParameterType, Visitor,
+    VisitorMut,
+};
 #[doc(hidden)]
 pub use declared::{numbers, show_in_group};
 pub use frame::{Airframe, PLUS, ROTOR_POSITION, ROTORS, ROTORS_MAX, Rotor, Rotors};

@@ -1,13 +1,13 @@
 //! Mounting of a sensor on the vehicle.
 
-use crate::{Number, parameters, sin_cos};
+use crate::{ParameterNumber, parameters, sin_cos};
 use nalgebra::{Matrix3, Vector3};
 
 parameters! {
     /// Mounting of the inertial sensor: the true one in `f64` in the plant, the known one in `f32` in flight software.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-    #[cfg_attr(feature = "serde", serde(bound = "T: crate::Number + serde::Serialize"))]
+    #[cfg_attr(feature = "serde", serde(bound = "T: crate::ParameterNumber + serde::Serialize"))]
     pub struct Mounting<T = f32, f64> {
         /// Position of the sensor, from the centre of mass, body frame.
         #[parameter(POS, "m", -10.0..=10.0)]
@@ -37,7 +37,7 @@ impl Mounting {
     }
 }
 
-impl<T: Number> Mounting<T> {
+impl<T: ParameterNumber> Mounting<T> {
     /// True if the sensor is at the centre of mass, along the body's axes, so that the mounting changes nothing.
     #[must_use]
     pub fn is_plain(&self) -> bool {

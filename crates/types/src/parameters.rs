@@ -1,6 +1,6 @@
 //! The vehicle's physical parameters.
 
-use crate::{Number, parameters};
+use crate::{ParameterNumber, parameters};
 use nalgebra::Vector3;
 
 parameters! {
@@ -8,7 +8,10 @@ parameters! {
     /// plant their true values in `f64`. The ranges admit vehicles from palm size up to passenger drones.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-    #[cfg_attr(feature = "serde", serde(bound = "T: crate::Number + serde::Serialize + serde::de::DeserializeOwned"))]
+    #[cfg_attr(
+        feature = "serde",
+        serde(bound = "T: crate::ParameterNumber + serde::Serialize + serde::de::DeserializeOwned")
+    )]
     #[cfg_attr(feature = "defmt", derive(defmt::Format))]
     pub struct Parameters<T = f32, f64> {
         /// m: mass of the vehicle.
@@ -35,7 +38,7 @@ parameters! {
     }
 }
 
-impl<T: Number> Parameters<T> {
+impl<T: ParameterNumber> Parameters<T> {
     /// Returns the weight m g \[N\].
     #[must_use]
     pub fn weight_n(&self) -> T {

@@ -1,7 +1,7 @@
 //! Tests of structs made by [`parameters!`].
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
-use afbc_types::{Axis, Choice, Declared, PerAxis, Range, Value, ValueMut, parameters};
+use afbc_types::{Axis, Choice, Declared, DeclaredValue, DeclaredValueMut, PerAxis, Range, parameters};
 use core::convert::Infallible;
 use nalgebra::Vector3;
 
@@ -87,8 +87,8 @@ fn listed(group: &impl Declared) -> Vec<(String, &'static str, Vec<f64>)> {
     let mut list = Vec::new();
     let Ok(()) = group.visit(&mut |declaration, value| {
         let numbers = match value {
-            Value::Switch(on) => vec![f64::from(u8::from(on))],
-            Value::Choice(index, _) => vec![declaration.range.min + index as f64],
+            DeclaredValue::Switch(on) => vec![f64::from(u8::from(on))],
+            DeclaredValue::Choice(index, _) => vec![declaration.range.min + index as f64],
             value => value.numbers().collect(),
         };
         list.push((declaration.name("P_", None).to_string(), declaration.range.name, numbers));
@@ -135,9 +135,9 @@ fn past(target: usize, coordinate: usize, above: bool) -> Option<(Outer, Range)>
         let past = if above { max + 1.0 } else { min - 1.0 };
         if at == target && past.is_finite() {
             let changed = match value {
-                ValueMut::Single(numbers) => numbers.get_mut(coordinate).map(|number| *number = past as f32),
-                ValueMut::Double(numbers) => numbers.get_mut(coordinate).map(|number| *number = past),
-                ValueMut::Whole(number) if coordinate == 0 => {
+                DeclaredValueMut::Single(numbers) => numbers.get_mut(coordinate).map(|number| *number = past as f32),
+                DeclaredValueMut::Double(numbers) => numbers.get_mut(coordinate).map(|number| *number = past),
+                DeclaredValueMut::Whole(number) if coordinate == 0 => {
                     *number = past as u32;
                     Some(())
                 }
@@ -192,7 +192,7 @@ fn a_visitor_changes_what_it_is_shown_and_may_stop() {
     let stopped = axes.visit_mut(&mut |declaration, value| {
         seen += 1;
         match value {
-            ValueMut::Single([number]) if declaration.group != "yaw" => *number = seen as f32,
+            DeclaredValueMut::Single([number]) if declaration.group != "yaw" => *number = seen as f32,
             _ => return Err(declaration.name("", None).to_string()),
         }
         Ok(())
@@ -208,7 +208,7 @@ fn a_choice_is_one_of_its_words() {
     let mut group = Outer::DEFAULT;
     for (index, way) in [(0, Way::Up), (2, Way::Across), (3, Way::Across), (1, Way::Down)] {
         let Ok(()) = group.visit_mut(&mut |_, value| {
-            if let ValueMut::Choice(at, words) = value {
+            if let DeclaredValueMut::Choice(at, words) = value {
                 assert_eq!(words, ["up", "down", "across"]);
                 *at = index;
             }

@@ -1,18 +1,18 @@
 //! Estimator settings from the data sheets of a vehicle's simulated sensors.
 
-use afbc_estimator::{DataSheet, Settings, Triad};
+use afbc_estimator::{DataSheet, InertialSensorFigures, Settings};
 use afbc_plant::InstrumentSuite;
-use afbc_plant::instruments::{Imu, Magnetometer};
+use afbc_plant::instruments::{ImuModel, MagnetometerModel};
 
 /// Returns the estimator's settings for this inertial sensor and the other instruments of `suite`, on a vehicle with
 /// this number of rotors, with samples every `step_s`.
 #[must_use]
-pub fn settings(suite: &InstrumentSuite, imu: &Imu, rotors: usize, gravity_m_s2: f64, step_s: f64) -> Settings {
-    let Imu { gyro, accel, harmonics, .. } = imu;
+pub fn settings(suite: &InstrumentSuite, imu: &ImuModel, rotors: usize, gravity_m_s2: f64, step_s: f64) -> Settings {
+    let ImuModel { gyro, accel, harmonics, .. } = imu;
     // Vibration of all rotors in hover, from the amplitude of one rotor's first harmonic.
     let vibration = |amplitude: f64| amplitude * libm::sqrt(0.5 * rotors as f64) * harmonics.norm();
     Settings::for_parts(&DataSheet {
-        gyro: Triad {
+        gyro: InertialSensorFigures {
             noise_rthz: gyro.noise_rad_s_rthz,
             walk: gyro.walk_rad_s2_rthz,
             instability: gyro.instability_rad_s,
@@ -24,7 +24,7 @@ pub fn settings(suite: &InstrumentSuite, imu: &Imu, rotors: usize, gravity_m_s2:
             lsb: gyro.lsb_rad_s,
             vibration: vibration(gyro.vibration_rad_s),
         },
-        accel: Triad {
+        accel: InertialSensorFigures {
             noise_rthz: accel.noise_m_s2_rthz,
             walk: accel.walk_m_s3_rthz,
             instability: accel.instability_m_s2,
@@ -47,7 +47,7 @@ pub fn settings(suite: &InstrumentSuite, imu: &Imu, rotors: usize, gravity_m_s2:
 }
 
 /// Returns the heading error from hard iron, soft iron and the motors' magnetic field \[rad\].
-fn iron(part: &Magnetometer) -> f64 {
+fn iron(part: &MagnetometerModel) -> f64 {
     let parts = [part.hard_iron_ut, part.soft_iron * part.strength_ut, part.motor_ut.xy().amax()];
     let field_ut = libm::sqrt(parts.iter().map(|part| part * part).sum());
     field_ut / (part.strength_ut * libm::cos(part.inclination_rad))

@@ -11,8 +11,8 @@ use afbc_files::read::words::out_of_range;
 use afbc_files::read::{FileError, Table};
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::Curve;
-use afbc_plant::instruments::Imu;
-use afbc_plant::{Battery, Contact, Drag, Frame, GroundEffect, InstrumentSuite, Realism, Rotors};
+use afbc_plant::instruments::ImuModel;
+use afbc_plant::{BatteryModel, Contact, Drag, GroundEffect, InstrumentSuite, Realism, RotorLayout, Rotors};
 use afbc_types::{Axis, Declared, Mounting, PLUS, Parameters, PerAxis, ROTOR_POSITION, ROTORS, Range, Rotor};
 use core::convert::Infallible;
 use nalgebra::Vector3;
@@ -50,16 +50,16 @@ pub fn parse(file: &str, text: &str, name: &str) -> Result<Vehicle, FileError> {
 
 /// Direction of rotation of a rotor, seen from above.
 #[derive(Clone, Copy)]
-enum Spin {
+enum SpinDirection {
     Ccw,
     Cw,
 }
 
-impl Spin {
+impl SpinDirection {
     const fn name(self) -> &'static str {
         match self {
-            Spin::Ccw => "ccw",
-            Spin::Cw => "cw",
+            SpinDirection::Ccw => "ccw",
+            SpinDirection::Cw => "cw",
         }
     }
 }
@@ -131,7 +131,7 @@ fn known_drag(drag: &Drag, vehicle: &Parameters<f64>, count: usize) -> KnownDrag
 /// Reads `[drag]` and `[ground]`.
 fn surroundings(root: &mut Table<'_>, vehicle: &mut Vehicle, rotor_height_m: f64) -> Result<(), FileError> {
     let Vehicle { parameters, rotors, realism, .. } = vehicle;
-    let frame = Frame::new(rotors).map_err(|error| root.fault_at("rotor", out_of_range(&error)))?;
+    let frame = RotorLayout::new(rotors).map_err(|error| root.fault_at("rotor", out_of_range(&error)))?;
     if let Some(table) = root.table("drag")? {
         let default = Drag { rotor_height_m, ..Drag::DEFAULT };
         let rotor_max_rad_s = realism.rotors.max_rad_s;
@@ -173,8 +173,8 @@ fn frame(root: &mut Table<'_>, arm_m: f64) -> Result<(Vec<Rotor<f64>>, f64), Fil
     let mut are_known = ROTORS.check(tables.len() as f64).is_ok();
     for mut table in tables {
         let at_m = table.need_vector(POSITION.name, &POSITION)?;
-        let spin = table.need_choice("spin", &[Spin::Ccw, Spin::Cw], Spin::name)?;
-        let rotor = Rotor { x: at_m.x / arm_m, y: at_m.y / arm_m, pushes_left: matches!(spin, Spin::Cw) };
+        let spin = table.need_choice("spin", &[SpinDirection::Ccw, SpinDirection::Cw], SpinDirection::name)?;
+        let rotor = Rotor { x: at_m.x / arm_m, y: at_m.y / arm_m, pushes_left: matches!(spin, SpinDirection::Cw) };
         table.finish()?;
         if !table.knows(POSITION.name) {
             are_known = false;
@@ -208,7 +208,8 @@ fn actuators(root: &mut Table<'_>, parameters: &Parameters<f64>) -> Result<(Roto
     table.require(&Rotors::LAG.range)?;
     table.require(&FORCE_MAX)?;
     let mut rotors = parts::rotors(Some(table), Rotors::DEFAULT, parameters)?;
-    rotors.battery = root.table("battery")?.map(|table| parts::battery(table, Battery::THREE_CELLS)).transpose()?;
+    rotors.battery =
+        root.table("battery")?.map(|table| parts::battery(table, BatteryModel::THREE_CELLS)).transpose()?;
     let force_max_n = parameters.thrust_factor_n_s2 * rotors.max_rad_s * rotors.max_rad_s;
     Ok((rotors, force_max_n))
 }
@@ -223,16 +224,16 @@ fn motor(mut table: Table<'_>) -> Result<Curve, FileError> {
 }
 
 /// Reads `[imu]`. Returns the mounting, and the sensor if the table names a part or states its noise figures.
-fn imu(root: &mut Table<'_>) -> Result<(Mounting<f64>, Option<Imu>), FileError> {
+fn imu(root: &mut Table<'_>) -> Result<(Mounting<f64>, Option<ImuModel>), FileError> {
     let mut mounting = Mounting::DEFAULT;
     let Some(mut table) = root.table("imu")? else { return Ok((mounting, None)) };
     table.declared(&mut mounting)?;
-    let named = parts::preset(&mut table, &Imu::PRESETS)?;
+    let named = parts::preset(&mut table, &ImuModel::PRESETS)?;
     let is_known = named.is_some() || parts::TRIADS.iter().any(|triad| table.holds_table(triad));
     let mut part = named.unwrap_or_default();
     if is_known {
         // The lever arm is refused here; only a scenario may set it.
-        table.declared_but(Imu::LEVER.range.name, &mut part)?;
+        table.declared_but(ImuModel::LEVER.range.name, &mut part)?;
         parts::groups(&mut table, &mut part, &parts::TRIADS)?;
     }
     table.finish()?;
@@ -246,7 +247,7 @@ fn estimation(
     root: &mut Table<'_>,
     parameters: &Parameters<f64>,
     rotors: usize,
-    imu: Option<&Imu>,
+    imu: Option<&ImuModel>,
 ) -> Result<(Estimation, Vec<&'static str>), FileError> {
     let gravity = Estimation::GRAVITY.range;
     let gravity_m_s2 = parameters.gravity_m_s2.clamp(gravity.min, gravity.max);

@@ -4,7 +4,7 @@
 use afbc_files::read::words::out_of_range;
 use afbc_files::read::{FileError, Table};
 use afbc_plant::instruments::Preset;
-use afbc_plant::{Battery, Contact, Drag, Frame, GroundEffect, Rotors};
+use afbc_plant::{BatteryModel, Contact, Drag, GroundEffect, RotorLayout, Rotors};
 use afbc_types::{Declared, OutOfRange, Parameters, Range};
 
 /// Accepted largest force of a rotor \[N\]; the corresponding speed must also be in range.
@@ -16,7 +16,7 @@ pub struct DragConditions<'a> {
     /// True parameters.
     pub parameters: &'a Parameters<f64>,
     /// Positions of the rotors.
-    pub frame: &'a Frame,
+    pub frame: &'a RotorLayout,
     /// Largest speed of a rotor \[rad/s\].
     pub rotor_max_rad_s: f64,
     /// Step of the simulation \[s\].
@@ -97,7 +97,7 @@ fn max_by_force(table: &mut Table<'_>, rotors: &mut Rotors, truth: &Parameters<f
 ///
 /// # Errors
 /// The same as for [`parameters`].
-pub fn battery(mut table: Table<'_>, default: Battery) -> Result<Battery, FileError> {
+pub fn battery(mut table: Table<'_>, default: BatteryModel) -> Result<BatteryModel, FileError> {
     let mut battery = default;
     table.declared(&mut battery)?;
     together(&table, &[], battery.validate())?;

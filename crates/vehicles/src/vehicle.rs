@@ -2,7 +2,7 @@
 
 use afbc::adaptive::Gains;
 use afbc::guarded::Guarded;
-use afbc::monitor::Bounds;
+use afbc::monitor::MonitorBounds;
 use afbc::{Profile, Settings};
 use afbc_estimator::Settings as Estimation;
 use afbc_files::read::{Example, FileError, Table};
@@ -11,11 +11,11 @@ use afbc_flight_core::motor::{Curve, Response};
 use afbc_flight_core::protocol::MotorOutputs;
 use afbc_onboard::{Configuration, EscSettings, Link};
 use afbc_plant::Realism;
-use afbc_plant::instruments::Imu;
+use afbc_plant::instruments::ImuModel;
 use afbc_rc::RadioSettings;
 use afbc_types::{
-    Airframe, Declaration, Declared, Mounting, OutOfRange, Parameters, PerAxis, Rotor, SensorCalibration, Value,
-    ValueMut, with_rotors,
+    Airframe, Declaration, Declared, DeclaredValue, DeclaredValueMut, Mounting, OutOfRange, Parameters, PerAxis, Rotor,
+    SensorCalibration, with_rotors,
 };
 use core::convert::Infallible;
 
@@ -50,7 +50,7 @@ pub struct Vehicle {
     /// Inertial sensor, if the file names a part or states its noise figures. Not serialised: the estimator's settings
     /// follow from it and are.
     #[serde(skip)]
-    pub imu_part: Option<Imu>,
+    pub imu_part: Option<ImuModel>,
     /// Settings of the firmware's estimator.
     pub estimation: Estimation,
     /// Names of the estimator settings that the file states; they override those derived from parts.
@@ -89,14 +89,14 @@ impl Vehicle {
     #[must_use]
     pub fn stated_over(&self, mut settings: Estimation) -> Estimation {
         let mut stated: Vec<(&str, Vec<f64>)> = Vec::new();
-        let Ok(()) = self.estimation.visit(&mut |declaration: &Declaration, value: Value<'_>| {
+        let Ok(()) = self.estimation.visit(&mut |declaration: &Declaration, value: DeclaredValue<'_>| {
             let name = declaration.range.name;
             stated.extend(self.estimation_stated.contains(&name).then(|| (name, value.numbers().collect())));
             Ok::<(), Infallible>(())
         });
-        let Ok(()) = settings.visit_mut(&mut |declaration: &Declaration, value: ValueMut<'_>| {
+        let Ok(()) = settings.visit_mut(&mut |declaration: &Declaration, value: DeclaredValueMut<'_>| {
             let own = stated.iter().find(|(name, _)| *name == declaration.range.name);
-            if let (Some((_, own)), ValueMut::Single(numbers)) = (own, value) {
+            if let (Some((_, own)), DeclaredValueMut::Single(numbers)) = (own, value) {
                 numbers.iter_mut().zip(own).for_each(|(number, own)| *number = *own as f32);
             }
             Ok::<(), Infallible>(())
@@ -170,7 +170,7 @@ impl Vehicle {
     /// ([`Guarded::new`]).
     pub fn check(&self) -> Result<(), OutOfRange> {
         let (settings, gains) = (self.settings(Profile::Flight), self.flight_gains);
-        let bounds = Bounds::new(&gains, &self.parameters.to_f32(), &settings);
+        let bounds = MonitorBounds::new(&gains, &self.parameters.to_f32(), &settings);
         with_rotors!(self.rotors.len(), N => {
             let airframe = Airframe::<N>::new(&self.parameters, &self.rotors)?;
             Guarded::new(airframe, settings, gains, bounds).map(drop)

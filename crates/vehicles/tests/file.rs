@@ -3,7 +3,7 @@
 
 use afbc::Profile;
 use afbc_estimator::Settings as Estimation;
-use afbc_types::{Declared, Value};
+use afbc_types::{Declared, DeclaredValue};
 use afbc_vehicles::{BUILT_IN, Vehicle, built_in, parse};
 
 /// Returns a built-in file's text without the tuned gains at its end.
@@ -156,7 +156,7 @@ fn damaged_files_are_told_line_by_line() {
 fn settings(estimation: &Estimation) -> Vec<(&'static str, f32)> {
     let mut settings = Vec::new();
     let Ok(()) = estimation.visit(&mut |declaration, value| {
-        let Value::Single([number]) = value else { panic!("{} is not a number", declaration.range.name) };
+        let DeclaredValue::Single([number]) = value else { panic!("{} is not a number", declaration.range.name) };
         settings.push((declaration.range.name, *number));
         Ok::<(), core::convert::Infallible>(())
     });
@@ -174,10 +174,10 @@ fn arming_and_guidance_are_the_files() {
     let vehicle = parse("my.toml", &with(tables), "my").unwrap();
     let configuration = vehicle.configuration().unwrap();
     assert_eq!(configuration.arming, afbc_flight_core::ArmingLimits { tilt_max_rad: 0.1, ..plain.arming });
-    let flying = afbc_guidance::Flying { land_m_s: 0.4, ..guidance.flying };
+    let flying = afbc_guidance::FlightModeSettings { land_m_s: 0.4, ..guidance.flying };
     let fence_action = afbc_guidance::FenceAction::Land;
-    let net = afbc_guidance::Net { fence_action, cells: 3, ..guidance.net };
-    assert_eq!(configuration.guidance, afbc_guidance::Settings { flying, net, ..guidance });
+    let failsafe = afbc_guidance::FailsafeSettings { fence_action, cells: 3, ..guidance.failsafe };
+    assert_eq!(configuration.guidance, afbc_guidance::Settings { flying, failsafe, ..guidance });
     for (tables, key, why) in [
         ("[guidance]\nfence_action = \"circle\"", "guidance.fence_action", "it must be \"nothing\", \"warn\""),
         ("[guidance]\nfence_action = 2", "guidance.fence_action", "a string"),

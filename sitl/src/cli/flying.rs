@@ -10,8 +10,8 @@ use afbc_report::claims::Claim;
 use afbc_report::flights;
 use afbc_scenario::{DURATION, Scenario};
 use afbc_sim::LogRate;
-use afbc_sim::flown::Flown;
-use afbc_sim::run::Run;
+use afbc_sim::flown::ScenarioFlight;
+use afbc_sim::run::FlightResult;
 use clap::Args;
 
 /// Flights with more steps than this, which take about a second, show their progress.
@@ -43,7 +43,7 @@ impl Flying {
         self,
         mut scenarios: Vec<Scenario>,
         open: impl FnOnce() -> Result<Folder, Failure>,
-    ) -> Result<(Folder, Vec<Flown>), Failure> {
+    ) -> Result<(Folder, Vec<ScenarioFlight>), Failure> {
         interrupt::ends_it()?;
         let mut log_every = Vec::new();
         for scenario in &mut scenarios {
@@ -63,8 +63,8 @@ impl Flying {
         let (mut flown, mut log_every) = (Vec::new(), log_every.into_iter());
         for scenario in scenarios {
             for (contender, log_every) in scenario.contenders.iter().zip(&mut log_every) {
-                let run = Run::fly(&scenario, contender, log_every)?;
-                flown.push(Flown { scenario: scenario.clone(), run });
+                let run = FlightResult::fly(&scenario, contender, log_every)?;
+                flown.push(ScenarioFlight { scenario: scenario.clone(), run });
                 progress.add(1);
             }
         }
@@ -84,11 +84,11 @@ fn progress(scenarios: &[Scenario]) -> Progress {
 }
 
 /// Writes all files into `folder`, then prints the table and the paths.
-pub(crate) fn report(folder: &Folder, flown: &[Flown], claims: &[Claim], json: Json) -> Result<(), Failure> {
+pub(crate) fn report(folder: &Folder, flown: &[ScenarioFlight], claims: &[Claim], json: Json) -> Result<(), Failure> {
     interrupt::is_too_late();
     let written = flights::write(folder, flown, claims)?;
     let whole: Vec<manifest::Flown<'_>> =
-        flown.iter().map(|Flown { scenario, .. }| (scenario, vec![scenario.seed])).collect();
+        flown.iter().map(|ScenarioFlight { scenario, .. }| (scenario, vec![scenario.seed])).collect();
     // All flights enter the fingerprint, but a scenario is written out only once for all of its contenders.
     let mut first = whole.clone();
     first.dedup_by(|a, b| a == b);

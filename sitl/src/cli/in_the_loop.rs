@@ -8,7 +8,7 @@ use afbc_hil::{Error, Log, LoopEnd};
 use afbc_scenario::{DURATION, Scenario};
 use afbc_sim::flight::Sample;
 use afbc_sim::metrics::{Accumulator, Metrics};
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::ops::ControlFlow;
@@ -39,7 +39,7 @@ pub(crate) fn outcome(scenario: &Scenario, metrics: &Metrics, end: &LoopEnd) -> 
     let LoopEnd { lost, interrupted, disarmed } = end;
     let mut text = match (lost, interrupted) {
         (None, false) => {
-            let without_link = Run::fly(scenario, &afbc_hil::firmware(scenario)?, u64::MAX)?.metrics;
+            let without_link = FlightResult::fly(scenario, &afbc_hil::firmware(scenario)?, u64::MAX)?.metrics;
             afbc_hil::tracking(scenario.duration_s, metrics, &without_link)
         }
         (Some(lost), _) => format!("The vehicle was lost at t = {:.3} s: {}.\n", lost.time_s, lost.reason),

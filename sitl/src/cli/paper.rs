@@ -9,7 +9,7 @@ use afbc_report::claims::claims;
 use afbc_scenario::Scenario;
 use afbc_scenario::case::{Case, Reading, Sign, Uncertainty};
 use afbc_scenario::paper::scenario;
-use afbc_sim::flown::Flown;
+use afbc_sim::flown::ScenarioFlight;
 use clap::{Args, ValueEnum};
 use std::process::ExitCode;
 
@@ -140,7 +140,7 @@ impl Paper {
 }
 
 /// True if the vehicle was lost in a reading other than `forces`.
-fn unexpectedly_lost(flown: &Flown) -> bool {
+fn unexpectedly_lost(flown: &ScenarioFlight) -> bool {
     let reading = flown.scenario.case.and_then(|case| case.reading);
     flown.run.lost.is_some() && reading != Some(Reading::Forces)
 }

@@ -6,7 +6,7 @@ use super::terminal::{Failure, print};
 use super::{interrupt, json, page};
 use afbc_report::flights;
 use afbc_report::results;
-use afbc_sim::flown::Flown;
+use afbc_sim::flown::ScenarioFlight;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -42,7 +42,7 @@ impl Results {
 }
 
 /// Flies all scenarios of the table.
-fn fly() -> Result<Vec<(String, Flown)>, Failure> {
+fn fly() -> Result<Vec<(String, ScenarioFlight)>, Failure> {
     interrupt::ends_it()?;
     let scenarios = results::scenarios()?;
     let flights = scenarios.iter().map(|(_, scenario)| scenario.contenders.len() as u64).sum();

@@ -6,21 +6,21 @@
 #[path = "../../../crates/mavlink/tests/reference/mod.rs"]
 mod reference;
 
+use afbc_mavlink::{Address, Counters, Decoder, Downlink, Encoder, FRAME_MAX, MessageSet, Uplink};
 use libfuzzer_sys::fuzz_target;
-use afbc_mavlink::{Address, Counters, Decoder, Downlink, FRAME_MAX, Message, Sender, Uplink};
 use mavlink::Message as _;
 use mavlink::dialects::common::MavMessage;
 
 const VEHICLE: Address = Address { system: 1, component: 1 };
 
-fn decode<'a, M: Message>(pieces: impl Iterator<Item = &'a [u8]>) -> (Vec<M>, Counters) {
+fn decode<'a, M: MessageSet>(pieces: impl Iterator<Item = &'a [u8]>) -> (Vec<M>, Counters) {
     let mut decoder = Decoder::new(VEHICLE);
     let mut messages = Vec::new();
     pieces.for_each(|piece| decoder.feed(piece, |_, message| messages.push(message)));
     (messages, *decoder.counters())
 }
 
-fn check<M: Message + core::fmt::Debug>(bytes: &[u8]) {
+fn check<M: MessageSet + core::fmt::Debug>(bytes: &[u8]) {
     let (messages, counters) = decode::<M>(core::iter::once(bytes));
     // As text, since a NaN in telemetry is not equal to itself.
     let whole = format!("{messages:?}");
@@ -32,7 +32,7 @@ fn check<M: Message + core::fmt::Debug>(bytes: &[u8]) {
     assert!(counters.skipped_bytes as usize <= bytes.len());
     for message in &messages {
         let mut buffer = [0; FRAME_MAX];
-        let (again, _) = decode::<M>(core::iter::once(Sender::new(VEHICLE).send(message, &mut buffer)));
+        let (again, _) = decode::<M>(core::iter::once(Encoder::new(VEHICLE).send(message, &mut buffer)));
         assert_eq!(again.len(), 1, "{message:?}");
     }
 }
@@ -76,7 +76,7 @@ fn nested(mut bytes: &[u8]) -> Vec<u8> {
 }
 
 /// Checks that any payload that arrives intact gives a message that is safe to fly on.
-fn check_payload<M: Message>(payload: &[u8], flyable: impl Fn(&M) -> bool) {
+fn check_payload<M: MessageSet>(payload: &[u8], flyable: impl Fn(&M) -> bool) {
     for id in 0..400 {
         if let Ok(message) = M::read(id, payload, VEHICLE) {
             assert!(flyable(&message));

@@ -5,7 +5,8 @@ use super::{Tick, Truth};
 use afbc_comms::services::modes;
 use afbc_guidance::FlightMode;
 use afbc_mavlink::{
-    Address, Answer, Command, ControlRequest, Downlink, ExternalTarget, Mission, ParameterRequest, Uplink,
+    Address, CommandResult, ControlRequest, Downlink, ExternalTarget, MissionMessage, ParameterRequest, Uplink,
+    VehicleCommand,
 };
 
 /// Time within which a command must be answered \[ms\].
@@ -72,7 +73,7 @@ pub struct Checker {
     /// Silence after which a station counts as lost \[ms\]. `acts_on_station` is true if the vehicle then acts.
     station_lost_ms: u32,
     acts_on_station: bool,
-    open: Vec<(u32, Address, Command)>,
+    open: Vec<(u32, Address, VehicleCommand)>,
     /// Address of the station in control, and the time when it was last heard.
     holder: Option<(Address, u32)>,
     /// Time when the last station in control was heard, whichever it was.
@@ -180,7 +181,7 @@ impl Checker {
             Uplink::Target(_) | Uplink::Setpoint(_) => true,
             Uplink::Parameter(request) => matches!(request, ParameterRequest::Set { .. }),
             Uplink::Mission(message) => {
-                matches!(message, Mission::Count(..) | Mission::Clear(_) | Mission::SetCurrent(_))
+                matches!(message, MissionMessage::Count(..) | MissionMessage::Clear(_) | MissionMessage::SetCurrent(_))
             }
             Uplink::Control(ControlRequest::Release) if holder == Some(from) => {
                 // The station has given up control.
@@ -199,14 +200,14 @@ impl Checker {
     }
 
     /// Checks that each command is answered once, and soon. Returns the commands accepted in this tick.
-    fn answers(&mut self, tick: &Tick) -> Vec<(Address, Command)> {
+    fn answers(&mut self, tick: &Tick) -> Vec<(Address, VehicleCommand)> {
         let mut accepted = Vec::new();
         for message in &tick.heard {
-            let Downlink::Answer { command, answer, to } = *message else { continue };
+            let Downlink::CommandAck { command, answer, to } = *message else { continue };
             let place = self.open.iter().position(|(_, from, it)| *from == to && it.id() == command);
             match place.map(|place| self.open.remove(place)) {
                 None => self.complain(tick.time_ms, &format!("an answer to nothing: {command}")),
-                Some((_, from, command)) if answer == Answer::Accepted => {
+                Some((_, from, command)) if answer == CommandResult::Accepted => {
                     let holder = self.holder.map(|(holder, _)| holder);
                     if needs_control(&command) && holder != Some(from) {
                         self.complain(tick.time_ms, &format!("obeys {from:?}, who is not in control: {command:?}"));
@@ -227,15 +228,15 @@ impl Checker {
 
     /// Checks arming: only an accepted command arms, and only at rest. The vehicle disarms on the ground, by force or
     /// with an announcement.
-    fn arming(&mut self, tick: &Tick, accepted: &[(Address, Command)], texts: &[String]) {
+    fn arming(&mut self, tick: &Tick, accepted: &[(Address, VehicleCommand)], texts: &[String]) {
         let Some(armed) = super::session::is_armed(tick) else { return };
         let (was, time_ms, truth) = (self.armed, tick.time_ms, tick.truth);
-        let has = |wanted: Command| accepted.iter().any(|(_, command)| *command == wanted);
+        let has = |wanted: VehicleCommand| accepted.iter().any(|(_, command)| *command == wanted);
         self.armed = armed;
         if armed && !was {
             (self.disarms_told, self.station_told, self.flown) = (false, false, false);
             self.descends = None;
-            if !has(Command::Arm) {
+            if !has(VehicleCommand::Arm) {
                 self.complain(time_ms, "armed by nobody");
             }
             if truth.position_m.z > AIR_M || truth.tilt_rad > ARMS_RAD || truth.velocity_m_s.norm() > ARMS_M_S {
@@ -247,8 +248,8 @@ impl Checker {
             let in_air = truth.position_m.z > AIR_M;
             self.falls = in_air;
             let cut = texts.iter().any(|text| CUTS.contains(&text.as_str()));
-            let grounded = has(Command::Disarm) || self.disarms_told || self.descends.is_some();
-            let why = match (has(Command::Kill), cut, in_air) {
+            let grounded = has(VehicleCommand::Disarm) || self.disarms_told || self.descends.is_some();
+            let why = match (has(VehicleCommand::Kill), cut, in_air) {
                 (true, ..) => None,
                 (_, true, true) if !self.bounds.cut => Some("the motors are stopped in the air"),
                 (_, true, _) => None,
@@ -261,7 +262,7 @@ impl Checker {
     }
 
     /// Checks that the reason of an announced transition allows it.
-    fn announced(&mut self, time_ms: u32, text: &str, accepted: &[(Address, Command)]) {
+    fn announced(&mut self, time_ms: u32, text: &str, accepted: &[(Address, VehicleCommand)]) {
         match text {
             DESCENDS => (self.descends, self.mode, self.mode_ms) = (Some(time_ms), FlightMode::Land, time_ms),
             DISARMS => self.disarms_told = true,
@@ -270,7 +271,7 @@ impl Checker {
         self.station_told |= text.contains("station lost") && !text.contains("no longer");
         let Some((mode, reason)) = text.split_once(": ") else { return };
         let Some(mode) = FlightMode::ALL.into_iter().find(|it| it.name() == mode) else { return };
-        let asked = |(_, command): &(Address, Command)| wanted(command) == Some(mode);
+        let asked = |(_, command): &(Address, VehicleCommand)| wanted(command) == Some(mode);
         let silent_ms = self.commander_ms.map_or(0, |heard_ms| time_ms.saturating_sub(heard_ms));
         let targetless_ms = self.target_ms.map_or(u32::MAX, |at_ms| time_ms.saturating_sub(at_ms));
         let lands = matches!(mode, FlightMode::Land | FlightMode::Return);
@@ -425,37 +426,37 @@ fn text(message: &Downlink) -> Option<String> {
 }
 
 /// True if only the station in control may give the command (docs/security.md).
-fn needs_control(command: &Command) -> bool {
+fn needs_control(command: &VehicleCommand) -> bool {
     matches!(
         command,
-        Command::Arm
-            | Command::Engage
-            | Command::TakeOff(_)
-            | Command::Land
-            | Command::Return
-            | Command::SelectMode(_)
-            | Command::SelectStandardMode(_)
-            | Command::Reposition { .. }
-            | Command::Orbit { .. }
-            | Command::Speed(_)
-            | Command::Home(_)
-            | Command::StartMission(..)
-            | Command::SetCurrent(..)
-            | Command::Reboot(_)
-            | Command::Storage(_)
+        VehicleCommand::Arm
+            | VehicleCommand::Engage
+            | VehicleCommand::TakeOff(_)
+            | VehicleCommand::Land
+            | VehicleCommand::Return
+            | VehicleCommand::SelectMode(_)
+            | VehicleCommand::SelectStandardMode(_)
+            | VehicleCommand::Reposition { .. }
+            | VehicleCommand::Orbit { .. }
+            | VehicleCommand::Speed(_)
+            | VehicleCommand::Home(_)
+            | VehicleCommand::StartMission(..)
+            | VehicleCommand::SetCurrent(..)
+            | VehicleCommand::Reboot(_)
+            | VehicleCommand::Storage(_)
     )
 }
 
 /// Returns the mode that a command requests.
-fn wanted(command: &Command) -> Option<FlightMode> {
+fn wanted(command: &VehicleCommand) -> Option<FlightMode> {
     match command {
-        Command::TakeOff(_) => Some(FlightMode::Takeoff),
-        Command::Land => Some(FlightMode::Land),
-        Command::Return => Some(FlightMode::Return),
-        Command::Reposition { .. } => Some(FlightMode::Hold),
-        Command::StartMission(..) => Some(FlightMode::Mission),
-        Command::SelectMode(custom) => modes::of_custom(*custom),
-        Command::SelectStandardMode(standard) => modes::of_standard(*standard),
+        VehicleCommand::TakeOff(_) => Some(FlightMode::Takeoff),
+        VehicleCommand::Land => Some(FlightMode::Land),
+        VehicleCommand::Return => Some(FlightMode::Return),
+        VehicleCommand::Reposition { .. } => Some(FlightMode::Hold),
+        VehicleCommand::StartMission(..) => Some(FlightMode::Mission),
+        VehicleCommand::SelectMode(custom) => modes::of_custom(*custom),
+        VehicleCommand::SelectStandardMode(standard) => modes::of_standard(*standard),
         _ => None,
     }
 }

@@ -3,7 +3,9 @@
 use super::{Tick, Truth};
 use afbc_comms::services::origin::EarthOrigin;
 use afbc_ground::{Client, Patience};
-use afbc_mavlink::{Address, Command, Datum, Decoder, Downlink, Height, MissionItem, Place, Plan, Uplink};
+use afbc_mavlink::{
+    Address, Datum, Decoder, Downlink, GlobalPosition, Height, MissionItem, MissionType, Uplink, VehicleCommand,
+};
 use afbc_scenario::{Scenario, built_in};
 use afbc_serve::{Server, fleet};
 use nalgebra::Vector3;
@@ -60,7 +62,7 @@ impl Session {
         let server = Server::new(&fleet(scenario, 1).unwrap(), 1).unwrap();
         let stations = [STATION, COMPANION].map(Station::new);
         let mut session = Session { server, stations, decoder: Decoder::new(STATION), time_ms: 0, garbage: Vec::new() };
-        session.say(STATION, Uplink::Command(Command::SetInterval { message: ROTORS, interval_us: 1000 }));
+        session.say(STATION, Uplink::Command(VehicleCommand::SetInterval { message: ROTORS, interval_us: 1000 }));
         // At first, only the first station is in reach.
         session.station(COMPANION).reaches = false;
         session
@@ -106,7 +108,7 @@ impl Session {
 
     /// Begins the upload of a mission. Its items follow when the vehicle requests them.
     pub fn upload(&mut self, from: Address, items: Vec<MissionItem>) {
-        self.station(from).client.upload([(Plan::MISSION, items)], UPLOAD);
+        self.station(from).client.upload([(MissionType::MISSION, items)], UPLOAD);
     }
 
     /// Changes weather or faults with a line of the server's protocol.
@@ -175,7 +177,7 @@ impl Session {
         let begin_ms = self.time_ms;
         while self.time_ms < begin_ms + ARMS_MS {
             if self.time_ms.is_multiple_of(TRY_MS) {
-                self.say(STATION, Uplink::Command(Command::Arm));
+                self.say(STATION, Uplink::Command(VehicleCommand::Arm));
             }
             let tick = self.step();
             see(&tick);
@@ -196,12 +198,12 @@ pub fn is_armed(tick: &Tick) -> Option<bool> {
 }
 
 /// Returns a place of the local frame \[m\] of the outdoor vehicle in global coordinates.
-pub fn global(x: f32, y: f32, z: f32) -> Place {
+pub fn global(x: f32, y: f32, z: f32) -> GlobalPosition {
     let origin = EarthOrigin::new(EarthOrigin::SIMULATED).unwrap();
     let global = origin.global(&Vector3::new(x, y, z));
     let [latitude_e7, longitude_e7] = global.e7();
     let height = Height { metres: global.altitude_m as f32, above: Datum::Sea };
-    Place { latitude_e7, longitude_e7, height }
+    GlobalPosition { latitude_e7, longitude_e7, height }
 }
 
 /// Returns a mission item at a place of the local frame \[m\]: north, west, up.

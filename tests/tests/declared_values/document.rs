@@ -1,7 +1,7 @@
 //! A file as tables of keys, with other values to try for each.
 
 use afbc_files::read::words;
-use afbc_types::{Declaration, Declared, Value};
+use afbc_types::{Declaration, Declared, DeclaredValue};
 use core::convert::Infallible;
 use core::fmt::{self, Write};
 use std::collections::BTreeMap;
@@ -134,7 +134,7 @@ impl Document {
 }
 
 /// Returns other values to try, coordinate by coordinate.
-fn cases(declaration: &Declaration, value: &Value<'_>) -> Vec<(Option<char>, Vec<String>)> {
+fn cases(declaration: &Declaration, value: &DeclaredValue<'_>) -> Vec<(Option<char>, Vec<String>)> {
     let range = declaration.range;
     let near = |number: f64| {
         let all = [number * 1.01, range.max, range.min, number * 0.5, number * 2.0, number * 0.99, number + 0.01];
@@ -142,20 +142,24 @@ fn cases(declaration: &Declaration, value: &Value<'_>) -> Vec<(Option<char>, Vec
         all.filter(|other| range.check(*other).is_ok() && *other != number && other.is_finite()).collect::<Vec<_>>()
     };
     match *value {
-        Value::Single([number]) => {
+        DeclaredValue::Single([number]) => {
             let near = near((*number).into()).into_iter().map(|other| other as f32).filter(|other| other != number);
             vec![(None, near.map(|other| format!("{other:?}")).collect())]
         }
-        Value::Double([number]) => vec![(None, near(*number).iter().map(|other| format!("{other:?}")).collect())],
-        Value::Single(numbers) => vector(numbers, |number| near(number.into()).iter().map(|it| *it as f32).collect()),
-        Value::Double(numbers) => vector(numbers, near),
-        Value::Whole(number) => {
+        DeclaredValue::Double([number]) => {
+            vec![(None, near(*number).iter().map(|other| format!("{other:?}")).collect())]
+        }
+        DeclaredValue::Single(numbers) => {
+            vector(numbers, |number| near(number.into()).iter().map(|it| *it as f32).collect())
+        }
+        DeclaredValue::Double(numbers) => vector(numbers, near),
+        DeclaredValue::Whole(number) => {
             let others = [number.wrapping_add(1), number.wrapping_sub(1), number * 2, number / 2];
             let others = others.into_iter().filter(|other| *other != number && range.check(*other).is_ok());
             vec![(None, others.map(|other| other.to_string()).collect())]
         }
-        Value::Switch(on) => vec![(None, vec![(!on).to_string()])],
-        Value::Choice(index, words) => {
+        DeclaredValue::Switch(on) => vec![(None, vec![(!on).to_string()])],
+        DeclaredValue::Choice(index, words) => {
             let others = words.iter().enumerate().filter(|(other, _)| *other != index);
             vec![(None, others.map(|(_, word)| format!("{word:?}")).collect())]
         }

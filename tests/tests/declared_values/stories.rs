@@ -5,7 +5,7 @@ use crate::airborne::session::{is_armed, item};
 use crate::airborne::{STATION, Session, Tick, velocity};
 use afbc_comms::services::modes;
 use afbc_guidance::FlightMode;
-use afbc_mavlink::{Command, ExternalTarget, ManualControl, Uplink};
+use afbc_mavlink::{ExternalTarget, ManualControl, Uplink, VehicleCommand};
 use afbc_scenario::Scenario;
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
@@ -35,7 +35,7 @@ const ARMS_MS: [u32; 2] = [4_000, 10_000];
 const BEGINS_MS: u32 = 10_000;
 
 enum Act {
-    Say(Command),
+    Say(VehicleCommand),
     Stream(Option<Uplink>),
     Line(&'static str),
     Mission,
@@ -43,7 +43,7 @@ enum Act {
 }
 
 fn select(mode: FlightMode) -> Act {
-    Act::Say(Command::SelectMode(modes::custom(mode)))
+    Act::Say(VehicleCommand::SelectMode(modes::custom(mode)))
 }
 
 impl Story {
@@ -83,7 +83,7 @@ impl Story {
         let mut acts = vec![(0, select(FlightMode::Takeoff))];
         let then: (Vec<(u32, Act)>, u32) = match self {
             Story::Ground => return (Vec::new(), 5_000),
-            Story::Journey => (vec![(0, Act::Mission), (8_000, Act::Say(Command::Return))], 34_000),
+            Story::Journey => (vec![(0, Act::Mission), (8_000, Act::Say(VehicleCommand::Return))], 34_000),
             Story::Fence => (vec![(0, Act::Stream(Some(velocity(5.0, 0.0, 0.0)))), (200, offboard())], 7_000),
             Story::Ceiling => (vec![(0, Act::Stream(Some(velocity(0.0, 0.0, 3.0)))), (200, offboard())], 7_000),
             Story::Silence => (vec![(0, Act::Silent)], 6_000),
@@ -115,7 +115,7 @@ impl Story {
         for time_ms in 0..BEGINS_MS + lasts_ms {
             let arms = (ARMS_MS[0]..ARMS_MS[1]).contains(&time_ms) && time_ms.is_multiple_of(250);
             if arms && !armed {
-                session.say(STATION, Uplink::Command(Command::Arm));
+                session.say(STATION, Uplink::Command(VehicleCommand::Arm));
             }
             while let Some((_, act)) = acts.next_if(|(at_ms, _)| BEGINS_MS + at_ms <= time_ms) {
                 match act {
@@ -131,7 +131,7 @@ impl Story {
                 }
             }
             if self == Story::Journey && time_ms == BEGINS_MS + 6_000 {
-                session.say(STATION, Uplink::Command(Command::StartMission(0, None)));
+                session.say(STATION, Uplink::Command(VehicleCommand::StartMission(0, None)));
             }
             let tick = session.step();
             armed = is_armed(&tick).unwrap_or(armed);

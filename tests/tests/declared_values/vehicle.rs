@@ -5,9 +5,9 @@ use super::stories::Story;
 use super::subject::{Responses, Subject, change_each, compare, fields};
 use crate::airborne::STATION;
 use afbc::Profile;
-use afbc_guidance::{Flying, Net};
+use afbc_guidance::{FailsafeSettings, FlightModeSettings};
 use afbc_hil::Host;
-use afbc_mavlink::{Decoder, Downlink, FRAME_MAX, ParameterRequest, Sender, Uplink};
+use afbc_mavlink::{Decoder, Downlink, Encoder, FRAME_MAX, ParameterRequest, Uplink};
 use afbc_onboard::parameters::ParameterTable;
 use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_scenario::{Scenario, built_in};
@@ -133,7 +133,7 @@ fn flown(vehicle: &Vehicle, kind: ControllerKind) -> Vec<u64> {
 
 /// Returns a parameter as a station reads it over the link.
 fn read_by_station(vehicle: &Vehicle, name: &str) -> f32 {
-    let (mut host, mut sender) = (Host::for_vehicle(vehicle).unwrap(), Sender::new(STATION));
+    let (mut host, mut sender) = (Host::for_vehicle(vehicle).unwrap(), Encoder::new(STATION));
     let mut letters = [0; 16];
     letters.iter_mut().zip(name.bytes()).for_each(|(to, from)| *to = from);
     let mut buffer = [0; FRAME_MAX];
@@ -160,8 +160,8 @@ fn read_by_station(vehicle: &Vehicle, name: &str) -> f32 {
 fn base() -> Vehicle {
     let mut vehicle = afbc_vehicles::built_in("iris").unwrap().read().unwrap();
     let battery = vehicle.realism.rotors.battery.unwrap();
-    let (net, flying) = (vehicle.guidance.net, vehicle.guidance.flying);
-    vehicle.guidance.net = Net {
+    let (net, flying) = (vehicle.guidance.failsafe, vehicle.guidance.flying);
+    vehicle.guidance.failsafe = FailsafeSettings {
         fence_radius_m: 10.0,
         fence_height_m: 8.0,
         station_lost_s: 2.0,
@@ -173,7 +173,7 @@ fn base() -> Vehicle {
         emergency: 0.03,
         ..net
     };
-    vehicle.guidance.flying = Flying {
+    vehicle.guidance.flying = FlightModeSettings {
         takeoff_height_m: 3.0,
         return_height_m: 5.0,
         disarm_before_s: 3.0,

@@ -4,7 +4,7 @@ use afbc_comms::AuxSensors;
 use afbc_hil::Host;
 use afbc_log::exact::{FRAME_MAX as RECORD_MAX, Frames, Record, write};
 use afbc_mavlink::telemetry::BatteryStatus;
-use afbc_mavlink::{Address, Command, Datum, FRAME_MAX, Height, ParameterRequest, Sender, Uplink};
+use afbc_mavlink::{Address, Datum, Encoder, FRAME_MAX, Height, ParameterRequest, Uplink, VehicleCommand};
 use afbc_scenario::Scenario;
 use afbc_sim::flight::World;
 use afbc_types::{ROTORS_MAX, RotorSpeeds, State};
@@ -25,25 +25,27 @@ fn sends(ms: u64, random: &mut Xoshiro256PlusPlus) -> Option<Uplink> {
     let command = |command| Some(Uplink::Command(command));
     match ms {
         500 => return Some(set(b"BAT1_N_CELLS", 3_i32.to_le_bytes(), INT32)),
-        6_000 | 7_000 | 8_000 | 9_000 => return command(Command::Arm),
-        6_300 | 7_300 | 8_300 | 9_300 => return command(Command::TakeOff(Height { metres: 4.0, above: Datum::Home })),
-        18_000 => return command(Command::Land),
+        6_000 | 7_000 | 8_000 | 9_000 => return command(VehicleCommand::Arm),
+        6_300 | 7_300 | 8_300 | 9_300 => {
+            return command(VehicleCommand::TakeOff(Height { metres: 4.0, above: Datum::Home }));
+        }
+        18_000 => return command(VehicleCommand::Land),
         _ if ms.is_multiple_of(1_000) => return Some(Uplink::Heartbeat),
         _ => {}
     }
     match random.next_u32() % 300 {
         // Before it flies, the station only sends parameters.
         number if ms < 9_500 && number != 4 => None,
-        0 => command(Command::Speed(1.0 + (random.next_u32() % 5) as f32)),
-        1 => command(Command::Engage),
-        2 => command(Command::SelectStandardMode((random.next_u32() % 8) as u8)),
-        3 => command(Command::Home(None)),
+        0 => command(VehicleCommand::Speed(1.0 + (random.next_u32() % 5) as f32)),
+        1 => command(VehicleCommand::Engage),
+        2 => command(VehicleCommand::SelectStandardMode((random.next_u32() % 8) as u8)),
+        3 => command(VehicleCommand::Home(None)),
         4 => {
             let speed_m_s = 2.0_f32 + (random.next_u32() % 9) as f32;
             Some(set(b"MPC_XY_VEL_MAX", speed_m_s.to_le_bytes(), REAL32))
         }
         5 => Some(Uplink::State { sent_us: ms * 1_000, state: State::default(), sigmas: Default::default() }),
-        6 if ms > 12_000 => command(Command::Return),
+        6 if ms > 12_000 => command(VehicleCommand::Return),
         _ => None,
     }
 }
@@ -68,7 +70,7 @@ pub(crate) fn fly_with(mut host: Host, scenario: &Scenario, seed: u64, ticks: u6
     let battery = BatteryStatus { voltage_mv: 12_500, current_ca: 500, ..BatteryStatus::default() };
     host.comms().set_aux_sensors(AuxSensors { battery: Some(battery), ..AuxSensors::default() });
     let mut world = World::released(&Scenario { seed, ..scenario.clone() }, 1e-3).unwrap();
-    let (mut random, mut sender) = (Xoshiro256PlusPlus::seed_from_u64(seed), Sender::new(STATION));
+    let (mut random, mut sender) = (Xoshiro256PlusPlus::seed_from_u64(seed), Encoder::new(STATION));
     let (mut speeds, mut buffer) = (RotorSpeeds::<ROTORS_MAX>::default(), [0; FRAME_MAX]);
     let (mut fault, mut fault_ms) = (None, 0);
     for ms in 0..ticks {

@@ -6,7 +6,7 @@ use crate::airborne::session::{global, item};
 use afbc_comms::services::modes;
 use afbc_guidance::FlightMode;
 use afbc_mavlink::{
-    Address, AttitudeAndThrust, Command, Datum, ExternalTarget, Height, ManualControl, MissionItem, Uplink,
+    Address, AttitudeAndThrust, Datum, ExternalTarget, Height, ManualControl, MissionItem, Uplink, VehicleCommand,
 };
 
 /// An event.
@@ -151,7 +151,7 @@ impl Case {
     /// Flies a mission from the beginning of the case.
     pub(crate) fn mission(self, places: &[[f32; 3]]) -> Self {
         let items = (0..).zip(places).map(|(number, at)| item(number, WAYPOINT, *at)).collect();
-        self.before(Do::Upload(items)).at(0.1, say(Command::StartMission(0, None)))
+        self.before(Do::Upload(items)).at(0.1, say(VehicleCommand::StartMission(0, None)))
     }
 
     /// Watches the battery, whose cells are known.
@@ -170,20 +170,20 @@ impl Case {
 pub(crate) const WAYPOINT: u16 = 16;
 pub(crate) const TAKE_OFF: u16 = 22;
 
-pub(crate) fn say(command: Command) -> Do {
+pub(crate) fn say(command: VehicleCommand) -> Do {
     Do::Say(STATION, Uplink::Command(command))
 }
 
-pub(crate) fn select(mode: FlightMode) -> Command {
-    Command::SelectMode(modes::custom(mode))
+pub(crate) fn select(mode: FlightMode) -> VehicleCommand {
+    VehicleCommand::SelectMode(modes::custom(mode))
 }
 
-pub(crate) fn take_off(metres: f32) -> Command {
-    Command::TakeOff(Height { metres, above: Datum::Here })
+pub(crate) fn take_off(metres: f32) -> VehicleCommand {
+    VehicleCommand::TakeOff(Height { metres, above: Datum::Here })
 }
 
-pub(crate) fn go_to(x: f32, y: f32, z: f32) -> Command {
-    Command::Reposition { place: global(x, y, z), yaw_rad: f32::NAN, speed_m_s: None, changes_mode: true }
+pub(crate) fn go_to(x: f32, y: f32, z: f32) -> VehicleCommand {
+    VehicleCommand::Reposition { place: global(x, y, z), yaw_rad: f32::NAN, speed_m_s: None, changes_mode: true }
 }
 
 /// Returns a target that tilts towards the north and climbs a little.

@@ -3,7 +3,7 @@
 use super::case::*;
 use crate::airborne::{COMPANION, STATION, velocity};
 use afbc_guidance::FlightMode;
-use afbc_mavlink::{Command, Uplink};
+use afbc_mavlink::{Uplink, VehicleCommand};
 
 /// Returns all cases with several faults.
 pub(super) fn cases() -> Vec<Case> {
@@ -32,7 +32,7 @@ pub(super) fn cases() -> Vec<Case> {
             .outdoors()
             .set("RTL_RETURN_ALT", 8.0)
             .mission(&AWAY)
-            .at(5.0, say(Command::Return))
+            .at(5.0, say(VehicleCommand::Return))
             .at(6.0, line("fault gnss lost"))
             .lasts(36.0)
             .hears(&["sensor fault", DESCENDS])
@@ -65,7 +65,7 @@ pub(super) fn cases() -> Vec<Case> {
         case("heading-lost-returning", "magnetometer lost during a return")
             .outdoors()
             .mission(&AWAY)
-            .at(5.0, say(Command::Return))
+            .at(5.0, say(VehicleCommand::Return))
             .at(5.5, line("fault magnetometer lost"))
             .lasts(30.0)
             .hears(&["sensor fault", "on the ground: disarming"])
@@ -98,7 +98,7 @@ pub(super) fn cases() -> Vec<Case> {
             .bound(|bounds| bounds.height_m = 8.0)
             .lands(),
         case("tracker-lost-landing", "the tracker is lost in a landing")
-            .at(0.2, say(Command::Land))
+            .at(0.2, say(VehicleCommand::Land))
             .at(1.2, line("fault tracker lost"))
             .lasts(18.0)
             .hears(&["sensor fault"])
@@ -138,7 +138,7 @@ pub(super) fn cases() -> Vec<Case> {
         case("gust-returning", "a gust of 8 m/s during a return")
             .outdoors()
             .mission(&AWAY)
-            .at(5.0, say(Command::Return))
+            .at(5.0, say(VehicleCommand::Return))
             .at(7.0, line("gust 0 8 0 0.5 2"))
             .lasts(30.0)
             .hears(&["on the ground: disarming"])
@@ -186,7 +186,7 @@ pub(super) fn cases() -> Vec<Case> {
             .on(Start::Air(5.0))
             .mission(&[[9.0, 0.0, 5.0], [9.0, 9.0, 5.0]])
             .at(1.5, line("fault tracker lost 7"))
-            .at(8.7, say(Command::Land))
+            .at(8.7, say(VehicleCommand::Land))
             .bound(|bounds| bounds.tilt_rad = 0.9)
             .lasts(26.0)
             .hears(&[DESCENDS, "on the ground: disarming"])
@@ -234,7 +234,7 @@ pub(super) fn cases() -> Vec<Case> {
             .near(0.0, 0.0, 0.7),
         case("kill-while-descending", "an order to stop the motors by force while it descends")
             .at(0.5, line("fault tracker lost"))
-            .at(7.5, say(Command::Kill))
+            .at(7.5, say(VehicleCommand::Kill))
             .lasts(10.0)
             .hears(&[DESCENDS])
             .bound(|bounds| (bounds.cut, bounds.touch_m_s) = (true, 9.0))

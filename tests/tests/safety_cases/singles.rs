@@ -5,7 +5,7 @@ use crate::airborne::checker::CUTS;
 use crate::airborne::session::item;
 use crate::airborne::{COMPANION, STATION, place, velocity};
 use afbc_guidance::FlightMode;
-use afbc_mavlink::{Command, Uplink};
+use afbc_mavlink::{Uplink, VehicleCommand};
 
 /// Returns all cases with one fault.
 pub(super) fn cases() -> Vec<Case> {
@@ -184,7 +184,7 @@ fn fence() -> Vec<Case> {
             .fenced(2.0)
             .on(Start::Ground)
             .before(Do::Upload(vec![item(0, TAKE_OFF, [0.0, 0.0, 20.0]), item(1, WAYPOINT, AWAY[0])]))
-            .at(0.5, say(Command::StartMission(0, None)))
+            .at(0.5, say(VehicleCommand::StartMission(0, None)))
             .lasts(11.5)
             .hears(&["mission item 0: outside the geofence", "on the ground: disarming"])
             .lands(),
@@ -212,7 +212,7 @@ fn fence() -> Vec<Case> {
             .fenced(2.0)
             .set("RTL_RETURN_ALT", 15.0)
             .mission(&[[8.0, 0.0, 3.0]])
-            .at(6.0, say(Command::Return))
+            .at(6.0, say(VehicleCommand::Return))
             .lasts(29.0)
             .never(&["at the geofence"])
             .hears(&["on the ground: disarming"])
@@ -289,7 +289,7 @@ fn battery() -> Vec<Case> {
             .watched()
             .before(Do::Line("battery 0.12"))
             .on(Start::PowerUp)
-            .at(0.0, say(Command::Arm))
+            .at(0.0, say(VehicleCommand::Arm))
             .lasts(1.0)
             .hears(&["arming refused: battery low or not known"])
             .lands(),
@@ -297,7 +297,7 @@ fn battery() -> Vec<Case> {
             .watched()
             .set("BAT1_N_CELLS", 6.0)
             .on(Start::PowerUp)
-            .at(0.0, say(Command::Arm))
+            .at(0.0, say(VehicleCommand::Arm))
             .lasts(1.0)
             .hears(&["arming refused: battery low or not known"])
             .lands(),
@@ -310,7 +310,7 @@ const ON_GROUND_RAD: f64 = 1.0;
 
 fn sensors() -> Vec<Case> {
     let fails = |name, what, line| case(name, what).at(0.5, Do::Line(line));
-    let lands = || say(Command::Land);
+    let lands = || say(VehicleCommand::Land);
     vec![
         fails("gnss-lost", "GNSS lost for good", "fault gnss lost")
             .outdoors()
@@ -360,7 +360,7 @@ fn sensors() -> Vec<Case> {
             .outdoors()
             .before(Do::Line("at 3 fault barometer lost"))
             .on(Start::PowerUp)
-            .at(0.0, say(Command::Arm))
+            .at(0.0, say(VehicleCommand::Arm))
             .lasts(1.0)
             .hears(&["arming refused: a sensor has failed"])
             .lands(),
@@ -402,7 +402,7 @@ fn airframe() -> Vec<Case> {
     vec![
         suffers("rotor-80", "a rotor with 80 % of its thrust", "rotor 2 0.8").near(0.0, 0.0, 0.4),
         suffers("rotor-60", "a rotor with 60 % of its thrust, then a landing", "rotor 2 0.6")
-            .at(4.0, say(Command::Land))
+            .at(4.0, say(VehicleCommand::Land))
             .lasts(15.0)
             .hears(&["on the ground: disarming"])
             .lands()
@@ -465,7 +465,7 @@ fn link() -> Vec<Case> {
             .flies(),
         case("second-station", "a second station orders a landing, and sends targets")
             .at(0.0, Do::Back(COMPANION))
-            .at(0.5, other(Command::Land))
+            .at(0.5, other(VehicleCommand::Land))
             .at(1.0, Do::Say(COMPANION, velocity(5.0, 0.0, 0.0)))
             .at(1.5, other(select(FlightMode::Offboard)))
             .hears(&["245/191 ignored: 255/190 is in control"])
@@ -480,28 +480,28 @@ fn link() -> Vec<Case> {
             .hears(&["return: station lost", "no longer: station lost", "hold: ordered"]),
         case("second-station-disarms", "a second station orders to disarm in flight")
             .at(0.0, Do::Back(COMPANION))
-            .at(0.5, other(Command::Disarm))
+            .at(0.5, other(VehicleCommand::Disarm))
             .hears(&["disarming refused: in flight; force it to stop"])
             .near(0.0, 0.0, 0.5),
         case("disarm-in-flight", "an order to disarm in flight, thrice")
-            .at(0.5, say(Command::Disarm))
-            .at(1.0, say(Command::Disarm))
-            .at(1.5, say(Command::Disarm))
+            .at(0.5, say(VehicleCommand::Disarm))
+            .at(1.0, say(VehicleCommand::Disarm))
+            .at(1.5, say(VehicleCommand::Disarm))
             .hears(&["disarming refused: in flight; force it to stop"])
             .near(0.0, 0.0, 0.5),
         case("kill", "an order to stop the motors by force")
-            .at(0.5, say(Command::Kill))
+            .at(0.5, say(VehicleCommand::Kill))
             .bound(|bounds| (bounds.cut, bounds.touch_m_s) = (true, 9.0))
             .lands(),
         case("second-station-kills", "a second station orders to stop the motors by force")
             .at(0.0, Do::Back(COMPANION))
-            .at(0.5, other(Command::Kill))
+            .at(0.5, other(VehicleCommand::Kill))
             .bound(|bounds| (bounds.cut, bounds.touch_m_s) = (true, 9.0))
             .lands(),
         case("land-and-arm", "an order to land while disarmed, and one to arm")
             .on(Start::PowerUp)
-            .at(0.0, say(Command::Land))
-            .at(0.5, say(Command::Arm))
+            .at(0.0, say(VehicleCommand::Land))
+            .at(0.5, say(VehicleCommand::Arm))
             .lasts(12.0)
             .hears(&["refused: not armed", "on the ground: disarming"])
             .lands(),

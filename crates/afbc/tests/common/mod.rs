@@ -4,7 +4,7 @@ use afbc::adaptive::Gains;
 use afbc::disturbance::DisturbanceObserver;
 use afbc::fuzzy::Membership;
 use afbc::reference::ReferenceModel;
-use afbc::{Limits, Profile, Safeguards, Settings, backstepping};
+use afbc::{PositionControlLimits, Profile, Safeguards, Settings, backstepping};
 use afbc_control::{Action, FlightController, Smoothing, Trace, Validated};
 use afbc_types::{Axis, Declaration, Declared, Inputs, Parameters, PerAxis, Setpoint, State};
 use nalgebra::Vector3;
@@ -89,22 +89,24 @@ pub(crate) fn spread(declaration: Declaration) -> impl Strategy<Value = f32> {
     ]
 }
 
-pub(crate) fn limits() -> impl Strategy<Value = Limits> {
+pub(crate) fn limits() -> impl Strategy<Value = PositionControlLimits> {
     let any = (
-        spread(Limits::TILT),
-        spread(Limits::RATE),
-        spread(Limits::ACCEL),
-        spread(Limits::SPEED),
-        spread(Limits::CLIMB),
+        spread(PositionControlLimits::TILT),
+        spread(PositionControlLimits::RATE),
+        spread(PositionControlLimits::ACCEL),
+        spread(PositionControlLimits::SPEED),
+        spread(PositionControlLimits::CLIMB),
     )
-        .prop_map(|(tilt_max_rad, tilt_rate_max_rad_s, acceleration_max_m_s2, speed_max_m_s, climb_max_m_s)| Limits {
-            tilt_max_rad,
-            tilt_rate_max_rad_s,
-            acceleration_max_m_s2,
-            speed_max_m_s,
-            climb_max_m_s,
+        .prop_map(|(tilt_max_rad, tilt_rate_max_rad_s, acceleration_max_m_s2, speed_max_m_s, climb_max_m_s)| {
+            PositionControlLimits {
+                tilt_max_rad,
+                tilt_rate_max_rad_s,
+                acceleration_max_m_s2,
+                speed_max_m_s,
+                climb_max_m_s,
+            }
         });
-    prop_oneof![1 => Just(Limits::NONE), 1 => Just(Profile::Flight.settings().limits), 4 => any]
+    prop_oneof![1 => Just(PositionControlLimits::NONE), 1 => Just(Profile::Flight.settings().limits), 4 => any]
 }
 
 pub(crate) fn safeguards() -> impl Strategy<Value = Safeguards> {

@@ -2,8 +2,8 @@
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used, reason = "shared by tests")]
 
 use afbc_calibration::{CalibrationEvent, RawSample, Side};
-use afbc_plant::instruments::Imu;
-use afbc_plant::{Environment, InstrumentSuite, Instruments, Motion, Plant, PlantModel, Truth};
+use afbc_plant::instruments::ImuModel;
+use afbc_plant::{Environment, InstrumentSuite, Motion, Plant, PlantModel, SimulatedInstruments, Truth};
 use afbc_types::Parameters;
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
@@ -14,7 +14,7 @@ pub const GRAVITY: f64 = 9.81;
 
 /// Vehicle in somebody's hands.
 pub struct Hands {
-    pub instruments: Instruments,
+    pub instruments: SimulatedInstruments,
     still: Truth,
     steps: u32,
     pub attitude: UnitQuaternion<f64>,
@@ -29,7 +29,7 @@ impl Hands {
         let calm = Environment::calm(Parameters::PAPER).unwrap();
         let still = Plant::new(PlantModel::RigidBody, Motion::default(), calm).truth();
         Hands {
-            instruments: Instruments::new(suite, &[], seed, STEP_S).unwrap(),
+            instruments: SimulatedInstruments::new(suite, &[], seed, STEP_S).unwrap(),
             still: Truth { thrust_share: 0.0, rotor_speeds_rad_s: still.rotor_speeds_rad_s * 0.0, ..still },
             steps: 0,
             attitude: UnitQuaternion::identity(),
@@ -38,7 +38,7 @@ impl Hands {
         }
     }
 
-    pub fn with_imu(imu: Imu, seed: u64) -> Self {
+    pub fn with_imu(imu: ImuModel, seed: u64) -> Self {
         Hands::new(&InstrumentSuite { imu: Some(imu), ..InstrumentSuite::default() }, seed)
     }
 

@@ -8,8 +8,8 @@ use crate::draw::mix;
 use afbc::Profile;
 use afbc_files::read::FileError;
 use afbc_files::read::words::out_of_range;
-use afbc_plant::noise::{Noise, Stream};
-use afbc_plant::{Environment, Motion, Start, Wind};
+use afbc_plant::noise::{Noise, NoiseStream};
+use afbc_plant::{Environment, Motion, RotorStart, Wind};
 use afbc_scenario::trajectory::Trajectory;
 use afbc_scenario::{Scenario, built_in};
 use afbc_types::OutOfRange;
@@ -56,7 +56,7 @@ impl<'a> Base<'a> {
         // The vehicle's name enters the draw, not its index, so that other vehicles in the list change nothing.
         let of_vehicle = vehicle.name.bytes().fold(mix(seed), |hash, byte| mix(hash ^ u64::from(byte)));
         let bits = mix(of_vehicle.wrapping_add(number)) >> 11;
-        let mut noise = Noise::new(bits, Stream::Scenario);
+        let mut noise = Noise::new(bits, NoiseStream::Scenario);
         let boldness = BOLDNESS_MIN + (1.0 - BOLDNESS_MIN) * noise.uniform();
         let change = self.power.fitted(&Change::draw(&mut noise, vehicle));
         // Outdoors the estimate is wrong by metres, and a vehicle that stands on the ground with a wrong position would
@@ -81,7 +81,7 @@ impl<'a> Base<'a> {
             ..self.scenario.clone()
         };
         if stands {
-            scenario.realism.rotors.start = Start::Idle;
+            scenario.realism.rotors.start = RotorStart::Idle;
         }
         change.put(&mut scenario).map_err(|error: OutOfRange| {
             let problem = format!("it cannot fly with {}; fly it with other seeds", out_of_range(&error));

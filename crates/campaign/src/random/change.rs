@@ -2,7 +2,9 @@
 
 use super::bisection::largest;
 use afbc_plant::noise::Noise;
-use afbc_plant::{Drag, Environment, Frame, ParameterChange, Payload, PlantParameter, RotorFault, Turbulence};
+use afbc_plant::{
+    Drag, Environment, Payload, PlantParameter, PlantParameterChange, RotorFault, RotorLayout, Turbulence,
+};
 use afbc_scenario::Scenario;
 use afbc_types::OutOfRange;
 use afbc_vehicles::Vehicle;
@@ -133,7 +135,7 @@ impl Change {
                 scenario.environment = Environment::calm(vehicle)?.with_payloads(vec![payload])?;
             }
             Change::Mass(factor) => {
-                let change = ParameterChange { quantity: PlantParameter::Mass, factor, start_s, end_s };
+                let change = PlantParameterChange { quantity: PlantParameter::Mass, factor, start_s, end_s };
                 scenario.environment = Environment::new(vehicle, vec![change], Vec::new())?;
             }
             Change::Rotor { rotor, efficiency } => {
@@ -177,7 +179,7 @@ fn times(drag: Drag, factor: f64) -> Drag {
 
 /// Returns 2, or the largest smaller factor on this vehicle's drag that the plant accepts.
 fn doubled(vehicle: &Vehicle) -> f64 {
-    let (Some(drag), Ok(frame)) = (vehicle.realism.drag, Frame::new(&vehicle.rotors)) else { return 1.0 };
+    let (Some(drag), Ok(frame)) = (vehicle.realism.drag, RotorLayout::new(&vehicle.rotors)) else { return 1.0 };
     let max_rad_s = vehicle.realism.rotors.max_rad_s;
     let fits = |more: f64| times(drag, 1.0 + more).validate_for(&vehicle.parameters, &frame, max_rad_s, 0.001).is_ok();
     1.0 + largest(1.0, fits)

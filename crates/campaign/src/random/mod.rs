@@ -20,7 +20,7 @@ use crate::compare::{self, Outcome};
 use afbc_files::read::FileError;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use afbc_types::OutOfRange;
 use afbc_vehicles::Vehicle;
 use base::Base;
@@ -93,7 +93,7 @@ impl Random {
 /// The first parameter, gain or setting out of range.
 pub fn fly(flights: Vec<DrawnFlight>, progress: &(dyn Fn() + Sync)) -> Result<Vec<FlownDraw>, OutOfRange> {
     let outcome = |scenario: &Scenario, contender: &Contender| {
-        let run = Run::fly(scenario, contender, u64::MAX)?;
+        let run = FlightResult::fly(scenario, contender, u64::MAX)?;
         progress();
         Ok(Outcome::of(scenario, &run))
     };

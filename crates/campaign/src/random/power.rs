@@ -2,7 +2,7 @@
 
 use super::bisection::largest;
 use super::change::Change;
-use afbc_plant::Battery;
+use afbc_plant::BatteryModel;
 use afbc_scenario::trajectory::SAMPLES;
 use afbc_scenario::trajectory::polynomial::peaks;
 use afbc_scenario::trajectory::{Reference, Trajectory};
@@ -138,7 +138,7 @@ impl Power {
 }
 
 /// Returns the fraction of their largest speed that the rotors reach when a full battery drives all of them.
-fn speed_share(vehicle: &Vehicle, battery: &Battery) -> f64 {
+fn speed_share(vehicle: &Vehicle, battery: &BatteryModel) -> f64 {
     let speed_rad_s = vehicle.realism.rotors.max_rad_s;
     let torque = vehicle.parameters.drag_factor_n_m_s2 * vehicle.rotors.len() as f64;
     let full_w = torque * speed_rad_s * speed_rad_s * speed_rad_s;

@@ -1,7 +1,7 @@
 //! Classes of sensor behaviour that the suite `rough-estimate` draws.
 
 use super::drawing::Drawing;
-use afbc_plant::instruments::{Failure, TrackerModel};
+use afbc_plant::instruments::{FailureKind, TrackerModel};
 use core::f64::consts::PI;
 use nalgebra::Vector3;
 
@@ -67,7 +67,7 @@ pub static CLASSES: [Class; 24] = [
         for _ in 0..d.count(5) {
             let (rates_rad_s, specific_force_m_s2) = (d.between(1.0, 5.0), d.between(10.5, 14.0));
             let lasts_s = d.logarithmic(0.01, 2.0);
-            d.fault(Failure::ImuClipped { rates_rad_s, specific_force_m_s2 }, lasts_s, 0.0);
+            d.fault(FailureKind::ImuClipped { rates_rad_s, specific_force_m_s2 }, lasts_s, 0.0);
         }
     }),
     class("bumps", None, false, "up to five of 160 to 400 m/s2 along an axis for 1 to 5 ms", |d| {
@@ -101,7 +101,7 @@ pub static CLASSES: [Class; 24] = [
     }),
     class("field", OUTDOORS, false, "5 to 25 uT along a body axis, for 5 s or longer, or for good", |d| {
         let (field_ut, lasts_s) = (d.axis() * d.between(5.0, 25.0), d.lasting(5.0));
-        d.fault(Failure::MagnetometerDisturbed { field_ut }, lasts_s, 0.0);
+        d.fault(FailureKind::MagnetometerDisturbed { field_ut }, lasts_s, 0.0);
     }),
     class("gnss-late", OUTDOORS, true, "by 0.1 to 0.25 s, with true stamps", |d| {
         let late_s = d.between(0.1, 0.25);
@@ -113,22 +113,22 @@ pub static CLASSES: [Class; 24] = [
     }),
     class("gnss-jump", OUTDOORS, false, "by 2 to 100 m along an axis, for 1 s or longer, or for good", |d| {
         let (by_m, lasts_s) = (d.axis() * d.logarithmic(2.0, 100.0), d.lasting(1.0));
-        d.fault(Failure::GnssJumped { by_m }, lasts_s, 0.0);
+        d.fault(FailureKind::GnssJumped { by_m }, lasts_s, 0.0);
     }),
     class("gnss-ramp", OUTDOORS, false, "by 2 to 30 m in any direction within 5 to 40 s", |d| {
         let (by_m, rise_s) = (d.direction() * d.logarithmic(2.0, 30.0), d.between(5.0, 40.0));
-        d.fault(Failure::GnssJumped { by_m }, f64::INFINITY, rise_s);
+        d.fault(FailureKind::GnssJumped { by_m }, f64::INFINITY, rise_s);
     }),
     class("gnss-outage", OUTDOORS, true, "up to four of 0.5 to 8 s", |d| {
         for _ in 0..d.count(4) {
             let lasts_s = d.logarithmic(0.5, 8.0);
-            d.fault(Failure::GnssLost, lasts_s, 0.0);
+            d.fault(FailureKind::GnssLost, lasts_s, 0.0);
         }
     }),
     class("multipath", OUTDOORS, false, "deviation of 2 to 10 m that wanders within 1 to 20 s, for 10 to 60 s", |d| {
         let (deviation_m, correlation_time_s) = (d.logarithmic(2.0, 10.0), d.logarithmic(1.0, 20.0));
         let lasts_s = d.between(10.0, 60.0);
-        d.fault(Failure::GnssMultipath { deviation_m, correlation_time_s }, lasts_s, 0.0);
+        d.fault(FailureKind::GnssMultipath { deviation_m, correlation_time_s }, lasts_s, 0.0);
     }),
     class("gnss-accuracy", OUTDOORS, false, "reported: 0.3 to 2 times the true one", |d| {
         let ratio = d.logarithmic(0.3, 2.0);
@@ -148,17 +148,17 @@ pub static CLASSES: [Class; 24] = [
     }),
     class("tracker-slip", INDOORS, false, "frame slips by 0.1 to 5 m in any direction within 5 to 30 s", |d| {
         let (by_m, rise_s) = (d.direction() * d.logarithmic(0.1, 5.0), d.between(5.0, 30.0));
-        d.fault(Failure::TrackerJumped { by_m, yaw_rad: 0.0 }, f64::INFINITY, rise_s);
+        d.fault(FailureKind::TrackerJumped { by_m, yaw_rad: 0.0 }, f64::INFINITY, rise_s);
     }),
     class("tracker-turn", INDOORS, false, "frame turns by 0.05 to 0.5 rad, at once or within 30 s", |d| {
         let yaw_rad = d.sign() * d.logarithmic(0.05, 0.5);
         let rise_s = (d.between(-30.0, 30.0)).max(0.0);
-        d.fault(Failure::TrackerJumped { by_m: Vector3::zeros(), yaw_rad }, f64::INFINITY, rise_s);
+        d.fault(FailureKind::TrackerJumped { by_m: Vector3::zeros(), yaw_rad }, f64::INFINITY, rise_s);
     }),
     class("tracker-flip", INDOORS, false, "frame turned by 180 degrees, up to three times for 0.1 to 2 s", |d| {
         for _ in 0..d.count(3) {
             let lasts_s = d.logarithmic(0.1, 2.0);
-            d.fault(Failure::TrackerJumped { by_m: Vector3::zeros(), yaw_rad: PI }, lasts_s, 0.0);
+            d.fault(FailureKind::TrackerJumped { by_m: Vector3::zeros(), yaw_rad: PI }, lasts_s, 0.0);
         }
     }),
 ];
@@ -169,10 +169,10 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 }
 
 /// Draws a bias of the gyroscope and one of the accelerometer, within these bounds and in independent directions.
-fn biased(d: &mut Drawing<'_>, [rate_min, rate_max]: [f64; 2], [force_min, force_max]: [f64; 2]) -> Failure {
+fn biased(d: &mut Drawing<'_>, [rate_min, rate_max]: [f64; 2], [force_min, force_max]: [f64; 2]) -> FailureKind {
     let rates_bias_rad_s = d.direction() * d.logarithmic(rate_min, rate_max);
     let force_bias_m_s2 = d.direction() * d.logarithmic(force_min, force_max);
-    Failure::ImuBiased { rates_bias_rad_s, force_bias_m_s2 }
+    FailureKind::ImuBiased { rates_bias_rad_s, force_bias_m_s2 }
 }
 
 impl Class {

@@ -1,6 +1,6 @@
 //! A flight whose sensor behaviour is being drawn.
 
-use afbc_plant::instruments::{Failure, Gnss, Imu, InstrumentFault, Magnetometer, TrackerModel};
+use afbc_plant::instruments::{FailureKind, GnssModel, ImuModel, InstrumentFault, MagnetometerModel, TrackerModel};
 use afbc_plant::noise::Noise;
 use afbc_plant::{Environment, Gust, GustKind};
 use afbc_scenario::Scenario;
@@ -65,7 +65,7 @@ impl Drawing<'_> {
     }
 
     /// Adds a fault that lasts `lasts_s` and takes `rise_s` to grow.
-    pub(super) fn fault(&mut self, failure: Failure, lasts_s: f64, rise_s: f64) {
+    pub(super) fn fault(&mut self, failure: FailureKind, lasts_s: f64, rise_s: f64) {
         let start_s = self.onset();
         self.scenario.instrument_faults.push(InstrumentFault { failure, start_s, end_s: start_s + lasts_s, rise_s });
     }
@@ -78,7 +78,7 @@ impl Drawing<'_> {
         self.gusts.push(Gust { axis, kind: GustKind::Acceleration, size, start_s, end_s: start_s + lasts_s });
     }
 
-    pub(super) fn imu(&mut self, change: impl FnOnce(&mut Imu)) {
+    pub(super) fn imu(&mut self, change: impl FnOnce(&mut ImuModel)) {
         self.scenario.instruments.imu.as_mut().map(change);
     }
 
@@ -86,11 +86,11 @@ impl Drawing<'_> {
         self.scenario.instruments.tracker.as_mut().map(change);
     }
 
-    pub(super) fn gnss(&mut self, change: impl FnOnce(&mut Gnss)) {
+    pub(super) fn gnss(&mut self, change: impl FnOnce(&mut GnssModel)) {
         self.scenario.instruments.gnss.as_mut().map(change);
     }
 
-    pub(super) fn magnetometer(&mut self, change: impl FnOnce(&mut Magnetometer)) {
+    pub(super) fn magnetometer(&mut self, change: impl FnOnce(&mut MagnetometerModel)) {
         self.scenario.instruments.magnetometer.as_mut().map(change);
     }
 

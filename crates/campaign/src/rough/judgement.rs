@@ -1,9 +1,9 @@
 //! The judgement of a flight: errors of the estimate, and how the flight ended.
 
 use afbc_scenario::Scenario;
-use afbc_sim::flight::{Estimated, Lost, Mode, Sample, fly};
+use afbc_sim::flight::{EstimateErrors, Lost, Mode, Sample, fly};
 use afbc_sim::metrics::is_settled;
-use afbc_sim::run::Tripped;
+use afbc_sim::run::MonitorTrip;
 use afbc_types::OutOfRange;
 
 /// Steps between two evaluations of the estimate. The normalised error is computed as often.
@@ -29,7 +29,7 @@ pub struct Judgement {
     /// True if the flight core descended at any time.
     pub descended: bool,
     /// Time and reason of the monitor's switch to the fallback law, if any.
-    pub tripped: Option<Tripped>,
+    pub tripped: Option<MonitorTrip>,
     /// Time and reason of the loss of the vehicle, if any.
     pub lost: Option<Lost>,
 }
@@ -44,7 +44,7 @@ impl Judgement {
             judgement.coasted |= mode == Mode::Coasting;
             judgement.descended |= mode == Mode::Descending;
             if let Some(reason) = sample.action.health.fallback {
-                judgement.tripped.get_or_insert(Tripped { time_s: sample.time_s, reason });
+                judgement.tripped.get_or_insert(MonitorTrip { time_s: sample.time_s, reason });
             }
             step += 1;
             if step % EVERY != 1 || mode == Mode::Disarmed || !is_settled(sample.time_s) {
@@ -68,7 +68,7 @@ impl Judgement {
 }
 
 /// Returns how many of the nine errors are within three standard deviations.
-fn inside(estimated: &Estimated) -> u64 {
+fn inside(estimated: &EstimateErrors) -> u64 {
     let pairs = [
         (&estimated.position_error_m, &estimated.position_sigma_m),
         (&estimated.velocity_error_m_s, &estimated.velocity_sigma_m_s),
@@ -85,14 +85,14 @@ mod tests {
 
     #[test]
     fn errors_are_inside_up_to_three_standard_deviations() {
-        let estimated = Estimated {
+        let estimated = EstimateErrors {
             position_error_m: Vector3::new(2.9, -2.9, 3.1),
             position_sigma_m: Vector3::repeat(1.0),
             velocity_error_m_s: Vector3::new(0.0, -0.31, 0.29),
             velocity_sigma_m_s: Vector3::repeat(0.1),
             attitude_error_rad: Vector3::new(f32::NAN, 0.02, -0.04),
             attitude_sigma_rad: Vector3::new(1.0, 0.01, 0.01),
-            ..Estimated::default()
+            ..EstimateErrors::default()
         };
         assert_eq!(inside(&estimated), 5);
     }

@@ -20,7 +20,7 @@ use crate::draw::mix;
 use afbc::Profile;
 use afbc_files::read::FileError;
 use afbc_files::read::words::out_of_range;
-use afbc_plant::noise::{Noise, Stream};
+use afbc_plant::noise::{Noise, NoiseStream};
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
 use afbc_scenario::trajectory::Trajectory;
@@ -80,7 +80,7 @@ impl Rough {
         // The names enter the draw, not the indices in the lists, so that other vehicles and classes change nothing.
         let of_names = vehicle.bytes().chain(class.bytes()).fold(mix(seed), |hash, byte| mix(hash ^ u64::from(byte)));
         let bits = mix(of_names.wrapping_add(number)) >> 11;
-        let mut noise = Noise::new(bits, Stream::Scenario);
+        let mut noise = Noise::new(bits, NoiseStream::Scenario);
         let is_long = (noise.uniform() * LONG_ONE_IN as f64) < 1.0;
         let hovers = noise.uniform() < 0.3;
         let drawn_place = if noise.uniform() < 0.5 { Venue::Indoors } else { Venue::Outdoors };

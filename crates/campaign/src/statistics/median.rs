@@ -53,7 +53,7 @@ fn rank(count: usize) -> Option<usize> {
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests")]
     use super::*;
-    use afbc_plant::noise::{Noise, Stream};
+    use afbc_plant::noise::{Noise, NoiseStream};
 
     /// Values by scipy 1.17.1: `scipy.stats.binom.ppf(0.025, n, 0.5)` for each number.
     #[test]
@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     fn it_lies_in_the_middle_of_its_interval_whatever_the_order() {
-        let mut noise = Noise::new(3, Stream::Scenario);
+        let mut noise = Noise::new(3, NoiseStream::Scenario);
         for count in 1..60 {
             let values: Vec<f64> = (0..count).map(|_| noise.normal()).collect();
             let median = Median::of(&values).unwrap();

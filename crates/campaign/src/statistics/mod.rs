@@ -6,7 +6,7 @@ mod signed_rank;
 pub use median::Median;
 pub use signed_rank::{SignedRank, holm};
 
-use afbc_plant::noise::{Noise, Stream};
+use afbc_plant::noise::{Noise, NoiseStream};
 use libm::sqrt;
 
 /// 97.5 % quantile of the standard normal distribution, for two-sided 95 %.
@@ -58,7 +58,7 @@ pub fn clustered(clusters: &[Vec<f64>], resamples: usize) -> Option<[f64; 2]> {
         return None;
     }
     let sums: Vec<(f64, usize)> = clusters.iter().map(|values| (values.iter().sum(), values.len())).collect();
-    let mut noise = Noise::new(0, Stream::Scenario);
+    let mut noise = Noise::new(0, NoiseStream::Scenario);
     let mut mean = |_| {
         let drawn = sums.iter().filter_map(|_| sums.get((noise.uniform() * sums.len() as f64) as usize));
         let (sum, count) = drawn.fold((0.0, 0), |(sum, count), (more, others)| (sum + more, count + others));
@@ -121,7 +121,7 @@ mod tests {
     fn the_bootstrap_interval_is_the_known_one() {
         assert_eq!(clustered(&[vec![0.0], vec![1.0]], 1000), Some([0.0, 1.0]));
         assert_eq!(clustered(&[vec![3.0, 4.0]], 1000), None);
-        let mut noise = Noise::new(1, Stream::Scenario);
+        let mut noise = Noise::new(1, NoiseStream::Scenario);
         let values: Vec<f64> = (0..400).map(|_| noise.normal()).collect();
         let mean = values.iter().sum::<f64>() / 400.0;
         let variance = values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / 400.0;

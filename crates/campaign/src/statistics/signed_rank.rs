@@ -85,14 +85,14 @@ pub fn holm(probabilities: &[f64]) -> Vec<f64> {
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests")]
     use super::*;
-    use afbc_plant::noise::{Noise, Stream};
+    use afbc_plant::noise::{Noise, NoiseStream};
 
     fn close(a: f64, b: f64, within: f64) {
         assert!((a - b).abs() <= within * b.abs(), "{a} != {b}");
     }
 
     fn drawn(seed: u64, count: usize, shift: f64) -> Vec<f64> {
-        let mut noise = Noise::new(seed, Stream::Scenario);
+        let mut noise = Noise::new(seed, NoiseStream::Scenario);
         (0..count).map(|_| noise.normal() + shift).collect()
     }
 
@@ -196,7 +196,7 @@ mod tests {
         assert_eq!(holm(&[0.7, 0.9]), [1.0, 1.0]);
         // The definition: the largest product, over all q not larger than p, of q and the number of probabilities not
         // smaller than q.
-        let mut noise = Noise::new(5, Stream::Scenario);
+        let mut noise = Noise::new(5, NoiseStream::Scenario);
         let all: Vec<f64> = (0..20).map(|_| noise.uniform() * noise.uniform()).collect();
         for (p, adjusted) in all.iter().zip(holm(&all)) {
             let of = |q: &f64| q * all.iter().filter(|other| *other >= q).count() as f64;

@@ -18,12 +18,12 @@ use crate::transfers::is_change;
 use afbc_flight_core::Stamped;
 use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Sighting};
-use afbc_guidance::{Item, Leg, Order};
+use afbc_guidance::{Item, Order, RequestedItem};
 use afbc_mavlink::telemetry::OrbitStatus;
 use afbc_mavlink::{
-    Address, Answer, Clock, Command, ControlAnswer, DataStream, Decoder, Downlink, FrameHandler, Interval, MavSeverity,
-    Mission, ParameterError, ParameterRequest, Question, QuestionRefusal, ReceivedFrame, SetupSigning, Telemetry,
-    Uplink,
+    Address, CommandResult, ControlAnswer, DataStream, Decoder, Downlink, FrameHandler, MavSeverity, MessageInterval,
+    MissionMessage, ParameterError, ParameterRequest, ReceivedFrame, ServiceRefusal, ServiceRequest, SetupSigning,
+    Telemetry, TimeMessage, Uplink, VehicleCommand,
 };
 use afbc_onboard::ControlInputs;
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
@@ -38,13 +38,13 @@ const HEARD_EVERY_US: u64 = 50_000;
 /// A reply to a message other than a command.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Reply {
-    Clock(Clock),
+    Clock(TimeMessage),
     Control(ControlAnswer),
-    Interval(Interval),
+    Interval(MessageInterval),
     Stream(DataStream),
     Reached(u16),
     ParameterError(ParameterError, Address),
-    Refusal(QuestionRefusal, Address),
+    Refusal(ServiceRefusal, Address),
 }
 
 /// A queued request about parameters.
@@ -170,7 +170,7 @@ impl Comms {
             self.report_heard(inputs);
         }
         let replies =
-            matches!(message, Uplink::Stream(_) | Uplink::Question(_) | Uplink::Clock(_) | Uplink::Control(_));
+            matches!(message, Uplink::Stream(_) | Uplink::ServiceRequest(_) | Uplink::Time(_) | Uplink::Control(_));
         if replies && self.replies.is_full() {
             // The message is ignored as if lost: no request is carried out that cannot be answered.
             return;
@@ -185,8 +185,8 @@ impl Comms {
                 let stream = self.streams.set_group(request, self.now_us);
                 self.reply(Reply::Stream(stream));
             }
-            Uplink::Question(question) => self.question(question, from),
-            Uplink::Clock(clock) => {
+            Uplink::ServiceRequest(question) => self.question(question, from),
+            Uplink::Time(clock) => {
                 let answer = timesync::answer(clock, from, self.me, self.now_us);
                 answer.into_iter().for_each(|answer| self.reply(Reply::Clock(answer)));
             }
@@ -211,11 +211,11 @@ impl Comms {
         }
         if let Uplink::Command(command) = message {
             let answer = match command {
-                _ if !self.commands.has_room() => Answer::Refused(BUSY),
+                _ if !self.commands.has_room() => CommandResult::Refused(BUSY),
                 // There is only one instance of each of these messages.
-                Command::RequestMessage { index: 1.., .. } => Answer::Denied,
-                _ if requests.take(from, message, payload, true) => Answer::Accepted,
-                _ => Answer::Refused(BUSY),
+                VehicleCommand::RequestMessage { index: 1.., .. } => CommandResult::Denied,
+                _ if requests.take(from, message, payload, true) => CommandResult::Accepted,
+                _ => CommandResult::Refused(BUSY),
             };
             return self.commands.answer(command.id(), answer, from);
         }
@@ -244,7 +244,7 @@ impl Comms {
     /// Returns the mission item that the guidance asks for, if it does not have it yet. If a new mission is too short
     /// for the item, returns the first item. If the mission was cleared, returns an empty item, to tell the guidance
     /// so.
-    pub(super) fn wanted_leg(&self) -> Option<Leg> {
+    pub(super) fn wanted_leg(&self) -> Option<RequestedItem> {
         let (wanted, upload) = (self.status.guided.wanted, self.missions.number());
         // The upload's number is compared too: after another upload the same number means another item.
         if self.given == Some((wanted, upload)) {
@@ -252,7 +252,7 @@ impl Comms {
         }
         let items = self.missions.items().len();
         if items == 0 {
-            let none = Leg { number: wanted, upload, item: Item::None, is_last: true };
+            let none = RequestedItem { number: wanted, upload, item: Item::None, is_last: true };
             return Some(none).filter(|_| self.given.is_some());
         }
         let number = if usize::from(wanted) < items { wanted } else { 0 };
@@ -283,13 +283,15 @@ impl Comms {
     pub(super) fn next_reply(&mut self) -> Option<Downlink> {
         let everyone = Address::default();
         Some(match self.replies.pop_front() {
-            Some(Reply::Clock(clock)) => Downlink::Clock(clock),
+            Some(Reply::Clock(clock)) => Downlink::Time(clock),
             Some(Reply::Control(answer)) => Downlink::Control(answer),
             Some(Reply::Interval(interval)) => Downlink::Interval(interval),
             Some(Reply::Stream(stream)) => Downlink::Stream(stream),
             Some(Reply::ParameterError(error, to)) => Downlink::ParameterError { error, to },
             Some(Reply::Refusal(refusal, to)) => Downlink::Refusal { refusal, to },
-            Some(Reply::Reached(number)) => Downlink::Mission { message: Mission::Reached(number), to: everyone },
+            Some(Reply::Reached(number)) => {
+                Downlink::Mission { message: MissionMessage::Reached(number), to: everyone }
+            }
             None => {
                 let (message, to) = self.missions.next_message()?;
                 Downlink::Mission { message, to }
@@ -307,7 +309,7 @@ impl Comms {
         let guided = &self.status.guided;
         let flies = guided.mode == afbc_guidance::FlightMode::Mission && self.status.mode.armed();
         let current = self.missions.current(Some(guided.wanted), self.reached, flies);
-        Downlink::Mission { message: Mission::Current(current), to: Address::default() }
+        Downlink::Mission { message: MissionMessage::Current(current), to: Address::default() }
     }
 
     /// Returns ORBIT_EXECUTION_STATUS while the vehicle flies an ordered orbit.
@@ -353,25 +355,25 @@ impl Comms {
     }
 
     /// Refuses a request that the vehicle does not support.
-    fn question(&mut self, question: Question, from: Address) {
+    fn question(&mut self, question: ServiceRequest, from: Address) {
         let refusal = match question {
-            Question::Log(request) => {
+            ServiceRequest::Log(request) => {
                 let Some(answer) = logs::answer(request) else { return };
-                QuestionRefusal::Log(answer)
+                ServiceRefusal::Log(answer)
             }
-            Question::File(operation) => QuestionRefusal::File(files::answer(operation)),
-            Question::Extended(request) => QuestionRefusal::Extended(extended::answer(request)),
-            Question::Event(request) => QuestionRefusal::Event(events::answer(request)),
-            Question::Serial(asked) => QuestionRefusal::Serial(serial::answer(asked)),
+            ServiceRequest::File(operation) => ServiceRefusal::File(files::answer(operation)),
+            ServiceRequest::Extended(request) => ServiceRefusal::Extended(extended::answer(request)),
+            ServiceRequest::Event(request) => ServiceRefusal::Event(events::answer(request)),
+            ServiceRequest::Serial(asked) => ServiceRefusal::Serial(serial::answer(asked)),
             // The answer repeats the place without terrain data.
-            Question::Terrain(place) => QuestionRefusal::Terrain(place),
-            Question::Unanswered(wish) => {
+            ServiceRequest::Terrain(place) => ServiceRefusal::Terrain(place),
+            ServiceRequest::Unanswered(wish) => {
                 if let Some(text) = self.unanswered.text(wish, self.now_us) {
                     self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, text);
                 }
                 return;
             }
-            Question::Origin => {
+            ServiceRequest::Origin => {
                 // Stations cannot move the origin: the shell sets it, or there is none.
                 self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, "the origin is not set by stations");
                 self.streams.request(Requested { message: id::GPS_GLOBAL_ORIGIN, index: 0 });
@@ -381,8 +383,9 @@ impl Comms {
         self.reply(Reply::Refusal(refusal, from));
     }
 
-    fn mission(&mut self, message: Mission, from: Address, inputs: &mut ControlInputs) {
-        let changes = matches!(message, Mission::Count(..) | Mission::Clear(_) | Mission::SetCurrent(_));
+    fn mission(&mut self, message: MissionMessage, from: Address, inputs: &mut ControlInputs) {
+        let changes =
+            matches!(message, MissionMessage::Count(..) | MissionMessage::Clear(_) | MissionMessage::SetCurrent(_));
         // Only requests that change something claim control. Items count only from the station that began the upload.
         let in_control = changes && self.may(from, inputs);
         let (around, number) = (self.surroundings(), self.missions.number());
@@ -394,7 +397,7 @@ impl Comms {
         if heard.fence {
             self.fence.renew();
         }
-        if matches!(message, Mission::SetCurrent(_)) {
+        if matches!(message, MissionMessage::SetCurrent(_)) {
             // MISSION_CURRENT is sent after the tick in which the guidance takes the new item.
             self.streams.request(Requested { message: id::MISSION_CURRENT, index: 0 });
         }

@@ -6,13 +6,13 @@ use crate::services::streams::{Requested, id};
 use crate::services::telemetry::compose;
 use crate::services::texts::{Words, reason, urgency};
 use crate::services::{escs, modes};
-use afbc::monitor::Norm;
+use afbc::monitor::EstimateNorms;
 use afbc_control::math::sqrt;
 use afbc_flight_core::Mode;
 use afbc_flight_core::tracker::Refused;
-use afbc_guidance::{Cause, ModeReason, Notice};
+use afbc_guidance::{FailsafeCause, GuidanceNotice, ModeReason};
 use afbc_mavlink::telemetry::ESCS_PER_MESSAGE;
-use afbc_mavlink::{Downlink, MavSeverity, Message, PositionTarget, SIGNED_FRAME_MAX, StatesRefused, Telemetry};
+use afbc_mavlink::{Downlink, MavSeverity, MessageSet, PositionTarget, SIGNED_FRAME_MAX, StatesRefused, Telemetry};
 use afbc_onboard::Report;
 use afbc_types::PerAxis;
 
@@ -84,7 +84,7 @@ impl Comms {
     }
 
     /// Sends a message and counts it against the link's rate. Returns the length of the frame.
-    pub(super) fn say(&mut self, message: &impl Message, send: &mut impl FnMut(&[u8])) -> usize {
+    pub(super) fn say(&mut self, message: &impl MessageSet, send: &mut impl FnMut(&[u8])) -> usize {
         let bytes = self.send(message, send);
         self.streams.spend(bytes);
         bytes
@@ -92,7 +92,7 @@ impl Comms {
 
     /// Sends a message. Returns the length of the frame. Not inlined because it has many callers.
     #[inline(never)]
-    fn send(&mut self, message: &impl Message, send: &mut impl FnMut(&[u8])) -> usize {
+    fn send(&mut self, message: &impl MessageSet, send: &mut impl FnMut(&[u8])) -> usize {
         let mut buffer = [0; SIGNED_FRAME_MAX];
         let frame = self.sender.send_signed(message, self.signing.stamp(self.now_us), &mut buffer);
         send(frame);
@@ -110,7 +110,9 @@ impl Comms {
             self.texts.put(warning, reason(declined));
         }
         // `Failsafes` announces the flight core's own failsafes, below.
-        let descends = |notice: &Notice| matches!(notice, Notice::Mode(_, ModeReason::Failsafe(Cause::Descent)));
+        let descends = |notice: &GuidanceNotice| {
+            matches!(notice, GuidanceNotice::Mode(_, ModeReason::Failsafe(FailsafeCause::Descent)))
+        };
         for notice in report.guided.notices.iter().filter(|notice| !descends(notice)) {
             let [first, second, third] = notice.parts();
             self.texts.say(urgency(notice.severity()), &Words::of(first).and(second).and(third));
@@ -143,7 +145,7 @@ impl Comms {
             id::MISSION_CURRENT => Some(self.mission_current()),
             id::POSITION_TARGET_LOCAL_NED => {
                 let setpoint = self.followed()?;
-                Some(Downlink::Followed(status.time_ms(), PositionTarget::from(setpoint)))
+                Some(Downlink::PositionTarget(status.time_ms(), PositionTarget::from(setpoint)))
             }
             id::AVAILABLE_MODES => {
                 // Index 0 asks for all modes. Each answer requests the next mode.
@@ -191,7 +193,7 @@ impl Comms {
 
     fn health(&self) -> afbc_mavlink::HealthArray {
         let status = &self.status;
-        let norm = |norm: &Norm| sqrt(norm.theta_squared);
+        let norm = |norm: &EstimateNorms| sqrt(norm.theta_squared);
         let Refused { overtaken, late, elsewhere } = *self.tracker.refused();
         let health = &status.health;
         afbc_mavlink::HealthArray {

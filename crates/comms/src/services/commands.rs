@@ -3,7 +3,7 @@
 use afbc_flight_core::inbox::QUEUE_MAX;
 use afbc_flight_core::{Request, Ticketed};
 use afbc_guidance::{Order, OrderRefusal};
-use afbc_mavlink::{Address, Answer, Downlink};
+use afbc_mavlink::{Address, CommandResult, Downlink};
 use heapless::Deque;
 
 /// Largest number of different queued answers, besides those of flight core and guidance. A further command is counted,
@@ -46,7 +46,7 @@ pub struct Commands {
 /// A queued answer.
 struct QueuedAnswer {
     command: u16,
-    answer: Answer,
+    answer: CommandResult,
     to: Address,
     /// Number of commands that are to get this answer.
     times: u16,
@@ -73,7 +73,7 @@ impl Commands {
             }
             None => {
                 // A kill is open already: the motors are about to stop.
-                self.answer(command, if kills { Answer::Accepted } else { Answer::Refused(BUSY) }, from);
+                self.answer(command, if kills { CommandResult::Accepted } else { CommandResult::Refused(BUSY) }, from);
                 None
             }
         }
@@ -88,7 +88,7 @@ impl Commands {
                 Some(Ticketed { value: order, ticket })
             }
             None => {
-                command.into_iter().for_each(|command| self.answer(command, Answer::Refused(BUSY), from));
+                command.into_iter().for_each(|command| self.answer(command, CommandResult::Refused(BUSY), from));
                 None
             }
         }
@@ -99,16 +99,16 @@ impl Commands {
     pub fn begin(&mut self, command: u16, from: Address, at_us: u64) -> bool {
         let is_free = self.in_progress.is_none();
         if is_free {
-            self.answer(command, Answer::InProgress, from);
+            self.answer(command, CommandResult::InProgress, from);
             self.in_progress = Some((Open { command: Some(command), from, at_us }, at_us));
         } else {
-            self.answer(command, Answer::Refused(BUSY), from);
+            self.answer(command, CommandResult::Refused(BUSY), from);
         }
         is_free
     }
 
     /// Ends the lasting command.
-    pub fn end(&mut self, answer: Answer) {
+    pub fn end(&mut self, answer: CommandResult) {
         if let Some((Open { command: Some(command), from, .. }, _)) = self.in_progress.take() {
             self.answer(command, answer, from);
         }
@@ -120,7 +120,7 @@ impl Commands {
     }
 
     /// Queues the answer to a command.
-    pub fn answer(&mut self, command: u16, answer: Answer, to: Address) {
+    pub fn answer(&mut self, command: u16, answer: CommandResult, to: Address) {
         let same = |waits: &&mut QueuedAnswer| {
             (waits.command, waits.answer, waits.to) == (command, answer, to) && waits.times < u16::MAX
         };
@@ -134,19 +134,23 @@ impl Commands {
     /// Converts the flight core's answer to a message to the command's sender.
     pub fn settle(&mut self, answer: afbc_flight_core::RequestAnswer) -> Option<Downlink> {
         let open = self.asked.get_mut(usize::from(answer.ticket))?.take()?;
-        open.answered(answer.result.map_or_else(|refusal| Answer::Refused(refusal as i32), |()| Answer::Accepted))
+        open.answered(
+            answer.result.map_or_else(|refusal| CommandResult::Refused(refusal as i32), |()| CommandResult::Accepted),
+        )
     }
 
     /// Converts the guidance's answer to a message to the command's sender.
     pub fn settle_order(&mut self, ticket: u8, result: Result<(), OrderRefusal>) -> Option<Downlink> {
         let open = self.ordered.get_mut(usize::from(ticket))?.take()?;
-        open.answered(result.map_or_else(|declined| Answer::Refused(declined as i32), |()| Answer::Accepted))
+        open.answered(
+            result.map_or_else(|declined| CommandResult::Refused(declined as i32), |()| CommandResult::Accepted),
+        )
     }
 
     /// Returns the next answer to be sent at `now_us`.
     pub fn next(&mut self, now_us: u64) -> Option<Downlink> {
         if let Some(QueuedAnswer { command, answer, to, times }) = self.waiting.front_mut() {
-            let next = Downlink::Answer { command: *command, answer: *answer, to: *to };
+            let next = Downlink::CommandAck { command: *command, answer: *answer, to: *to };
             *times -= 1;
             if *times == 0 {
                 self.waiting.pop_front();
@@ -157,14 +161,14 @@ impl Commands {
         let mut open = self.asked.iter_mut().chain(&mut self.ordered);
         // A lost message that needs no answer is dropped silently.
         while let Some(lost) = open.find_map(|place| place.take_if(forgotten)) {
-            if let Some(answer) = lost.answered(Answer::Failed) {
+            if let Some(answer) = lost.answered(CommandResult::Failed) {
                 return Some(answer);
             }
         }
         match &mut self.in_progress {
             Some((open, told_us)) if now_us.saturating_sub(*told_us) >= IN_PROGRESS_US => {
                 *told_us = now_us;
-                open.answered(Answer::InProgress)
+                open.answered(CommandResult::InProgress)
             }
             _ => None,
         }
@@ -177,8 +181,8 @@ impl Commands {
 }
 
 impl Open {
-    fn answered(self, answer: Answer) -> Option<Downlink> {
-        self.command.map(|command| Downlink::Answer { command, answer, to: self.from })
+    fn answered(self, answer: CommandResult) -> Option<Downlink> {
+        self.command.map(|command| Downlink::CommandAck { command, answer, to: self.from })
     }
 }
 
@@ -190,8 +194,8 @@ mod tests {
     const A: Address = Address { system: 255, component: 190 };
     const B: Address = Address { system: 245, component: 190 };
 
-    fn answered(command: u16, answer: Answer, to: Address) -> Option<Downlink> {
-        Some(Downlink::Answer { command, answer, to })
+    fn answered(command: u16, answer: CommandResult, to: Address) -> Option<Downlink> {
+        Some(Downlink::CommandAck { command, answer, to })
     }
 
     #[test]
@@ -201,15 +205,15 @@ mod tests {
         let give = |commands: &mut Commands, from| commands.order(order, Some(21), from, 0).map(|it| it.ticket);
         assert_eq!([A, B, A, B].map(|from| give(&mut commands, from)), [Some(0), Some(1), Some(2), Some(3)]);
         assert_eq!(give(&mut commands, A), None);
-        assert_eq!(commands.next(0), answered(21, Answer::Refused(BUSY), A));
-        assert_eq!(commands.settle_order(1, Ok(())), answered(21, Answer::Accepted, B));
+        assert_eq!(commands.next(0), answered(21, CommandResult::Refused(BUSY), A));
+        assert_eq!(commands.settle_order(1, Ok(())), answered(21, CommandResult::Accepted, B));
         assert_eq!(commands.settle_order(1, Ok(())), None, "once");
         let declined = OrderRefusal::NotArmed;
-        assert_eq!(commands.settle_order(0, Err(declined)), answered(21, Answer::Refused(declined as i32), A));
+        assert_eq!(commands.settle_order(0, Err(declined)), answered(21, CommandResult::Refused(declined as i32), A));
         assert_eq!(commands.settle_order(77, Ok(())), None);
         assert_eq!(commands.next(FORGOTTEN_US), None);
-        assert_eq!(commands.next(FORGOTTEN_US + 1), answered(21, Answer::Failed, A));
-        assert_eq!(commands.next(FORGOTTEN_US + 1), answered(21, Answer::Failed, B));
+        assert_eq!(commands.next(FORGOTTEN_US + 1), answered(21, CommandResult::Failed, A));
+        assert_eq!(commands.next(FORGOTTEN_US + 1), answered(21, CommandResult::Failed, B));
         assert_eq!(commands.next(FORGOTTEN_US + 1), None);
     }
 
@@ -227,14 +231,14 @@ mod tests {
         let mut commands = Commands::default();
         assert!(commands.begin(245, A, 0));
         assert!(!commands.begin(245, B, 10));
-        assert_eq!(commands.next(20), answered(245, Answer::InProgress, A));
-        assert_eq!(commands.next(20), answered(245, Answer::Refused(BUSY), B));
+        assert_eq!(commands.next(20), answered(245, CommandResult::InProgress, A));
+        assert_eq!(commands.next(20), answered(245, CommandResult::Refused(BUSY), B));
         assert_eq!(commands.next(IN_PROGRESS_US - 1), None);
-        assert_eq!(commands.next(IN_PROGRESS_US), answered(245, Answer::InProgress, A));
+        assert_eq!(commands.next(IN_PROGRESS_US), answered(245, CommandResult::InProgress, A));
         assert_eq!(commands.next(IN_PROGRESS_US), None);
-        commands.end(Answer::Accepted);
-        commands.end(Answer::Accepted);
-        assert_eq!(commands.next(3 * IN_PROGRESS_US), answered(245, Answer::Accepted, A));
+        commands.end(CommandResult::Accepted);
+        commands.end(CommandResult::Accepted);
+        assert_eq!(commands.next(3 * IN_PROGRESS_US), answered(245, CommandResult::Accepted, A));
         assert_eq!(commands.next(9 * IN_PROGRESS_US), None);
     }
 }

@@ -3,7 +3,7 @@
 //! The first station that commands is in control, until it has been silent for a time or releases control. A station is
 //! known by its system and component number: the link has no other proof of identity (`docs/security.md`).
 
-use afbc_mavlink::{Address, Command, ControlAnswer, ControlRequest as Wish};
+use afbc_mavlink::{Address, ControlAnswer, ControlRequest as Wish, VehicleCommand};
 
 /// Silence after which a station is no longer in control \[us\].
 pub const SILENT_US: u64 = 10_000_000;
@@ -106,37 +106,37 @@ impl OperatorControl {
 
 /// Returns true if only the station in control may give this command. Any station may send requests and may stop the
 /// motors: [`Command::Kill`] works in flight too, [`Command::Disarm`] only on the ground.
-pub fn is_needed_for(command: Command) -> bool {
+pub fn is_needed_for(command: VehicleCommand) -> bool {
     match command {
-        Command::Arm
-        | Command::Engage
-        | Command::SelfTest
-        | Command::TakeOff(_)
-        | Command::Land
-        | Command::Return
-        | Command::SelectMode(_)
-        | Command::SelectStandardMode(_)
-        | Command::Reposition { .. }
-        | Command::Orbit { .. }
-        | Command::Speed(_)
-        | Command::Home(_)
-        | Command::StartMission(..)
-        | Command::SetCurrent(..)
-        | Command::Reboot(_)
-        | Command::Calibrate(_)
-        | Command::Storage(_) => true,
-        Command::Disarm
-        | Command::Kill
-        | Command::SetInterval { .. }
-        | Command::GetInterval(_)
-        | Command::RequestMessage { .. }
-        | Command::RequestProtocol
-        | Command::RequestCapabilities
-        | Command::CheckArming
-        | Command::StartLogStream
-        | Command::StopLogStream
-        | Command::Denied(_)
-        | Command::Other(_) => false,
+        VehicleCommand::Arm
+        | VehicleCommand::Engage
+        | VehicleCommand::SelfTest
+        | VehicleCommand::TakeOff(_)
+        | VehicleCommand::Land
+        | VehicleCommand::Return
+        | VehicleCommand::SelectMode(_)
+        | VehicleCommand::SelectStandardMode(_)
+        | VehicleCommand::Reposition { .. }
+        | VehicleCommand::Orbit { .. }
+        | VehicleCommand::Speed(_)
+        | VehicleCommand::Home(_)
+        | VehicleCommand::StartMission(..)
+        | VehicleCommand::SetCurrent(..)
+        | VehicleCommand::Reboot(_)
+        | VehicleCommand::Calibrate(_)
+        | VehicleCommand::Storage(_) => true,
+        VehicleCommand::Disarm
+        | VehicleCommand::Kill
+        | VehicleCommand::SetInterval { .. }
+        | VehicleCommand::GetInterval(_)
+        | VehicleCommand::RequestMessage { .. }
+        | VehicleCommand::RequestProtocol
+        | VehicleCommand::RequestCapabilities
+        | VehicleCommand::CheckArming
+        | VehicleCommand::StartLogStream
+        | VehicleCommand::StopLogStream
+        | VehicleCommand::Denied(_)
+        | VehicleCommand::Other(_) => false,
     }
 }
 

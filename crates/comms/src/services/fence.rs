@@ -6,7 +6,7 @@
 
 use crate::services::items::{Invalid, check_unused};
 use crate::services::origin::LocalChart;
-use afbc_guidance::FenceView;
+use afbc_guidance::FenceStatus;
 use afbc_guidance::fence::{MARGIN_M, PolygonFault, StopPath, check_polygon, distance, passes_edge};
 use afbc_mavlink::{MavCmd, MissionItem, MissionResult};
 use nalgebra::Vector2;
@@ -187,12 +187,12 @@ pub struct FenceWatch {
     outside: bool,
     /// Number of ticks for which the vehicle has stood still and was not about to leave.
     stopped_ticks: u16,
-    view: FenceView,
+    view: FenceStatus,
 }
 
 impl FenceWatch {
     /// Returns the state of the fence for the guidance.
-    pub fn view(&self) -> FenceView {
+    pub fn view(&self) -> FenceStatus {
         self.view
     }
 
@@ -248,7 +248,7 @@ impl FenceWatch {
         let FenceWatch { nears, outside, stopped_ticks, .. } = *self;
         // The flag stays until the vehicle has stopped: once it brakes, it is soon no longer about to leave.
         let lasts = self.view.leaves && stopped_ticks < STOPPED_TICKS;
-        let view = FenceView { leaves: nears || outside || lasts, outside };
+        let view = FenceStatus { leaves: nears || outside || lasts, outside };
         *self = FenceWatch { view, stopped_ticks, ..FenceWatch::default() };
     }
 }

@@ -3,7 +3,7 @@
 use crate::services::origin::{EarthOrigin, LocalChart, resolve};
 use crate::services::texts::Words;
 use afbc_guidance::{Item, is_place};
-use afbc_mavlink::{Datum, Height, MavCmd, MissionItem, MissionResult, Place};
+use afbc_mavlink::{Datum, GlobalPosition, Height, MavCmd, MissionItem, MissionResult};
 use nalgebra::{Vector2, Vector3};
 
 /// Most items of all plans together.
@@ -225,7 +225,7 @@ fn used(item: &MissionItem) -> Option<u8> {
 /// Returns the first parameter that is neither 0 nor omitted.
 pub(in crate::services) fn check_unused(item: &MissionItem, used: u8) -> Result<(), Invalid> {
     let [p1, p2, p3, p4] = item.parameters.map(is_neutral);
-    let [x, y] = [item.x, item.y].map(|whole| whole == 0 || whole == Place::AS_IT_IS);
+    let [x, y] = [item.x, item.y].map(|whole| whole == 0 || whole == GlobalPosition::AS_IT_IS);
     for (place, neutral) in (0..).zip([p1, p2, p3, p4, x, y, is_neutral(item.z)]) {
         if used >> place & 1 == 0 && !neutral {
             let result = MissionResult(MissionResult::INVALID_PARAM1.0 + place);
@@ -247,11 +247,11 @@ const USUAL: f32 = -2.0;
 
 /// Returns true for a take-off or a landing at the vehicle's present place.
 fn is_here(item: &MissionItem) -> bool {
-    let nowhere = [[0; 2], [Place::AS_IT_IS; 2]].contains(&[item.x, item.y]);
+    let nowhere = [[0; 2], [GlobalPosition::AS_IT_IS; 2]].contains(&[item.x, item.y]);
     nowhere && [TAKE_OFF, LAND].contains(&item.command)
 }
 
-fn on_earth(place: &Place) -> Result<(), Invalid> {
+fn on_earth(place: &GlobalPosition) -> Result<(), Invalid> {
     if place.latitude_e7.unsigned_abs() > 900_000_000 {
         return Err(Invalid { result: MissionResult::INVALID_X, reason: "latitude is out of range" });
     }
@@ -374,7 +374,7 @@ pub fn to_guidance(item: &MissionItem, origin: Option<&EarthOrigin>, home_m: f32
 }
 
 /// Returns the place of an item. For an item in the local frame only the height counts.
-fn place(item: &MissionItem) -> Option<Place> {
+fn place(item: &MissionItem) -> Option<GlobalPosition> {
     let above = match item.frame {
         0 | 5 | LOCAL_NED => Datum::Sea,
         3 | 6 => Datum::Home,
@@ -384,7 +384,7 @@ fn place(item: &MissionItem) -> Option<Place> {
     // The local coordinates are not degrees, so they are replaced by valid ones.
     let coordinates = if item.frame == LOCAL_NED { [1; 2] } else { [item.x, item.y] };
     let [latitude_e7, longitude_e7] = coordinates;
-    Some(Place { latitude_e7, longitude_e7, height })
+    Some(GlobalPosition { latitude_e7, longitude_e7, height })
 }
 
 /// `MAV_FRAME_LOCAL_NED`.

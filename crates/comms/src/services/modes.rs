@@ -69,7 +69,7 @@ pub fn available(place: u8) -> Option<AvailableMode> {
     };
     let mut name = [0; 35];
     name.iter_mut().zip(mode.name().bytes()).for_each(|(to, from)| *to = from);
-    Some(AvailableMode { count: COUNT, place, standard: standard(mode), custom: custom(mode), properties, name })
+    Some(AvailableMode { count: COUNT, index: place, standard: standard(mode), custom: custom(mode), properties, name })
 }
 
 /// Bit of a request's index that requests all following modes too.
@@ -126,7 +126,7 @@ mod tests {
         for (mode, place) in FlightMode::ALL.into_iter().zip(1..) {
             let reported = offered.iter().find(|reported| reported.custom == custom(mode));
             assert_eq!(
-                reported.map(|reported| (reported.place, reported.count, reported.standard)),
+                reported.map(|reported| (reported.index, reported.count, reported.standard)),
                 Some((place, COUNT, standard(mode)))
             );
             assert!(standard(mode) == 0 || of_standard(standard(mode)) == Some(mode));
@@ -146,7 +146,7 @@ mod tests {
                 FlightMode::Acro => 1,
                 _ => 4,
             };
-            assert_eq!((reported.place, reported.properties), (place, properties), "{mode:?}");
+            assert_eq!((reported.index, reported.properties), (place, properties), "{mode:?}");
             let end = reported.name.iter().position(|byte| *byte == 0).expect("short");
             assert_eq!(core::str::from_utf8(reported.name.get(..end).expect("within")), Ok(mode.name()));
             let now = current(mode, FlightMode::Hold);

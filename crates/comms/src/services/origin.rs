@@ -3,7 +3,7 @@
 //! The local frame is tangent to the WGS 84 ellipsoid at its origin: x is north, y is west. z is the difference in
 //! altitude, so z follows the curvature of the earth. Both conversions are exact except for rounding.
 
-use afbc_mavlink::Place;
+use afbc_mavlink::GlobalPosition;
 use nalgebra::{Vector2, Vector3};
 
 /// Semi-major axis \[m\] and squared eccentricity of WGS 84.
@@ -171,7 +171,7 @@ impl Global {
 
 /// Converts a station's place to the local frame \[m\]. Omitted coordinates become NaN; x and y are both NaN if one of
 /// them is omitted. Heights may be relative to `home_m` or to `here_m`.
-pub fn resolve(origin: &EarthOrigin, place: &Place, home_m: f32, here_m: f32) -> Vector3<f32> {
+pub fn resolve(origin: &EarthOrigin, place: &GlobalPosition, home_m: f32, here_m: f32) -> Vector3<f32> {
     use afbc_mavlink::Datum;
     let height = f64::from(place.height.metres);
     let z = match place.height.above {
@@ -180,7 +180,7 @@ pub fn resolve(origin: &EarthOrigin, place: &Place, home_m: f32, here_m: f32) ->
         Datum::Here => place.height.metres + here_m,
     };
     let given = [place.latitude_e7, place.longitude_e7];
-    if given.contains(&Place::AS_IT_IS) {
+    if given.contains(&GlobalPosition::AS_IT_IS) {
         return Vector3::new(f32::NAN, f32::NAN, z);
     }
     let local = origin.local(&Global::of_e7(given, origin.at.altitude_m));
@@ -225,7 +225,7 @@ mod tests {
         let origin = EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible");
         let z = |above| {
             let height = Height { metres: 490.0, above };
-            let place = Place { latitude_e7: Place::AS_IT_IS, longitude_e7: 0, height };
+            let place = GlobalPosition { latitude_e7: GlobalPosition::AS_IT_IS, longitude_e7: 0, height };
             let resolved = resolve(&origin, &place, 5.0, 7.0);
             assert!(resolved.x.is_nan() && resolved.y.is_nan());
             resolved.z
@@ -305,10 +305,10 @@ mod tests {
         let there = Vector3::new(300.0, -200.0, 0.0);
         let [latitude_e7, longitude_e7] = origin.global(&there).e7();
         for (above, z) in [(Datum::Sea, 12.0), (Datum::Home, 505.0), (Datum::Here, 507.0)] {
-            let place = Place { latitude_e7, longitude_e7, height: Height { metres: 500.0, above } };
+            let place = GlobalPosition { latitude_e7, longitude_e7, height: Height { metres: 500.0, above } };
             let local = resolve(&origin, &place, 5.0, 7.0);
             assert!((local - Vector3::new(300.0, -200.0, z)).norm() < 0.02, "{local}");
-            let half = resolve(&origin, &Place { longitude_e7: Place::AS_IT_IS, ..place }, 5.0, 7.0);
+            let half = resolve(&origin, &GlobalPosition { longitude_e7: GlobalPosition::AS_IT_IS, ..place }, 5.0, 7.0);
             assert!(half.x.is_nan() && half.y.is_nan() && half.z == z);
         }
     }

@@ -6,7 +6,7 @@
 //!
 //! [`Decoder::wired`]: afbc_mavlink::Decoder::wired
 
-use afbc_mavlink::{Address, Key, ReceivedFrame, SetupSigning, Stamp, TIME_MAX};
+use afbc_mavlink::{Address, ReceivedFrame, SetupSigning, SigningKey, Stamp, TIME_MAX};
 use afbc_store::RecordName;
 use heapless::Vec;
 
@@ -41,7 +41,7 @@ enum Lock {
     #[default]
     Open,
     /// Frames must be signed with this key.
-    Signed(Key),
+    Signed(SigningKey),
     /// A loss of power has left an incomplete key. No frame is accepted but a new key over a wire.
     Broken,
 }
@@ -112,7 +112,7 @@ impl Signing {
     #[inline(never)]
     fn of(check: Option<u32>, clock: Option<u32>, words: [Option<u32>; WORDS.len()]) -> Self {
         let kept_s = clock.unwrap_or_default();
-        let mut key = Key([0; 32]);
+        let mut key = SigningKey([0; 32]);
         for (bytes, word) in key.0.chunks_exact_mut(4).zip(&words) {
             bytes.copy_from_slice(&word.unwrap_or_default().to_le_bytes());
         }
@@ -163,7 +163,7 @@ impl Signing {
     }
 
     /// Returns true if a frame is signed with the key and newer than the stream's previous frames. Remembers its time.
-    fn is_genuine(&mut self, now_us: u64, frame: &ReceivedFrame<'_>, key: &Key) -> bool {
+    fn is_genuine(&mut self, now_us: u64, frame: &ReceivedFrame<'_>, key: &SigningKey) -> bool {
         let Some(Stamp { link, time_10us }) = frame.stamp() else { return false };
         if time_10us > LATEST_10US {
             return false;
@@ -220,7 +220,7 @@ impl Signing {
     }
 
     /// Returns the key and the stamp of the next frame if it is to be signed.
-    pub fn stamp(&mut self, now_us: u64) -> Option<(&Key, Stamp)> {
+    pub fn stamp(&mut self, now_us: u64) -> Option<(&SigningKey, Stamp)> {
         // Two frames within 10 us must not have the same time, or the second one would count as a replay.
         let time_10us = self.clock_10us(now_us).max(self.signed_10us.saturating_add(1));
         let Lock::Signed(key) = &self.lock else { return None };

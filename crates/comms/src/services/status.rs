@@ -3,7 +3,7 @@
 use crate::services::origin::EarthOrigin;
 use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::{Mode, Reasons, TickHealth};
-use afbc_guidance::{FlightMode, Guided};
+use afbc_guidance::{FlightMode, GuidanceOutputs};
 use afbc_mavlink::telemetry::BatteryStatus;
 use afbc_onboard::{EscTelemetry, Report};
 use afbc_rc::Channels;
@@ -59,7 +59,7 @@ pub struct VehicleStatus {
     /// Mode of the flight core.
     pub mode: Mode,
     /// State of the guidance.
-    pub guided: Guided,
+    pub guided: GuidanceOutputs,
     /// Newest state, from the vehicle's estimator or from the link.
     pub state: Option<State>,
     /// True if the vehicle has an IMU and estimates its state.

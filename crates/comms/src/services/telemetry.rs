@@ -6,8 +6,10 @@ use crate::services::origin::{EarthOrigin, Global};
 use crate::services::status::{RadioStatus, VehicleStatus};
 use crate::services::streams::id;
 use afbc_control::math::sqrt;
-use afbc_mavlink::telemetry::{self, ActuatorOutputs, AttitudeQuaternion, Fix, GlobalPosition, Home, Version, VfrHud};
-use afbc_mavlink::{Clock, Downlink, RadioChannels, Telemetry};
+use afbc_mavlink::telemetry::{
+    self, ActuatorOutputs, AttitudeQuaternion, GlobalPositionInt, GpsRawInt, HomePosition, Version, VfrHud,
+};
+use afbc_mavlink::{Downlink, RadioChannels, Telemetry, TimeMessage};
 use micromath::F32Ext;
 use nalgebra::Vector3;
 
@@ -27,9 +29,9 @@ pub fn compose(message: u32, status: &VehicleStatus) -> Option<Downlink> {
         id::SYSTEM_TIME => {
             let powered_up_us = status.aux.powered_up_us;
             let unix_us = if powered_up_us == 0 { 0 } else { powered_up_us.saturating_add(time_us) };
-            Some(Downlink::Clock(Clock::Time { unix_us, boot_ms: time_ms }))
+            Some(Downlink::Time(TimeMessage::Time { unix_us, boot_ms: time_ms }))
         }
-        id::GPS_RAW_INT => telemetry(Telemetry::Fix(fix(status)?)),
+        id::GPS_RAW_INT => telemetry(Telemetry::GpsRawInt(fix(status)?)),
         id::ATTITUDE => {
             let state = status.state?;
             let (attitude_rad, rates_rad_s) = (state.attitude_rad, state.rates_rad_s);
@@ -45,20 +47,20 @@ pub fn compose(message: u32, status: &VehicleStatus) -> Option<Downlink> {
             let (position_m, velocity_m_s) = (state.position_m, state.velocity_m_s);
             Some(Downlink::Position { time_ms, position_m, velocity_m_s })
         }
-        id::GLOBAL_POSITION_INT => telemetry(Telemetry::Global(global(status)?)),
+        id::GLOBAL_POSITION_INT => telemetry(Telemetry::GlobalPositionInt(global(status)?)),
         id::GPS_GLOBAL_ORIGIN => {
             let at = status.aux.origin?.at();
             let (place_e7, altitude_mm) = (at.e7(), at.altitude_mm());
-            telemetry(Telemetry::Origin(telemetry::GlobalOrigin { place_e7, altitude_mm, time_us }))
+            telemetry(Telemetry::GpsGlobalOrigin(telemetry::GlobalOrigin { place_e7, altitude_mm, time_us }))
         }
         id::RC_CHANNELS => {
             let RadioStatus { channels, rssi } = status.radio?;
             telemetry(Telemetry::Channels(RadioChannels { time_ms, us: channels.us, rssi }))
         }
-        id::VFR_HUD => telemetry(Telemetry::Summary(summary(status)?)),
+        id::VFR_HUD => telemetry(Telemetry::VfrHud(summary(status)?)),
         id::BATTERY_STATUS => telemetry(Telemetry::Battery(status.aux.battery?)),
         id::ESTIMATOR_STATUS => telemetry(Telemetry::Estimator(health::estimator(status))),
-        id::HOME_POSITION => telemetry(Telemetry::Home(home(status)?)),
+        id::HOME_POSITION => telemetry(Telemetry::HomePosition(home(status)?)),
         id::EXTENDED_SYS_STATE => telemetry(Telemetry::Landed(health::landed(status))),
         id::ACTUATOR_OUTPUT_STATUS => {
             let throttles = status.throttles.map(throttle);
@@ -110,11 +112,11 @@ fn place(status: &VehicleStatus) -> Option<(EarthOrigin, Global, afbc_types::Sta
     status.is_located().then(|| (origin, origin.global(&state.position_m), state))
 }
 
-fn global(status: &VehicleStatus) -> Option<GlobalPosition> {
+fn global(status: &VehicleStatus) -> Option<GlobalPositionInt> {
     let (_, place, state) = place(status)?;
     let cm_s = |speed_m_s: f32| (speed_m_s * 100.0) as i16;
     let v = state.velocity_m_s;
-    Some(GlobalPosition {
+    Some(GlobalPositionInt {
         time_ms: status.time_ms(),
         place_e7: place.e7(),
         altitude_mm: place.altitude_mm(),
@@ -124,7 +126,7 @@ fn global(status: &VehicleStatus) -> Option<GlobalPosition> {
     })
 }
 
-fn fix(status: &VehicleStatus) -> Option<Fix> {
+fn fix(status: &VehicleStatus) -> Option<GpsRawInt> {
     let receiver = status.aux.receiver?;
     let known = place(status);
     let (place_e7, altitude_mm) = known.as_ref().map_or(([0; 2], 0), |(_, place, _)| (place.e7(), place.altitude_mm()));
@@ -135,14 +137,23 @@ fn fix(status: &VehicleStatus) -> Option<Fix> {
         ((sqrt(v.xy().norm_squared()) * 100.0) as u16, (course as u16).min(35_999))
     });
     let crate::services::status::GnssReceiver { kind, satellites, sigma_mm } = receiver;
-    Some(Fix { time_us: status.time_us, place_e7, altitude_mm, kind, satellites, sigma_mm, speed_cm_s, course_cdeg })
+    Some(GpsRawInt {
+        time_us: status.time_us,
+        place_e7,
+        altitude_mm,
+        kind,
+        satellites,
+        sigma_mm,
+        speed_cm_s,
+        course_cdeg,
+    })
 }
 
-fn home(status: &VehicleStatus) -> Option<Home> {
+fn home(status: &VehicleStatus) -> Option<HomePosition> {
     let (origin, position_m) = (status.aux.origin?, status.guided.home_m?);
     let place = origin.global(&position_m);
     let (place_e7, altitude_mm, attitude) = (place.e7(), place.altitude_mm(), [1.0, 0.0, 0.0, 0.0]);
-    Some(Home { place_e7, altitude_mm, position_m, attitude, time_us: status.time_us })
+    Some(HomePosition { place_e7, altitude_mm, position_m, attitude, time_us: status.time_us })
 }
 
 fn summary(status: &VehicleStatus) -> Option<VfrHud> {
@@ -232,18 +243,20 @@ mod tests {
         let status = flying();
         let (origin, state) = (status.aux.origin.expect("known"), status.state.expect("known"));
         let here = origin.global(&state.position_m);
-        let Telemetry::Global(global) = reported(id::GLOBAL_POSITION_INT, &status) else { panic!("another") };
+        let Telemetry::GlobalPositionInt(global) = reported(id::GLOBAL_POSITION_INT, &status) else {
+            panic!("another")
+        };
         assert_eq!((global.time_ms, global.place_e7, global.altitude_mm), (5_000, here.e7(), 500_500));
         assert_eq!((global.relative_mm, global.velocity_ned_cm_s), (10_000, [300, 400, -125]));
         // Half a radian to the right is 28.64 degrees.
         assert_eq!(global.heading_cdeg, 2864);
-        let Telemetry::Fix(fix) = reported(id::GPS_RAW_INT, &status) else { panic!("another") };
+        let Telemetry::GpsRawInt(fix) = reported(id::GPS_RAW_INT, &status) else { panic!("another") };
         assert_eq!((fix.time_us, fix.place_e7, fix.altitude_mm), (5_000_123, here.e7(), 500_500));
         assert_eq!((fix.kind, fix.satellites, fix.sigma_mm), (3, 11, [700, 900]));
         // 3 m/s north and 4 m/s east make a course of 53.13 degrees, accurate to 0.16.
         assert_eq!(fix.speed_cm_s, 500);
         assert!(fix.course_cdeg.abs_diff(5313) <= 16, "{}", fix.course_cdeg);
-        let Telemetry::Summary(summary) = reported(id::VFR_HUD, &status) else { panic!("another") };
+        let Telemetry::VfrHud(summary) = reported(id::VFR_HUD, &status) else { panic!("another") };
         assert_eq!((summary.speed_m_s, summary.altitude_m, summary.climb_m_s), (5.0, 500.5, 1.25));
         // The throttles of the four rotors are 0, 1/2, 1 and 1/2.
         assert_eq!((summary.heading_deg, summary.throttle_percent), (28, 50));
@@ -259,11 +272,11 @@ mod tests {
         let (position_m, velocity_m_s) = (state.position_m, state.velocity_m_s);
         let position = Downlink::Position { time_ms: 5_000, position_m, velocity_m_s };
         assert_eq!(compose(id::LOCAL_POSITION_NED, &status), Some(position));
-        let Telemetry::Home(home) = reported(id::HOME_POSITION, &status) else { panic!("another") };
+        let Telemetry::HomePosition(home) = reported(id::HOME_POSITION, &status) else { panic!("another") };
         let at = origin.global(&Vector3::new(1.0, 2.0, 2.5));
         assert_eq!((home.place_e7, home.altitude_mm, home.time_us), (at.e7(), 490_500, 5_000_123));
         assert_eq!((home.position_m, home.attitude), (Vector3::new(1.0, 2.0, 2.5), [1.0, 0.0, 0.0, 0.0]));
-        let Telemetry::Origin(place) = reported(id::GPS_GLOBAL_ORIGIN, &status) else { panic!("another") };
+        let Telemetry::GpsGlobalOrigin(place) = reported(id::GPS_GLOBAL_ORIGIN, &status) else { panic!("another") };
         assert_eq!(
             (place.place_e7, place.altitude_mm, place.time_us),
             (EarthOrigin::SIMULATED.e7(), 488_000, 5_000_123)
@@ -279,24 +292,26 @@ mod tests {
         let mut status = flying();
         status.health.state_age_us = u32::MAX;
         assert_eq!(compose(id::GLOBAL_POSITION_INT, &status), None);
-        let Telemetry::Fix(fix) = reported(id::GPS_RAW_INT, &status) else { panic!("another") };
+        let Telemetry::GpsRawInt(fix) = reported(id::GPS_RAW_INT, &status) else { panic!("another") };
         assert_eq!((fix.place_e7, fix.altitude_mm, fix.speed_cm_s, fix.course_cdeg), ([0; 2], 0, 65_535, 65_535));
         let mut status = flying();
         status.aux.origin = None;
-        let Telemetry::Summary(summary) = reported(id::VFR_HUD, &status) else { panic!("another") };
+        let Telemetry::VfrHud(summary) = reported(id::VFR_HUD, &status) else { panic!("another") };
         assert_eq!(summary.altitude_m, 12.5);
         assert_eq!([id::HOME_POSITION, id::GPS_GLOBAL_ORIGIN].map(|it| compose(it, &status)), [None, None]);
         // Without home, heights are relative to the origin.
         let mut status = flying();
         status.guided.home_m = None;
-        let Telemetry::Global(global) = reported(id::GLOBAL_POSITION_INT, &status) else { panic!("another") };
+        let Telemetry::GlobalPositionInt(global) = reported(id::GLOBAL_POSITION_INT, &status) else {
+            panic!("another")
+        };
         assert_eq!((global.relative_mm, compose(id::HOME_POSITION, &status)), (12_500, None));
     }
 
     #[test]
     fn clocks_versions_and_modes_are_reported() {
         let mut status = flying();
-        let time = |unix_us| Some(Downlink::Clock(Clock::Time { unix_us, boot_ms: 5_000 }));
+        let time = |unix_us| Some(Downlink::Time(TimeMessage::Time { unix_us, boot_ms: 5_000 }));
         assert_eq!(compose(id::SYSTEM_TIME, &status), time(1_700_000_005_000_123));
         status.aux.powered_up_us = 0;
         assert_eq!(compose(id::SYSTEM_TIME, &status), time(0));
@@ -337,7 +352,9 @@ mod tests {
         let mut status = flying();
         let state = status.state.as_mut().expect("known");
         state.attitude_rad.z = 1e-5;
-        let Telemetry::Global(global) = reported(id::GLOBAL_POSITION_INT, &status) else { panic!("another") };
+        let Telemetry::GlobalPositionInt(global) = reported(id::GLOBAL_POSITION_INT, &status) else {
+            panic!("another")
+        };
         assert!(global.heading_cdeg <= 35_999);
     }
 }

@@ -2,7 +2,7 @@
 
 use afbc_guidance::OrderRefusal;
 use afbc_guidance::notice::Severity;
-use afbc_mavlink::{Address, Downlink, MavSeverity, Text};
+use afbc_mavlink::{Address, Downlink, MavSeverity, StatusText};
 use heapless::{Deque, String};
 
 /// Most queued texts. Further texts are dropped.
@@ -40,19 +40,19 @@ impl Words {
         self.number(station.system.into()).and("/").number(station.component.into())
     }
 
-    fn text(&self) -> Text {
-        Text::from(self.0.as_str())
+    fn text(&self) -> StatusText {
+        StatusText::from(self.0.as_str())
     }
 }
 
 /// Queue of texts.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Texts(Deque<(MavSeverity, Text), TEXTS_MAX>);
+pub(crate) struct Texts(Deque<(MavSeverity, StatusText), TEXTS_MAX>);
 
 impl Texts {
     /// Queues a text.
     pub(crate) fn put(&mut self, severity: MavSeverity, text: &str) {
-        self.0.push_back((severity, Text::from(text))).ok();
+        self.0.push_back((severity, StatusText::from(text))).ok();
     }
 
     /// Queues composed words.
@@ -150,7 +150,7 @@ mod tests {
         for number in 0..20 {
             texts.say(MavSeverity::MAV_SEVERITY_ERROR, &Words::default().number(number));
         }
-        assert_eq!(texts.next(), Some(Downlink::Text { severity: info, text: Text::from("first") }));
+        assert_eq!(texts.next(), Some(Downlink::Text { severity: info, text: StatusText::from("first") }));
         for number in 0..TEXTS_MAX as u32 - 1 {
             let text = Words::default().number(number).text();
             assert_eq!(texts.next(), Some(Downlink::Text { severity: MavSeverity::MAV_SEVERITY_ERROR, text }));

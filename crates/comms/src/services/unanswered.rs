@@ -1,27 +1,27 @@
 //! Refuses unsupported messages that MAVLink has no answer for, by an occasional text.
 
-use afbc_mavlink::UnansweredWish;
+use afbc_mavlink::UnansweredRequest;
 
 /// Time between two texts about the same kind of message \[us\].
 const QUIET_US: u64 = 20_000_000;
 
 /// The last refused kind of message, and its time \[us\].
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Unanswered(Option<(UnansweredWish, u64)>);
+pub struct Unanswered(Option<(UnansweredRequest, u64)>);
 
 impl Unanswered {
     /// Returns the text that refuses a message at `now_us`. Returns none if the same text was sent a short time ago.
-    pub fn text(&mut self, wish: UnansweredWish, now_us: u64) -> Option<&'static str> {
-        let said = |(last, at_us): &(UnansweredWish, u64)| *last == wish && now_us.saturating_sub(*at_us) < QUIET_US;
+    pub fn text(&mut self, wish: UnansweredRequest, now_us: u64) -> Option<&'static str> {
+        let said = |(last, at_us): &(UnansweredRequest, u64)| *last == wish && now_us.saturating_sub(*at_us) < QUIET_US;
         if self.0.as_ref().is_some_and(said) {
             return None;
         }
         self.0 = Some((wish, now_us));
         Some(match wish {
-            UnansweredWish::Corrections => "refused: RTK corrections are not used",
-            UnansweredWish::Tune => "refused: there is no buzzer",
-            UnansweredWish::Follow => "refused: targets are not followed",
-            UnansweredWish::Shell => "refused: there is no shell",
+            UnansweredRequest::Corrections => "refused: RTK corrections are not used",
+            UnansweredRequest::Tune => "refused: there is no buzzer",
+            UnansweredRequest::Follow => "refused: targets are not followed",
+            UnansweredRequest::Shell => "refused: there is no shell",
         })
     }
 }
@@ -32,7 +32,7 @@ mod tests {
 
     #[test]
     fn each_is_told_now_and_then() {
-        use UnansweredWish::{Corrections, Follow, Shell, Tune};
+        use UnansweredRequest::{Corrections, Follow, Shell, Tune};
         let mut unanswered = Unanswered::default();
         for (wish, word) in [(Corrections, "RTK"), (Tune, "buzzer"), (Follow, "followed"), (Shell, "shell")] {
             assert!(unanswered.text(wish, 5).is_some_and(|text| text.contains(word)));

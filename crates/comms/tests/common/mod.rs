@@ -3,7 +3,7 @@
 use afbc_comms::services::modes;
 use afbc_comms::{Comms, REPORT_MAX};
 use afbc_guidance::FlightMode;
-use afbc_mavlink::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
+use afbc_mavlink::{Address, Decoder, Downlink, Encoder, FRAME_MAX, Uplink, VehicleCommand};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{Configuration, ControlInputs, Flight, Prepared, Readings, Report};
 use afbc_types::{PoseSigmas, Setpoint, State};
@@ -45,7 +45,7 @@ impl Bench {
         for tick in 0..2000 {
             if tick == 1100 {
                 bench.follow();
-                bench.hear(Uplink::Command(Command::Arm));
+                bench.hear(Uplink::Command(VehicleCommand::Arm));
             }
             assert_eq!(bench.tick(&State::default()).0.mode.armed(), tick >= 1100);
         }
@@ -54,12 +54,12 @@ impl Bench {
 
     /// Selects Offboard mode.
     pub fn follow(&mut self) {
-        self.hear(Uplink::Command(Command::SelectMode(modes::custom(FlightMode::Offboard))));
+        self.hear(Uplink::Command(VehicleCommand::SelectMode(modes::custom(FlightMode::Offboard))));
     }
 
     /// Receives `message` from `from`.
     pub fn hear_from(&mut self, from: Address, message: Uplink) {
-        self.hear_bytes(Sender::new(from).send(&message, &mut [0; FRAME_MAX]));
+        self.hear_bytes(Encoder::new(from).send(&message, &mut [0; FRAME_MAX]));
     }
 
     /// Receives bytes, and returns the new inputs.
@@ -102,7 +102,7 @@ impl Bench {
         self.measure(state);
         self.hear(Uplink::Setpoint(Setpoint::default()));
         let (report, mut said) = self.step();
-        said.retain(|message| matches!(message, Downlink::Answer { .. } | Downlink::Text { .. }));
+        said.retain(|message| matches!(message, Downlink::CommandAck { .. } | Downlink::Text { .. }));
         (report, said)
     }
 

@@ -15,14 +15,14 @@ const DEGREE: i32 = 600_000_000;
 
 /// Assembles sentences byte by byte.
 #[derive(Default)]
-pub(super) struct Framing {
+pub(super) struct SentenceFramer {
     body: Vec<u8, LENGTH>,
-    place: Place,
+    place: FramingState,
 }
 
 /// Position of the next byte in a sentence.
 #[derive(Clone, Copy, Default)]
-enum Place {
+enum FramingState {
     /// Outside any sentence.
     #[default]
     Outside,
@@ -33,47 +33,51 @@ enum Place {
 
 /// Result of a byte that ends a sentence.
 #[derive(Debug, PartialEq)]
-pub(super) enum Framed<'a> {
+pub(super) enum FramedSentence<'a> {
     /// Body of a sentence with a correct checksum, without `$` and checksum.
     Whole(&'a [u8]),
     Damaged,
 }
 
-impl Framing {
+impl SentenceFramer {
     /// Takes a byte; returns the sentence that it completes or shows to be damaged.
-    pub(super) fn take(&mut self, byte: u8) -> Option<Framed<'_>> {
+    pub(super) fn take(&mut self, byte: u8) -> Option<FramedSentence<'_>> {
         let damaged = match (self.place, byte) {
             (place, b'$') => {
                 self.body.clear();
-                self.place = Place::Body;
+                self.place = FramingState::Body;
                 // A sentence that has begun is cut off.
-                !matches!(place, Place::Outside)
+                !matches!(place, FramingState::Outside)
             }
-            (Place::Outside, _) => false,
-            (Place::Body, b'*') => {
-                self.place = Place::Checksum(None);
+            (FramingState::Outside, _) => false,
+            (FramingState::Body, b'*') => {
+                self.place = FramingState::Checksum(None);
                 false
             }
             // Other bytes cannot be part of a sentence.
-            (Place::Body, b' '..=b'~') => self.body.push(byte).is_err(),
-            (Place::Body, _) => true,
-            (Place::Checksum(upper), _) => match (hexadecimal(byte), upper) {
+            (FramingState::Body, b' '..=b'~') => self.body.push(byte).is_err(),
+            (FramingState::Body, _) => true,
+            (FramingState::Checksum(upper), _) => match (hexadecimal(byte), upper) {
                 (None, _) => true,
                 (digit, None) => {
-                    self.place = Place::Checksum(digit);
+                    self.place = FramingState::Checksum(digit);
                     false
                 }
                 (Some(lower), Some(upper)) => {
-                    self.place = Place::Outside;
+                    self.place = FramingState::Outside;
                     let sum = self.body.iter().fold(0, |sum, byte| sum ^ byte);
-                    return Some(if sum == upper << 4 | lower { Framed::Whole(&self.body) } else { Framed::Damaged });
+                    return Some(if sum == upper << 4 | lower {
+                        FramedSentence::Whole(&self.body)
+                    } else {
+                        FramedSentence::Damaged
+                    });
                 }
             },
         };
         if damaged && byte != b'$' {
-            self.place = Place::Outside;
+            self.place = FramingState::Outside;
         }
-        damaged.then_some(Framed::Damaged)
+        damaged.then_some(FramedSentence::Damaged)
     }
 }
 
@@ -90,14 +94,14 @@ fn hexadecimal(digit: u8) -> Option<u8> {
 #[derive(Debug, PartialEq)]
 pub(super) enum Sentence {
     /// GGA; none without a measured fix.
-    Fix(Option<Fix>),
+    Fix(Option<GgaFields>),
     /// RMC; none if not valid or not measured.
-    Motion(Option<Motion>),
+    Motion(Option<RmcFields>),
 }
 
 /// Fields of GGA.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Fix {
+pub(super) struct GgaFields {
     /// Time of day \[ms\].
     pub(super) time_ms: u32,
     pub(super) latitude: Angle,
@@ -111,7 +115,7 @@ pub(super) struct Fix {
 
 /// Fields of RMC.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Motion {
+pub(super) struct RmcFields {
     /// Time of day \[ms\].
     pub(super) time_ms: u32,
     /// Speed over ground \[0.001 knots\].
@@ -148,7 +152,7 @@ impl Sentence {
             Some([b'A'..=b'O' | b'Q'..=b'Z', b'A'..=b'Z', kind @ ..]) => kind,
             _ => return Ok(None),
         };
-        let mut fields = Fields(fields);
+        let mut fields = SentenceFields(fields);
         Ok(match kind {
             b"GGA" => Some(Sentence::Fix(fields.fix().ok_or(())?)),
             b"RMC" => Some(Sentence::Motion(fields.motion().ok_or(())?)),
@@ -158,21 +162,21 @@ impl Sentence {
 }
 
 /// Fields not yet read.
-struct Fields<I>(I);
+struct SentenceFields<I>(I);
 
-impl<'a, I: Iterator<Item = &'a [u8]>> Fields<I> {
+impl<'a, I: Iterator<Item = &'a [u8]>> SentenceFields<I> {
     fn next(&mut self) -> Option<&'a [u8]> {
         self.0.next()
     }
 
     /// Parses GGA; `Some(None)` without a measured fix.
-    fn fix(&mut self) -> Option<Option<Fix>> {
+    fn fix(&mut self) -> Option<Option<GgaFields>> {
         let time = self.next()?;
         let [latitude, north, longitude, east] = [self.next()?, self.next()?, self.next()?, self.next()?];
         if !matches!(self.next()?, [quality] if MEASURED.contains(quality)) {
             return Some(None);
         }
-        let fix = Fix {
+        let fix = GgaFields {
             time_ms: time_of_day(time)?,
             latitude: angle(latitude, north, *b"NS", 90)?,
             longitude: angle(longitude, east, *b"EW", 180)?,
@@ -184,7 +188,7 @@ impl<'a, I: Iterator<Item = &'a [u8]>> Fields<I> {
     }
 
     /// Parses RMC; `Some(None)` if it is not valid or not measured.
-    fn motion(&mut self) -> Option<Option<Motion>> {
+    fn motion(&mut self) -> Option<Option<RmcFields>> {
         let time = self.next()?;
         if self.next()? != b"A" {
             return Some(None);
@@ -196,7 +200,7 @@ impl<'a, I: Iterator<Item = &'a [u8]>> Fields<I> {
         if !matches!(self.0.nth(3), None | Some(b"" | b"A" | b"D" | b"F" | b"P" | b"R")) {
             return Some(None);
         }
-        Some(Some(Motion {
+        Some(Some(RmcFields {
             time_ms: time_of_day(time)?,
             speed: decimal(speed, 3)?,
             course: if course.is_empty() { 0 } else { decimal(course, 3)? },
@@ -275,19 +279,19 @@ mod tests {
 
     #[test]
     fn a_sentence_that_breaks_off_is_damaged() {
-        let mut framing = Framing::default();
+        let mut framing = SentenceFramer::default();
         let mut damaged = 0;
         let mut whole = 0;
         for byte in b"$GP,1$GPX*17\r\n$GP\r\n$*0\xFF$A*40 $A*4g$A*41\r\n" {
             match framing.take(*byte) {
-                Some(Framed::Whole(_)) => whole += 1,
-                Some(Framed::Damaged) => damaged += 1,
+                Some(FramedSentence::Whole(_)) => whole += 1,
+                Some(FramedSentence::Damaged) => damaged += 1,
                 None => (),
             }
         }
         // The checksum of `GPX` is 0x4F, that of `A` is 0x41.
         assert_eq!((whole, damaged), (1, 6));
         let long: Vec<u8, 200> = core::iter::once(b'$').chain([b'A'; 150]).collect();
-        assert_eq!(long.iter().filter(|byte| framing.take(**byte) == Some(Framed::Damaged)).count(), 1);
+        assert_eq!(long.iter().filter(|byte| framing.take(**byte) == Some(FramedSentence::Damaged)).count(), 1);
     }
 }

@@ -53,7 +53,7 @@ impl Interface {
 
 /// Importance of a configuration step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Worth {
+pub(super) enum Importance {
     /// Required: without it the receiver is used with NMEA.
     Needed,
     /// Optional: skipped if refused.
@@ -63,17 +63,17 @@ pub(super) enum Worth {
 }
 
 /// Returns the configuration step with this number, for a line with this baud rate; none after the last step.
-pub(super) fn step(interface: Interface, number: u8, baud: u32) -> Option<(UbxCommand, Worth)> {
+pub(super) fn step(interface: Interface, number: u8, baud: u32) -> Option<(UbxCommand, Importance)> {
     Some(match (interface, number) {
-        (Interface::Keys, 0) => (set(MSGOUT_UBX_NAV_PVT_UART1, &[1]), Worth::Needed),
-        (Interface::Keys, 1) => (set(NAVSPG_DYNMODEL, &[AIRBORNE]), Worth::Wished),
-        (Interface::Keys, 2) => (set(UART1OUTPROT_NMEA, &[0]), Worth::Wished),
-        (Interface::Keys, 3) => (set(UART1_BAUDRATE, &baud.to_le_bytes()), Worth::Line(baud)),
+        (Interface::Keys, 0) => (set(MSGOUT_UBX_NAV_PVT_UART1, &[1]), Importance::Needed),
+        (Interface::Keys, 1) => (set(NAVSPG_DYNMODEL, &[AIRBORNE]), Importance::Wished),
+        (Interface::Keys, 2) => (set(UART1OUTPROT_NMEA, &[0]), Importance::Wished),
+        (Interface::Keys, 3) => (set(UART1_BAUDRATE, &baud.to_le_bytes()), Importance::Line(baud)),
         // After the baud rate, since a slow line has no room for so many solutions.
-        (Interface::Keys, 4) => (set(RATE_MEAS, &BY_KEYS_MS.to_le_bytes()), Worth::Wished),
+        (Interface::Keys, 4) => (set(RATE_MEAS, &BY_KEYS_MS.to_le_bytes()), Importance::Wished),
         (Interface::Messages, 0) => {
             let [class, number] = NAV_PVT;
-            (UbxCommand::new(CFG_MSG, &[class, number, 1]), Worth::Needed)
+            (UbxCommand::new(CFG_MSG, &[class, number, 1]), Importance::Needed)
         }
         (Interface::Messages, 1) => {
             // Mask that applies only the dynamic model.
@@ -82,18 +82,18 @@ pub(super) fn step(interface: Interface, number: u8, baud: u32) -> Option<(UbxCo
                 2 => AIRBORNE,
                 _ => 0,
             });
-            (UbxCommand::new(CFG_NAV5, &payload), Worth::Wished)
+            (UbxCommand::new(CFG_NAV5, &payload), Importance::Wished)
         }
         (Interface::Messages, 2) => {
             let [a, b, c, d] = baud.to_le_bytes();
             // UART 1; 8N1; input UBX and NMEA, output only UBX.
             let payload = [1, 0, 0, 0, 0xC0, 0x08, 0, 0, a, b, c, d, 3, 0, 1, 0, 0, 0, 0, 0];
-            (UbxCommand::new(CFG_PRT, &payload), Worth::Line(baud))
+            (UbxCommand::new(CFG_PRT, &payload), Importance::Line(baud))
         }
         (Interface::Messages, 3) => {
             let [low, high] = BY_MESSAGES_MS.to_le_bytes();
             // One solution per measurement, aligned to GPS time.
-            (UbxCommand::new(CFG_RATE, &[low, high, 1, 0, 1, 0]), Worth::Wished)
+            (UbxCommand::new(CFG_RATE, &[low, high, 1, 0, 1, 0]), Importance::Wished)
         }
         _ => return None,
     })

@@ -58,7 +58,7 @@ fn checksum(bytes: impl Iterator<Item = u8>) -> [u8; 2] {
 }
 
 /// Content at the beginning of the buffer.
-enum Front<T> {
+enum FrameSearch<T> {
     /// Incomplete frame.
     Part,
     /// This number of bytes of noise.
@@ -109,14 +109,14 @@ impl FrameDecoder {
     pub(super) fn next<T>(&mut self, byte_us: u64, read: impl Fn(MessageId, &[u8]) -> T) -> Option<(u64, T)> {
         loop {
             match front(self.bytes.get(..self.length)?, &read) {
-                Front::Part => return None,
-                Front::Noise(count) => self.remove(count, byte_us),
-                Front::Damaged => {
+                FrameSearch::Part => return None,
+                FrameSearch::Noise(count) => self.remove(count, byte_us),
+                FrameSearch::Damaged => {
                     self.damaged = self.damaged.saturating_add(1);
                     // Another frame may begin within it.
                     self.remove(BEGIN.len(), byte_us);
                 }
-                Front::Whole(length, message) => {
+                FrameSearch::Whole(length, message) => {
                     let first_us = self.first_us;
                     self.remove(length, byte_us);
                     return Some((first_us, message));
@@ -136,28 +136,28 @@ impl FrameDecoder {
     }
 }
 
-fn front<T>(held: &[u8], read: impl Fn(MessageId, &[u8]) -> T) -> Front<T> {
+fn front<T>(held: &[u8], read: impl Fn(MessageId, &[u8]) -> T) -> FrameSearch<T> {
     let [begin, _] = BEGIN;
     match held {
-        [] => Front::Part,
-        [a] if *a == begin => Front::Part,
+        [] => FrameSearch::Part,
+        [a] if *a == begin => FrameSearch::Part,
         [a, b, rest @ ..] if [*a, *b] == BEGIN => {
-            let [class, number, low, high, rest @ ..] = rest else { return Front::Part };
+            let [class, number, low, high, rest @ ..] = rest else { return FrameSearch::Part };
             let length = usize::from(u16::from_le_bytes([*low, *high]));
             if length > PAYLOAD_MAX {
-                return Front::Noise(BEGIN.len());
+                return FrameSearch::Noise(BEGIN.len());
             }
-            let Some((payload, [a, b, ..])) = rest.split_at_checked(length) else { return Front::Part };
+            let Some((payload, [a, b, ..])) = rest.split_at_checked(length) else { return FrameSearch::Part };
             let summed = [*class, *number, *low, *high].into_iter().chain(payload.iter().copied());
             if checksum(summed) == [*a, *b] {
-                Front::Whole(length + AROUND, read([*class, *number], payload))
+                FrameSearch::Whole(length + AROUND, read([*class, *number], payload))
             } else {
-                Front::Damaged
+                FrameSearch::Damaged
             }
         }
         [_, rest @ ..] => {
             let next = rest.iter().position(|byte| *byte == begin).unwrap_or(rest.len());
-            Front::Noise(1 + next)
+            FrameSearch::Noise(1 + next)
         }
     }
 }

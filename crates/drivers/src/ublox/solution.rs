@@ -1,6 +1,6 @@
 //! Decoding of NAV-PVT, a navigation solution.
 
-use crate::reading::FixReading;
+use crate::reading::GnssReading;
 use nalgebra::Vector3;
 
 /// Payload lengths of the seventh generation and of later ones.
@@ -14,11 +14,11 @@ const IS_NO_PLACE: u8 = 1;
 
 /// Decodes a payload. Returns none for another length, and `Some(None)` for an epoch without a fix or with impossible
 /// numbers.
-pub(super) fn read(payload: &[u8]) -> Option<Option<FixReading>> {
+pub(super) fn read(payload: &[u8]) -> Option<Option<GnssReading>> {
     LENGTHS.contains(&payload.len()).then(|| fix(payload))
 }
 
-fn fix(payload: &[u8]) -> Option<FixReading> {
+fn fix(payload: &[u8]) -> Option<GnssReading> {
     let byte = |at: usize| payload.get(at).copied();
     let word = |at: usize| payload.get(at..).and_then(|rest| rest.first_chunk::<4>()).copied();
     let signed = |at: usize| word(at).map(i32::from_le_bytes);
@@ -29,7 +29,7 @@ fn fix(payload: &[u8]) -> Option<FixReading> {
         return None;
     }
     let speed_sigma_m_s = sigma(68)?;
-    let reading = FixReading {
+    let reading = GnssReading {
         latitude_deg: f64::from(signed(28)?) * 1e-7,
         longitude_deg: f64::from(signed(24)?) * 1e-7,
         altitude_m: metres(36)?,

@@ -4,10 +4,10 @@ extern crate std;
 
 use super::memory;
 use super::{M21, V3, V21, covariance, dense, dense_row, difference, numbers, vector};
-use crate::aid::Aid;
-use crate::errors::Coordinate;
+use crate::aid::AidSource;
+use crate::errors::VectorComponent;
 use crate::estimator::Estimator;
-use crate::horizon::{Expected, Horizon, Target};
+use crate::horizon::{ExpectedReadings, FusionHorizon, ObservedQuantity};
 use crate::measurement::Measurement;
 use crate::memory::Memory;
 use crate::settings::Settings;
@@ -38,12 +38,12 @@ fn linear(p: M21) -> M21 {
 }
 
 /// Returns a measurement that differs from the estimate's expectation by `by`.
-fn measurement(aid: Aid, memory: &Memory, by: V3) -> Measurement {
+fn measurement(aid: AidSource, memory: &Memory, by: V3) -> Measurement {
     let off = by.map(|x| x as f32);
     let n = &memory.nominal;
     match aid {
-        Aid::TrackerPosition => Measurement::Position { position_m: n.position + off, sigma_m: SIGMA as f32 },
-        Aid::GnssPosition => Measurement::Gnss {
+        AidSource::TrackerPosition => Measurement::Position { position_m: n.position + off, sigma_m: SIGMA as f32 },
+        AidSource::GnssPosition => Measurement::Gnss {
             position_m: n.position + Vector3::new(off.x, off.y, 0.0),
             velocity_m_s: n.velocity,
             horizontal_sigma_m: SIGMA as f32,
@@ -51,7 +51,7 @@ fn measurement(aid: Aid, memory: &Memory, by: V3) -> Measurement {
             speed_sigma_m_s: 1e3,
             climb_sigma_m_s: 1e3,
         },
-        Aid::GnssHeight => Measurement::Gnss {
+        AidSource::GnssHeight => Measurement::Gnss {
             position_m: n.position + Vector3::new(0.0, 0.0, off.x),
             velocity_m_s: n.velocity,
             horizontal_sigma_m: 1e4,
@@ -59,7 +59,7 @@ fn measurement(aid: Aid, memory: &Memory, by: V3) -> Measurement {
             speed_sigma_m_s: 1e3,
             climb_sigma_m_s: 1e3,
         },
-        Aid::GnssVelocity => Measurement::Gnss {
+        AidSource::GnssVelocity => Measurement::Gnss {
             position_m: n.position,
             velocity_m_s: n.velocity + off,
             horizontal_sigma_m: 1e4,
@@ -67,7 +67,7 @@ fn measurement(aid: Aid, memory: &Memory, by: V3) -> Measurement {
             speed_sigma_m_s: SIGMA as f32,
             climb_sigma_m_s: SIGMA as f32,
         },
-        Aid::TrackerAttitude => {
+        AidSource::TrackerAttitude => {
             let q = UnitQuaternion::new(by).into_inner().coords.map(|x| x as f32);
             let q = Quaternion::from(q) * n.attitude;
             Measurement::Pose {
@@ -77,33 +77,33 @@ fn measurement(aid: Aid, memory: &Memory, by: V3) -> Measurement {
                 attitude_sigma_rad: SIGMA as f32,
             }
         }
-        Aid::Height => {
+        AidSource::Height => {
             Measurement::Height { height_m: n.position.z + memory.height_offset + off.x, sigma_m: SIGMA as f32 }
         }
-        Aid::Heading => {
+        AidSource::Heading => {
             Measurement::Heading { heading_rad: crate::rotation::euler(&n.attitude).z + off.x, sigma_rad: SIGMA as f32 }
         }
     }
 }
 
 /// Returns the Jacobian rows of the measurement at the present.
-fn rows(aid: Aid, memory: &Memory) -> Vec<V21> {
+fn rows(aid: AidSource, memory: &Memory) -> Vec<V21> {
     let past = memory.history.newest().unwrap();
-    let horizon = Horizon::new(&past, &past, 9.81);
-    let expected = Expected { height_offset: 0.0, field: Vector3::x() };
+    let horizon = FusionHorizon::new(&past, &past, 9.81);
+    let expected = ExpectedReadings { height_offset: 0.0, field: Vector3::x() };
     let zero = Vector3::zeros();
     let (target, count) = match aid {
-        Aid::TrackerPosition => (Target::Position(zero), 3),
-        Aid::GnssPosition => (Target::Position(zero), 2),
-        Aid::GnssHeight => (Target::Position(zero), 1),
-        Aid::GnssVelocity => (Target::Velocity(zero), 3),
-        Aid::TrackerAttitude => (Target::Attitude(past.attitude), 3),
-        Aid::Height => (Target::Height(0.0), 1),
-        Aid::Heading => (Target::Heading(0.0), 1),
+        AidSource::TrackerPosition => (ObservedQuantity::Position(zero), 3),
+        AidSource::GnssPosition => (ObservedQuantity::Position(zero), 2),
+        AidSource::GnssHeight => (ObservedQuantity::Position(zero), 1),
+        AidSource::GnssVelocity => (ObservedQuantity::Velocity(zero), 3),
+        AidSource::TrackerAttitude => (ObservedQuantity::Attitude(past.attitude), 3),
+        AidSource::Height => (ObservedQuantity::Height(0.0), 1),
+        AidSource::Heading => (ObservedQuantity::Heading(0.0), 1),
     };
-    let row = |at: &Coordinate| dense_row(&horizon.row(&target, *at, &expected).unwrap().1);
-    let first = if aid == Aid::GnssHeight { 2 } else { 0 };
-    Coordinate::ALL.iter().skip(first).take(count).map(row).collect()
+    let row = |at: &VectorComponent| dense_row(&horizon.row(&target, *at, &expected).unwrap().1);
+    let first = if aid == AidSource::GnssHeight { 2 } else { 0 };
+    VectorComponent::ALL.iter().skip(first).take(count).map(row).collect()
 }
 
 /// Fuses until the queue is empty.
@@ -122,7 +122,7 @@ fn start(p: &M21, turn: &V3, offset: f64) -> Memory {
     memory
 }
 
-const AIDS: [Aid; 7] = Aid::ALL;
+const AIDS: [AidSource; 7] = AidSource::ALL;
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
@@ -214,7 +214,7 @@ proptest! {
         for i in (0..=steps).rev() {
             let at_us = NOW_US - u64::from(i * 4000_u32);
             let back = (NOW_US - at_us) as f32 * 1e-6;
-            memory.history.store(&crate::history::Past {
+            memory.history.store(&crate::history::PastState {
                 at_us: at_us as u32, attitude: memory.nominal.attitude, velocity, position: position - velocity * back,
                     });
         }
@@ -262,7 +262,7 @@ fn a_receivers_variance_is_divided() {
     let kept = memory.covariance.slow.position;
     assert!(kept.m11 < -1e-4);
     // After ten seconds, nine tenths of the covariance are left.
-    memory.remember(NOW_US + 10_000_000);
+    memory.store_history(NOW_US + 10_000_000);
     memory.still_us = NOW_US + 10_000_000;
     let mut later = memory;
     later.offer(&fix(NOW_US + 10_000_000, 1.3));

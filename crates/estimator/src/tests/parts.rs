@@ -4,16 +4,16 @@
 extern crate std;
 
 use super::{V3, numbers, vector};
-use crate::aid::{Aid, AidRecord, Aids, Repeated, Trust, passes};
+use crate::aid::{AidRecord, AidRecords, AidSource, FrozenPoseDetector, ResetDelay, passes};
 use crate::covariance::{Covariance, angle_variance, largest_sigma};
-use crate::geodetic::Origin;
-use crate::history::{History, Past};
-use crate::imu::{Clipped, LowPass, MISSING_US, Monitor, Smoothed};
+use crate::geodetic::GeodeticOrigin;
+use crate::history::{PastState, StateHistory};
+use crate::imu::{ClippedSensors, ImuMonitor, LowPassFilter2p, LowPassFilter2pMemory, MISSING_US};
 use crate::measurement::{ImuSample, Measurement};
 use crate::memory::Memory;
-use crate::nominal::Nominal;
-use crate::queue::Queue;
-use crate::rotation::{about_z, difference, identity, levelling, matrix, normalized, renormalized, small, twist};
+use crate::nominal::NominalState;
+use crate::queue::MeasurementQueue;
+use crate::rotation::{about_z, difference, identity, levelling, matrix, normalized, renormalized, small, yaw_between};
 use crate::settings::Settings;
 use afbc_types::Stamped;
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
@@ -53,7 +53,7 @@ proptest! {
         let yaw = other[0] * 3.1;
         let about = UnitQuaternion::new(V3::z() * yaw);
         prop_assert!(apart(&about_z(yaw as f32), &about) < 1e-6);
-        prop_assert!((f64::from(twist(&single(&(about * from)), &single(&from))) - yaw).abs() < 2e-5);
+        prop_assert!((f64::from(yaw_between(&single(&(about * from)), &single(&from))) - yaw).abs() < 2e-5);
     }
 
     /// Levelling turns the given direction to vertical by the shortest way.
@@ -89,7 +89,7 @@ proptest! {
                 (radius * (1.0 - square) + altitude) * sine,
             )
         };
-        let origin = Origin::new(latitude, longitude, altitude).unwrap();
+        let origin = GeodeticOrigin::new(latitude, longitude, altitude).unwrap();
         let there = (latitude + by[0] * 0.01, longitude + by[1] * 0.01, altitude + by[2] * 100.0);
         let turns = if there.1 > 180.0 { 1.0 } else if there.1 < -180.0 { -1.0 } else { 0.0 };
         let wrapped = there.1 - 360.0 * turns;
@@ -115,11 +115,12 @@ proptest! {
             }
         };
         let turn = |t: f64| UnitQuaternion::new(V3::new(c[0], c[5], c[9]) * (0.5 * t));
-        let mut history = History::default();
+        let mut history = StateHistory::default();
         let base = u32::MAX - span_us / 2;
         for (step, t) in [(0, 0.0), (span_us, f64::from(span_us) * 1e-6)] {
             let (velocity, position) = (of(1, t).map(|x| x as f32), of(0, t).map(|x| x as f32));
-            history.store(&Past { at_us: base.wrapping_add(step), attitude: single(&turn(t)), velocity, position });
+            let at_us = base.wrapping_add(step);
+            history.store(&PastState { at_us, attitude: single(&turn(t)), velocity, position });
         }
         let after_us = (f64::from(span_us) * share) as u32;
         let t = f64::from(after_us) * 1e-6;
@@ -135,7 +136,7 @@ proptest! {
     /// For any order of times: the oldest arrival that is due leaves first, and a ninth measurement drops the oldest.
     #[test]
     fn the_queue_is_a_queue(events in proptest::collection::vec((any::<bool>(), 0..20_u64, 0..25_u64), 1..60)) {
-        let (mut queue, mut model) = (Queue::default(), Vec::new());
+        let (mut queue, mut model) = (MeasurementQueue::default(), Vec::new());
         for (pushes, at_us, limit_us) in events {
             if pushes {
                 let value = Measurement::Heading { heading_rad: model.len() as f32, sigma_rad: 0.1 };
@@ -162,7 +163,7 @@ proptest! {
         let grows = V3::new(slope[3], slope[4], slope[5]) * 30.0;
         let force = |t: f64| vector(f) * 5.0 + V3::new(0.0, 0.0, 9.8) + grows * t;
         let start = UnitQuaternion::new(V3::new(0.2, -0.1, 0.4));
-        let mut nominal = Nominal::new(single(&start));
+        let mut nominal = NominalState::new(single(&start));
         (nominal.gyro_bias, nominal.accel_bias) = biases;
         nominal.velocity = Vector3::new(1.0, -2.0, 0.5);
         nominal.move_to(Vector3::new(3.0, 4.0, 5.0));
@@ -197,7 +198,7 @@ proptest! {
 /// A motion of a fraction of the last bit per step is not lost.
 #[test]
 fn rounding_leaves_no_step_out() {
-    let mut nominal = Nominal::new(identity());
+    let mut nominal = NominalState::new(identity());
     nominal.move_to(Vector3::new(4000.0, 0.0, 0.0));
     nominal.velocity = Vector3::new(0.05, 0.0, 0.0);
     let sample = ImuSample { specific_force_m_s2: Vector3::new(0.0, 0.0, 9.81), ..ImuSample::default() };
@@ -212,10 +213,10 @@ fn rounding_leaves_no_step_out() {
 
 #[test]
 fn an_impossible_state_is_not_sound() {
-    let mut good = Nominal::new(identity());
+    let mut good = NominalState::new(identity());
     (good.position, good.velocity) = (Vector3::new(8.9e4, -8.9e4, 8.9e4), Vector3::new(299.0, -299.0, 299.0));
     assert!(good.is_sound());
-    let bad = |change: &dyn Fn(&mut Nominal)| {
+    let bad = |change: &dyn Fn(&mut NominalState)| {
         let mut nominal = good;
         change(&mut nominal);
         !nominal.is_sound()
@@ -248,7 +249,7 @@ fn an_impossible_state_is_not_sound() {
 fn the_low_pass_is_butterworths() {
     for cutoff_hz in [20.0, 120.0, 300.0_f32] {
         for ratio in [0.1, 0.5, 1.0, 1.5] {
-            let (low_pass, mut memory) = (LowPass::new(cutoff_hz), Smoothed::default());
+            let (low_pass, mut memory) = (LowPassFilter2p::new(cutoff_hz), LowPassFilter2pMemory::default());
             let hz = f64::from(cutoff_hz) * ratio;
             if hz > 450.0 {
                 continue;
@@ -269,11 +270,11 @@ fn the_low_pass_is_butterworths() {
         }
     }
     // The first value passes unchanged; without a cutoff every value does.
-    let mut memory = Smoothed::default();
-    LowPass::new(50.0).advance(&mut memory, &Vector3::new(3.0, -2.0, 1.0));
+    let mut memory = LowPassFilter2pMemory::default();
+    LowPassFilter2p::new(50.0).advance(&mut memory, &Vector3::new(3.0, -2.0, 1.0));
     assert!((memory.output - Vector3::new(3.0, -2.0, 1.0)).norm() < 1e-5);
     for x in [1.0, -4.0_f32] {
-        LowPass::new(0.0).advance(&mut memory, &Vector3::repeat(x));
+        LowPassFilter2p::new(0.0).advance(&mut memory, &Vector3::repeat(x));
         assert_eq!(memory.output, Vector3::repeat(x));
     }
 }
@@ -287,9 +288,9 @@ fn sample(at_us: u64, rate: f32, force: f32) -> ImuSample {
 fn the_monitor_tells_what_it_sees() {
     let settings = Settings::DEFAULT;
     let stuck_us = 15_000;
-    let mut monitor = Monitor::default();
+    let mut monitor = ImuMonitor::default();
     assert!(monitor.health(5, &settings, stuck_us).missing && monitor.at_us().is_none());
-    assert_eq!(monitor.take(&sample(1_000_000, 0.0, 0.0), &settings), Clipped { gyro: false, accel: false });
+    assert_eq!(monitor.take(&sample(1_000_000, 0.0, 0.0), &settings), ClippedSensors { gyro: false, accel: false });
     assert!(!monitor.health(1_000_000 + MISSING_US, &settings, stuck_us).missing);
     assert!(monitor.health(1_000_001 + MISSING_US, &settings, stuck_us).missing);
     // Repeated samples count as stuck after the set time, and no longer after the first change.
@@ -318,9 +319,9 @@ fn the_monitor_tells_what_it_sees() {
         (0.0, 0.99, true),
         (0.0, -0.99, true),
     ] {
-        let mut monitor = Monitor::default();
+        let mut monitor = ImuMonitor::default();
         let sample = sample(1_000_000, rate * settings.gyro_range_rad_s, force * settings.accel_range_m_s2);
-        let clipped = Clipped { gyro: clips && rate != 0.0, accel: clips && force != 0.0 };
+        let clipped = ClippedSensors { gyro: clips && rate != 0.0, accel: clips && force != 0.0 };
         assert_eq!(monitor.take(&sample, &settings), clipped, "{rate}, {force}");
         assert_eq!(monitor.health(1_000_000, &settings, stuck_us).clipped, clips);
         let _ = monitor.take(&super::parts::sample(1_199_000, 0.0, 0.0), &settings);
@@ -329,7 +330,7 @@ fn the_monitor_tells_what_it_sees() {
         assert!(!monitor.health(1_200_000, &settings, stuck_us).clipped);
     }
     // After 500 refusals in a row the sample clock must have jumped.
-    let mut monitor = Monitor::default();
+    let mut monitor = ImuMonitor::default();
     for number in 1..=500 {
         monitor.refuse();
         assert_eq!(monitor.is_lost(), number == 500);
@@ -341,7 +342,7 @@ fn the_monitor_tells_what_it_sees() {
     assert_eq!(monitor.at_us(), None);
     // Root mean square of the changes from sample to sample.
     for (rate, force, noisy) in [(1.9, 0.0, false), (2.1, 0.0, true), (0.0, 39.0, false), (0.0, 41.0, true)] {
-        let mut monitor = Monitor::default();
+        let mut monitor = ImuMonitor::default();
         for ms in 0..2000_u64 {
             let sign = if ms.is_multiple_of(2) { 0.5 } else { -0.5 };
             let _ = monitor.take(&sample(1000 * ms, sign * rate, sign * force), &settings);
@@ -356,35 +357,35 @@ fn the_monitor_tells_what_it_sees() {
 /// soon if none does.
 #[test]
 fn what_two_agree_on_is_not_overruled() {
-    use Aid::{GnssHeight, GnssPosition, GnssVelocity, Heading, Height, TrackerAttitude, TrackerPosition};
-    let trust = |aid: Aid, live: &[Aid], now_us| {
-        let mut aids = Aids::default();
+    use AidSource::{GnssHeight, GnssPosition, GnssVelocity, Heading, Height, TrackerAttitude, TrackerPosition};
+    let trust = |aid: AidSource, live: &[AidSource], now_us| {
+        let mut aids = AidRecords::default();
         live.iter().for_each(|live| aids.of_mut(*live).accept(1000));
         aids.trust(aid, aids.gnss_velocity.is_live(now_us, 50), now_us, 50)
     };
     for (aid, live, expected) in [
-        (TrackerPosition, &[GnssPosition][..], Trust::Never),
-        (TrackerPosition, &[GnssVelocity], Trust::Late),
-        (TrackerPosition, &[Height, Heading], Trust::Soon),
-        (GnssPosition, &[TrackerPosition], Trust::Never),
-        (GnssPosition, &[GnssVelocity, Height], Trust::Late),
-        (GnssPosition, &[Height], Trust::Soon),
-        (GnssHeight, &[GnssVelocity, Height], Trust::Never),
-        (GnssHeight, &[TrackerPosition], Trust::Never),
-        (GnssHeight, &[GnssVelocity, GnssPosition], Trust::Late),
-        (GnssHeight, &[Height], Trust::Soon),
-        (GnssVelocity, &[TrackerPosition], Trust::Never),
-        (GnssVelocity, &[GnssPosition], Trust::Late),
-        (GnssVelocity, &[Height], Trust::Soon),
-        (TrackerAttitude, &[Heading], Trust::Never),
-        (TrackerAttitude, &[TrackerPosition], Trust::Soon),
-        (Heading, &[TrackerAttitude], Trust::Never),
-        (Heading, &[GnssVelocity], Trust::Never),
-        (Heading, &[TrackerPosition], Trust::Late),
-        (Height, &[TrackerPosition, GnssHeight, GnssVelocity], Trust::Soon),
+        (TrackerPosition, &[GnssPosition][..], ResetDelay::Never),
+        (TrackerPosition, &[GnssVelocity], ResetDelay::Late),
+        (TrackerPosition, &[Height, Heading], ResetDelay::Soon),
+        (GnssPosition, &[TrackerPosition], ResetDelay::Never),
+        (GnssPosition, &[GnssVelocity, Height], ResetDelay::Late),
+        (GnssPosition, &[Height], ResetDelay::Soon),
+        (GnssHeight, &[GnssVelocity, Height], ResetDelay::Never),
+        (GnssHeight, &[TrackerPosition], ResetDelay::Never),
+        (GnssHeight, &[GnssVelocity, GnssPosition], ResetDelay::Late),
+        (GnssHeight, &[Height], ResetDelay::Soon),
+        (GnssVelocity, &[TrackerPosition], ResetDelay::Never),
+        (GnssVelocity, &[GnssPosition], ResetDelay::Late),
+        (GnssVelocity, &[Height], ResetDelay::Soon),
+        (TrackerAttitude, &[Heading], ResetDelay::Never),
+        (TrackerAttitude, &[TrackerPosition], ResetDelay::Soon),
+        (Heading, &[TrackerAttitude], ResetDelay::Never),
+        (Heading, &[GnssVelocity], ResetDelay::Never),
+        (Heading, &[TrackerPosition], ResetDelay::Late),
+        (Height, &[TrackerPosition, GnssHeight, GnssVelocity], ResetDelay::Soon),
     ] {
         assert_eq!(trust(aid, live, 1050), expected, "{aid:?}, {live:?}");
-        let alone = if aid == Heading { Trust::Late } else { Trust::Soon };
+        let alone = if aid == Heading { ResetDelay::Late } else { ResetDelay::Soon };
         assert_eq!(trust(aid, live, 1051), alone, "{aid:?}, {live:?}");
     }
 }
@@ -399,15 +400,15 @@ fn an_aid_is_live_for_a_while() {
     assert!(record.is_live(1100, 100) && !record.is_live(1101, 100) && record.is_live(500, 0));
     assert_eq!(record.reject(2000), 0);
     // Each aid holds the position, the velocity or neither.
-    for live in Aid::ALL {
-        let mut aids = Aids::default();
+    for live in AidSource::ALL {
+        let mut aids = AidRecords::default();
         aids.of_mut(live).accept(1000);
-        for aid in Aid::ALL {
+        for aid in AidSource::ALL {
             assert_eq!(aids.of(aid).accepted == 1, aid == live, "{live:?}, {aid:?}");
         }
-        let position = matches!(live, Aid::TrackerPosition | Aid::GnssPosition);
+        let position = matches!(live, AidSource::TrackerPosition | AidSource::GnssPosition);
         assert_eq!(aids.holds_position(1050, 50), position);
-        assert_eq!(aids.holds_velocity(1050, 50), position || live == Aid::GnssVelocity);
+        assert_eq!(aids.holds_velocity(1050, 50), position || live == AidSource::GnssVelocity);
         assert!(!aids.holds_velocity(1051, 50) && !aids.holds_position(1051, 50));
     }
     let passes = |x, y, z| passes(&Vector3::new(x, y, z), &Vector3::new(1.0, 4.0, 9.0), 25.0);
@@ -416,7 +417,7 @@ fn an_aid_is_live_for_a_while() {
     );
     assert!(!passes(f32::NAN, 0.0, 0.0));
     // A pose counts as repeated from its first arrival, and only if every bit is equal.
-    let mut repeated = Repeated::default();
+    let mut repeated = FrozenPoseDetector::default();
     let (place, turn) = (Vector3::new(1.0, 2.0, 3.0), [1.0, 0.0, 0.0, 0.0]);
     assert_eq!(repeated.lasts_us(&place, &turn, 1000), 0);
     repeated.doubted = true;
@@ -429,12 +430,12 @@ fn an_aid_is_live_for_a_while() {
 fn rough_samples_count_for_a_while() {
     let mut memory = Memory::default();
     assert_eq!(memory.roughened_since(0), (0.0, 0.0));
-    memory.roughen(1_000_000, 0.5, 2.0);
-    memory.roughen(1_300_000, 0.25, 1.0);
+    memory.inflate_variances(1_000_000, 0.5, 2.0);
+    memory.inflate_variances(1_300_000, 0.25, 1.0);
     assert_eq!((memory.rough, memory.roughened_since(1_299_999)), ((0.75, 3.0), (0.75, 3.0)));
     assert_eq!(memory.roughened_since(1_300_000), (0.0, 0.0));
     // The earlier sum is older than any measurement and no longer counts.
-    memory.roughen(1_600_001, 0.125, 0.5);
+    memory.inflate_variances(1_600_001, 0.125, 0.5);
     assert_eq!((memory.rough, memory.roughened_since(1_600_000)), ((0.875, 3.5), (0.125, 0.5)));
     // An implausible measurement is counted, and a ninth one pushes out the first.
     for heading_rad in [f32::NAN, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0] {
@@ -443,7 +444,7 @@ fn rough_samples_count_for_a_while() {
     assert_eq!((memory.dropped().implausible, memory.dropped().crowded, memory.queue.waiting()), (1, 1, 8));
     // The vehicle stands if it is told so, or if unknown, until it moves.
     assert!(!memory.stands());
-    memory.rest = crate::rest::Rest::aligned(Vector3::zeros(), Vector3::z());
+    memory.rest = crate::rest::RestDetector::aligned(Vector3::zeros(), Vector3::z());
     assert!(memory.stands());
     memory.rest.unmoved = false;
     assert!(!memory.stands());
@@ -531,7 +532,7 @@ fn the_door_has_bounds() {
     let faint = |x: f32| Measurement::MagneticField { field: Vector3::repeat(-x), sigma: 1.0 }.is_plausible();
     assert!(faint(1.1e-7) && !faint(0.9e-7));
     // Limits of the origin.
-    let is = |latitude, longitude, altitude| Origin::new(latitude, longitude, altitude).is_some();
+    let is = |latitude, longitude, altitude| GeodeticOrigin::new(latitude, longitude, altitude).is_some();
     assert!(is(88.9, 179.9, 1.9e4) && is(-88.9, -179.9, -1.9e4));
     assert!(!is(89.1, 0.0, 0.0) && !is(-89.1, 0.0, 0.0) && !is(0.0, 180.1, 0.0) && !is(0.0, -180.1, 0.0));
     assert!(!is(0.0, 0.0, 2.1e4) && !is(0.0, 0.0, -2.1e4) && !is(f64::NAN, 0.0, 0.0));

@@ -3,15 +3,15 @@
 extern crate std;
 
 use super::{M21, V3, blocks, covariance, dense, dense_row, difference, memory, numbers, vector};
-use crate::align::{Align, Aligned, Unready};
-use crate::errors::{Coordinate, Slows};
+use crate::align::{Alignment, AlignmentResult, Unready};
+use crate::errors::{SlowErrors, VectorComponent};
 use crate::estimate::Sigmas;
 use crate::estimator::Estimator;
-use crate::history::Past;
-use crate::horizon::{Horizon, Target, magnetic};
+use crate::history::PastState;
+use crate::horizon::{FusionHorizon, ObservedQuantity, magnetic};
 use crate::measurement::{ImuSample, Measurement};
 use crate::memory::Memory;
-use crate::queue::{Axes, Part};
+use crate::queue::{AidObservation, FusedAxes};
 use crate::restart::reference;
 use crate::settings::Settings;
 use afbc_types::State;
@@ -19,8 +19,8 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use std::vec::Vec;
 
-fn part(aid: crate::Aid, target: Target, axes: Axes, variance: &V3) -> Part {
-    Part { aid: Some(aid), target, axes, variance: variance.map(|x| x as f32), rough: 0.0 }
+fn part(aid: crate::AidSource, target: ObservedQuantity, axes: FusedAxes, variance: &V3) -> AidObservation {
+    AidObservation { aid: Some(aid), target, axes, variance: variance.map(|x| x as f32), rough: 0.0 }
 }
 
 fn three(m: &mut M21, i: usize, j: usize, block: &Matrix3<f64>) {
@@ -28,11 +28,11 @@ fn three(m: &mut M21, i: usize, j: usize, block: &Matrix3<f64>) {
 }
 
 /// Returns the horizon of a vehicle that has moved straight on for `tau_s`.
-fn since(memory: &mut Memory, tau_s: f32) -> Horizon {
+fn since(memory: &mut Memory, tau_s: f32) -> FusionHorizon {
     let now = memory.history.newest().unwrap();
     let at_us = now.at_us - (tau_s * 1e6) as u32;
-    let past = Past { at_us, position: now.position - now.velocity * tau_s, ..now };
-    Horizon::new(&now, &past, 9.81)
+    let past = PastState { at_us, position: now.position - now.velocity * tau_s, ..now };
+    FusionHorizon::new(&now, &past, 9.81)
 }
 
 proptest! {
@@ -44,14 +44,16 @@ proptest! {
         let mut memory = memory(&p, &V3::new(0.1, -0.2, 0.7));
         let variance = vector(noise).map(|x| x * x + 0.01);
         let (aid, axes, coordinates) = [
-            (crate::Aid::TrackerPosition, Axes::All, 0..3), (crate::Aid::GnssPosition, Axes::All, 0..3),
-            (crate::Aid::GnssPosition, Axes::Level, 0..2), (crate::Aid::GnssHeight, Axes::Vertical, 2..3),
+            (crate::AidSource::TrackerPosition, FusedAxes::All, 0..3),
+            (crate::AidSource::GnssPosition, FusedAxes::All, 0..3),
+            (crate::AidSource::GnssPosition, FusedAxes::Level, 0..2),
+            (crate::AidSource::GnssHeight, FusedAxes::Vertical, 2..3),
         ][which].clone();
         let horizon = since(&mut memory, tau as f32);
         let by = vector(by).map(|x| x as f32) * 10.0;
         let before = memory.nominal.position;
-        let part = part(aid, Target::Position(horizon.past().position + by), axes, &variance);
-        let rows: Vec<_> = Coordinate::ALL.into_iter().map(|at| {
+        let part = part(aid, ObservedQuantity::Position(horizon.past().position + by), axes, &variance);
+        let rows: Vec<_> = VectorComponent::ALL.into_iter().map(|at| {
             dense_row(&horizon.row(&part.target, at, &estimator.expected(&memory)).unwrap().1)
         }).collect();
         estimator.follow(&mut memory, &part, &horizon);
@@ -59,23 +61,23 @@ proptest! {
         prop_assert!((memory.nominal.position - before - by).norm() < 1e-5);
         prop_assert!((memory.history.newest().unwrap().position - before - by).norm() < 1e-5);
         prop_assert!(memory.resets.position == 1 && memory.knows.position);
-        prop_assert_eq!(memory.knows.height_offset, axes == Axes::Level);
+        prop_assert_eq!(memory.knows.height_offset, axes == FusedAxes::Level);
         // Linear map of the errors for the replaced coordinates.
         let mut t = M21::identity();
         for i in coordinates.clone() {
             let mut row = -rows[i];
             row[6 + i] = 0.0;
-            if aid != crate::Aid::TrackerPosition {
+            if aid != crate::AidSource::TrackerPosition {
                 row[16 + i] = -1.0;
             }
             t.set_row(6 + i, &row.transpose());
         }
-        if axes != Axes::Level {
+        if axes != FusedAxes::Level {
             t.fixed_rows_mut::<1>(15).fill(0.0);
         }
         let mut theirs = t * p * t.transpose();
         coordinates.for_each(|i| theirs[(6 + i, 6 + i)] += variance[i]);
-        if axes != Axes::Level {
+        if axes != FusedAxes::Level {
             // Forgotten, down to the smallest variance.
             theirs[(15, 15)] = 1e-8;
         }
@@ -94,7 +96,9 @@ proptest! {
         let before = fast.nominal.velocity;
         let horizon = since(&mut fast, 0.0);
         estimator.follow(
-            &mut fast, &part(crate::Aid::GnssVelocity, Target::Velocity(before + by), Axes::All, &variance), &horizon,
+            &mut fast,
+            &part(crate::AidSource::GnssVelocity, ObservedQuantity::Velocity(before + by), FusedAxes::All, &variance),
+            &horizon,
         );
         prop_assert!((fast.nominal.velocity - before - by).norm() < 1e-5 && fast.resets.velocity == 1);
         prop_assert!((fast.history.newest().unwrap().velocity - before - by).norm() < 1e-5);
@@ -115,7 +119,8 @@ proptest! {
         high.knows.height_offset = false;
         let horizon = since(&mut high, 0.0);
         let height = horizon.past().position.z + offset;
-        estimator.follow(&mut high, &part(crate::Aid::Height, Target::Height(height), Axes::All, &variance), &horizon);
+        let height_part = part(crate::AidSource::Height, ObservedQuantity::Height(height), FusedAxes::All, &variance);
+        estimator.follow(&mut high, &height_part, &horizon);
         prop_assert!((high.height_offset - offset).abs() < 1e-5 && high.knows.height_offset);
         prop_assert!(high.resets.height == 1);
         let mut t = M21::identity();
@@ -142,20 +147,21 @@ proptest! {
         let field = r.inverse() * estimator.expected(&memory).field.map(f64::from);
         let q = (r.into_inner() * Quaternion::from(entry.attitude.coords.map(f64::from))).coords.map(|x| x as f32);
         let target = match which {
-            0 => Target::Field(old.tr_mul(&field.map(|x| x as f32))),
-            1 => Target::Attitude(Quaternion::from(q)),
-            _ => Target::Heading(horizon.heading() + by as f32),
+            0 => ObservedQuantity::Field(old.tr_mul(&field.map(|x| x as f32))),
+            1 => ObservedQuantity::Attitude(Quaternion::from(q)),
+            _ => ObservedQuantity::Heading(horizon.heading() + by as f32),
         };
-        let part = part(crate::Aid::Heading, target, Axes::All, &V3::repeat(sigma * sigma));
+        let part = part(crate::AidSource::Heading, target, FusedAxes::All, &V3::repeat(sigma * sigma));
         estimator.follow(&mut memory, &part, &horizon);
         let r = r.to_rotation_matrix().into_inner();
         let turned = r.map(|x| x as f32) * old;
         prop_assert!((memory.nominal.rotation - turned).norm() < 1e-4 && (memory.rotation - turned).norm() < 1e-4);
         let now = memory.history.newest().unwrap();
-        let along = crate::rotation::twist(&now.attitude, &entry.attitude);
+        let along = crate::rotation::yaw_between(&now.attitude, &entry.attitude);
         prop_assert!((f64::from(along) - by).abs() < 1e-4 && memory.knows.heading && memory.resets.heading == 1);
         // After the turn, the heading error follows from the other errors by the measurement's row.
-        let row = Horizon::new(&now, &now, 9.81).row(&part.target, Coordinate::Z, &estimator.expected(&memory));
+        let horizon = FusionHorizon::new(&now, &now, 9.81);
+        let row = horizon.row(&part.target, VectorComponent::Z, &estimator.expected(&memory));
         let mut row = -dense_row(&row.unwrap().1);
         row[2] = 0.0;
         let mut first = M21::identity();
@@ -173,7 +179,7 @@ proptest! {
         prop_assert!(difference(&ours, &theirs) < 1e-3, "{}", difference(&ours, &theirs));
         // The variance of the gyroscope bias grows about the vertical and hardly about other axes.
         let before = dense(&memory.covariance);
-        memory.doubt_turn();
+        memory.inflate_vertical_gyro_bias();
         let more = dense(&memory.covariance) - before;
         let body = memory.nominal.rotation.transpose().map(f64::from);
         let up = body * V3::z() * 0.02;
@@ -185,7 +191,7 @@ proptest! {
     #[test]
     fn a_doubted_tilt_is_less_sure(p in covariance()) {
         let mut memory = memory(&p, &V3::zeros());
-        memory.doubt_tilt();
+        memory.inflate_tilt();
         let mut theirs = p;
         for (i, sigma) in [(0, 0.2), (1, 0.2), (9, 0.02), (10, 0.02), (11, 0.02), (12, 0.2), (13, 0.2), (14, 0.2)] {
             theirs[(i, i)] += sigma * sigma;
@@ -282,13 +288,13 @@ fn aligned(
     gyro: &Vector3<f32>,
     teller: u8,
     settings: &Settings,
-) -> Option<Aligned> {
+) -> Option<AlignmentResult> {
     let body = |v: V3| truth.inverse_transform_vector(&v).map(|x| x as f32);
     let yaw = truth.euler_angles().2 as f32;
-    let mut align = Align::default();
+    let mut align = Alignment::default();
     for ms in 0..=100_u64 {
         let q = truth.into_inner();
-        align.hear(&match teller {
+        align.add_heading(&match teller {
             0 => Measurement::MagneticField { field: body(*field), sigma: 0.01 },
             1 => Measurement::Pose {
                 position_m: Vector3::zeros(),
@@ -371,7 +377,7 @@ fn a_start_in_the_air_is_as_told() {
     assert!(n.position == far && n.velocity.x == -49.0 && n.gyro_bias.y == 0.9 && n.accel_bias.z == -4.9, "{n:?}");
     assert_eq!(reference(&Vector3::new(0.0, 3.0, -4.0)), Some((5.0, -0.8)));
     assert_eq!(reference(&Vector3::zeros()), None);
-    assert_eq!(memory.covariance.slow.variance, Slows::zeros());
+    assert_eq!(memory.covariance.slow.variance, SlowErrors::zeros());
 }
 
 /// Each limit of the alignment, just within and just beyond.
@@ -380,7 +386,7 @@ fn an_alignment_has_limits() {
     let settings = Settings::DEFAULT;
     // Returns the refusal within the first second, `None` if the alignment succeeded.
     let runs = |change: &dyn Fn(u64, &mut ImuSample)| {
-        let mut align = Align::default();
+        let mut align = Alignment::default();
         for ms in 0..=1000_u64 {
             let mut sample = ImuSample {
                 at_us: 1_000_000 + 1000 * ms,
@@ -430,7 +436,7 @@ fn an_alignment_has_limits() {
 /// The variance of a mean is a sample's variance divided by their number.
 #[test]
 fn a_mean_is_as_good_as_its_samples() {
-    let mut align = Align::default();
+    let mut align = Alignment::default();
     let mut found = None;
     for ms in 0..=1000_u64 {
         let sign = if ms.is_multiple_of(2) { 1.0 } else { -1.0 };

@@ -3,15 +3,15 @@
 
 use super::memory;
 use super::{M21, V3, V21, covariance, dense, dense_row, difference, numbers, row, vector};
-use crate::aid::Aid;
-use crate::errors::Coordinate;
+use crate::aid::AidSource;
+use crate::errors::VectorComponent;
 use crate::estimate::{Resets, Validity};
 use crate::estimator::Estimator;
-use crate::horizon::{Expected, Horizon, Target};
+use crate::horizon::{ExpectedReadings, FusionHorizon, ObservedQuantity};
 use crate::measurement::{ImuSample, Measurement};
 use crate::memory::Memory;
 use crate::queue::parts;
-use crate::rest::Rest;
+use crate::rest::RestDetector;
 use crate::settings::Settings;
 use afbc_types::Stamped;
 use nalgebra::{Matrix3, Quaternion, Vector3};
@@ -43,7 +43,7 @@ fn offer(estimator: &Estimator, memory: &mut Memory, value: Measurement, at_us: 
 
 /// Stores the present state at a later time.
 fn later(memory: &mut Memory, at_us: u64) {
-    memory.remember(at_us);
+    memory.store_history(at_us);
 }
 
 fn place(position_m: Vector3<f32>) -> Measurement {
@@ -54,7 +54,7 @@ proptest! {
     /// `motion_variance` is the sum of both variances with their squared factors.
     #[test]
     fn a_motions_variance_is_that_of_place_and_speed(p in covariance(), row in row()) {
-        let (at, h) = (Coordinate::ALL.iter().position(|c| *c == row.coordinate).unwrap(), dense_row(&row));
+        let (at, h) = (VectorComponent::ALL.iter().position(|c| *c == row.coordinate).unwrap(), dense_row(&row));
         let theirs = h[6 + at] * h[6 + at] * p[(6 + at, 6 + at)] + h[3 + at] * h[3 + at] * p[(3 + at, 3 + at)];
         let ours = f64::from(super::blocks(&p).motion_variance(&row));
         prop_assert!((ours - theirs).abs() < 1e-5 * (theirs + 1e-9));
@@ -86,8 +86,9 @@ proptest! {
         let before = memory;
         let past = memory.history.newest().unwrap();
         let expected = V3::new(level * declination.cos(), -level * declination.sin(), -steep).map(|x| x as f32);
-        let horizon = Horizon::new(&past, &past, 9.81);
-        let of = horizon.row(&Target::Field(field), Coordinate::X, &Expected { height_offset: 0.0, field: expected });
+        let horizon = FusionHorizon::new(&past, &past, 9.81);
+        let expected = ExpectedReadings { height_offset: 0.0, field: expected };
+        let of = horizon.row(&ObservedQuantity::Field(field), VectorComponent::X, &expected);
         let h = dense_row(&of.unwrap().1);
         offer(&with(settings), &mut memory, Measurement::MagneticField { field, sigma: 0.01 }, NOW_US, NOW_US);
         prop_assert_eq!((memory.aids().heading.accepted, memory.dropped().disturbed), (1, 0));
@@ -179,12 +180,12 @@ fn what_is_rejected_for_long_is_believed() {
     type Told = fn(&Resets) -> u32;
     let start = memory(&usual(), &V3::zeros());
     let (here, speed) = (start.nominal.position, start.nominal.velocity);
-    let cases: [(Measurement, Told, Aid, Option<Aid>); 5] = [
-        (place(here + far), |r| r.position, Aid::TrackerPosition, Some(Aid::GnssPosition)),
-        (gnss(here + far, speed), |r| r.position, Aid::GnssPosition, Some(Aid::TrackerPosition)),
-        (gnss(here, speed + far), |r| r.velocity, Aid::GnssVelocity, Some(Aid::TrackerPosition)),
-        (heading(1.0), |r| r.heading, Aid::Heading, Some(Aid::TrackerAttitude)),
-        (height(&start, 10.0), |r| r.height, Aid::Height, None),
+    let cases: [(Measurement, Told, AidSource, Option<AidSource>); 5] = [
+        (place(here + far), |r| r.position, AidSource::TrackerPosition, Some(AidSource::GnssPosition)),
+        (gnss(here + far, speed), |r| r.position, AidSource::GnssPosition, Some(AidSource::TrackerPosition)),
+        (gnss(here, speed + far), |r| r.velocity, AidSource::GnssVelocity, Some(AidSource::TrackerPosition)),
+        (heading(1.0), |r| r.heading, AidSource::Heading, Some(AidSource::TrackerAttitude)),
+        (height(&start, 10.0), |r| r.height, AidSource::Height, None),
     ];
     for (value, told, aid, other) in cases {
         for (lasts_us, contradicted, believed) in
@@ -204,16 +205,16 @@ fn what_is_rejected_for_long_is_believed() {
             assert_eq!(memory.aids().of(aid).accepted, u32::from(believed), "{aid:?}, {lasts_us}");
             let n = &memory.nominal;
             match (aid, believed) {
-                (Aid::TrackerPosition | Aid::GnssPosition, _) => {
+                (AidSource::TrackerPosition | AidSource::GnssPosition, _) => {
                     let off = (n.position - here - if believed { far } else { Vector3::zeros() }).norm();
                     assert!(off < 1e-3, "{aid:?}: {off}");
                     // Only a tracker's jump raises the velocity variance, because no velocity was fused with it.
                     let doubted = memory.covariance.vv.m11 > 50.0;
-                    assert_eq!(doubted, believed && aid == Aid::TrackerPosition);
+                    assert_eq!(doubted, believed && aid == AidSource::TrackerPosition);
                 }
-                (Aid::GnssVelocity, true) => assert!((n.velocity - speed - far).norm() < 1e-3),
-                (Aid::Heading, true) => assert!((crate::rotation::euler(&n.attitude).z - 1.0).abs() < 1e-4),
-                (Aid::Height, true) => assert!((memory.height_offset - start.height_offset - 10.0).abs() < 1e-3),
+                (AidSource::GnssVelocity, true) => assert!((n.velocity - speed - far).norm() < 1e-3),
+                (AidSource::Heading, true) => assert!((crate::rotation::euler(&n.attitude).z - 1.0).abs() < 1e-4),
+                (AidSource::Height, true) => assert!((memory.height_offset - start.height_offset - 10.0).abs() < 1e-3),
                 _ => {}
             }
         }
@@ -237,7 +238,7 @@ fn what_is_rejected_for_long_is_believed() {
 fn the_first_measurement_sets_what_it_tells() {
     let estimator = with(Settings { declination_rad: 0.3, ..Settings::DEFAULT });
     let mut memory = memory(&usual(), &V3::zeros());
-    memory.knows = crate::memory::Known::default();
+    memory.knows = crate::memory::KnownStates::default();
     let here = Vector3::new(100.0, -50.0, 20.0);
     offer(&estimator, &mut memory, place(here), NOW_US, NOW_US);
     assert!((memory.nominal.position - here).norm() < 1e-4 && memory.knows.position);
@@ -283,7 +284,7 @@ fn late_and_early_ones_are_dropped() {
         memory.nominal.velocity = Vector3::zeros();
         memory.history.clear();
         for back in (0..=71).rev() {
-            memory.remember(NOW_US - back * 4000);
+            memory.store_history(NOW_US - back * 4000);
         }
         memory
     };
@@ -317,9 +318,9 @@ fn rest_is_a_measurement() {
     let slow = Vector3::new(0.02, -0.01, 0.03);
     let still = || {
         let mut memory = memory(&diagonal([1e-6, 1e-4, 1e-2, 1e-8, 1e-6, 1e-2]), &V3::zeros());
-        memory.rest = Rest::aligned(Vector3::zeros(), Vector3::z() * 9.81);
+        memory.rest = RestDetector::aligned(Vector3::zeros(), Vector3::z() * 9.81);
         memory.nominal.velocity = slow;
-        memory.remember(NOW_US);
+        memory.store_history(NOW_US);
         memory.aids.gnss_position.accept(NOW_US);
         memory
     };
@@ -338,7 +339,7 @@ fn rest_is_a_measurement() {
         for k in 0..3 {
             let mut memory = still();
             memory.nominal.velocity = Vector3::from_fn(|i, _| if i == k { -speed } else { 0.0 });
-            memory.remember(NOW_US);
+            memory.store_history(NOW_US);
             memory.still_us = 0;
             run(&mut memory);
             assert_eq!(memory.held_us.is_some(), held, "{k}, {speed}");
@@ -350,7 +351,7 @@ fn rest_is_a_measurement() {
         let mut memory = memory(&diagonal([1e-6, 625.0, 1e-2, 1e-8, 1e-6, 1e-2]), &V3::zeros());
         memory.nominal.velocity = Vector3::new(4.0, 0.0, 0.0);
         let now_us = 10_000_000;
-        memory.remember(now_us);
+        memory.store_history(now_us);
         memory.aids.tracker_position.accept(now_us - aided_us);
         for _ in 0..8 {
             estimator.fuse(&mut memory, now_us);
@@ -371,7 +372,7 @@ fn validity_has_limits() {
     let valid = |change: &dyn Fn(&mut Memory)| {
         let mut memory = memory(&usual(), &V3::zeros());
         let _ = memory.monitor.take(&sample, &s);
-        memory.remember(now_us);
+        memory.store_history(now_us);
         memory.still_us = now_us;
         memory.aids.gnss_position.accept(now_us);
         memory.aids.height.accept(now_us);
@@ -422,9 +423,9 @@ fn validity_has_limits() {
     for (since_us, is) in [(499_999, true), (500_000, false)] {
         let mut memory = memory(&usual(), &V3::zeros());
         let _ = memory.monitor.take(&sample, &s);
-        memory.rest = Rest::aligned(Vector3::zeros(), Vector3::z() * 9.81);
+        memory.rest = RestDetector::aligned(Vector3::zeros(), Vector3::z() * 9.81);
         (memory.held_us, memory.still_us) = (Some(now_us - since_us), now_us);
-        memory.remember(now_us);
+        memory.store_history(now_us);
         assert_eq!(estimator.step(&mut memory, now_us, None).at_rest, is);
     }
 }
@@ -494,23 +495,23 @@ fn each_part_has_its_variance() {
     assert!((position.variance - Vector3::new(4.0, 4.0, 9.0)).norm() < 1e-5);
     assert!((velocity.variance - Vector3::repeat(1e-6)).norm() < 1e-9);
     let aids = [position, height, velocity].map(|part| part.aid.unwrap());
-    assert_eq!(aids, [Aid::GnssPosition, Aid::GnssHeight, Aid::GnssVelocity]);
+    assert_eq!(aids, [AidSource::GnssPosition, AidSource::GnssHeight, AidSource::GnssVelocity]);
     assert!(position.is_slow() && height.is_slow() && !velocity.is_slow() && height.variance == position.variance);
     assert_eq!([position, height, velocity].map(|part| part.scalars()), [2, 1, 3]);
     for (target, more) in [
-        (Target::Position(zero), 0.5 * 0.04),
-        (Target::Height(0.0), 0.5 * 0.04),
-        (Target::Velocity(zero), 0.5),
-        (Target::Attitude(Quaternion::new(1.0, 0.0, 0.0, 0.0)), 0.3),
-        (Target::Heading(0.0), 0.3),
-        (Target::Field(Vector3::x()), 0.0),
+        (ObservedQuantity::Position(zero), 0.5 * 0.04),
+        (ObservedQuantity::Height(0.0), 0.5 * 0.04),
+        (ObservedQuantity::Velocity(zero), 0.5),
+        (ObservedQuantity::Attitude(Quaternion::new(1.0, 0.0, 0.0, 0.0)), 0.3),
+        (ObservedQuantity::Heading(0.0), 0.3),
+        (ObservedQuantity::Field(Vector3::x()), 0.0),
     ] {
-        let mut part = crate::queue::Part { target, ..position };
-        part.roughen((0.3, 0.5), 0.2);
+        let mut part = crate::queue::AidObservation { target, ..position };
+        part.inflate_variances((0.3, 0.5), 0.2);
         assert!((part.variance - position.variance - Vector3::repeat(more)).norm() < 1e-6, "{target:?}");
         assert_eq!(part.rough, 0.3);
-        part = crate::queue::Part { target, ..position };
-        part.roughen((0.0, 0.0), 0.2);
+        part = crate::queue::AidObservation { target, ..position };
+        part.inflate_variances((0.0, 0.0), 0.2);
         assert!(part.variance == position.variance && part.rough == 0.0);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::error::{Fault, FileError, Place, Source};
 use super::words::{self, nearest, one_of};
-use afbc_types::{Declaration, Declared, Range, ValueMut};
+use afbc_types::{Declaration, Declared, DeclaredValueMut, Range};
 use nalgebra::Vector3;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -87,19 +87,25 @@ impl<'a> Table<'a> {
             // Must precede reading the value, since an error names the unit.
             self.units.push((range.name, unit));
             match value {
-                ValueMut::Single([number]) => self.number(range)?.into_iter().for_each(|read| *number = read as f32),
-                ValueMut::Double([number]) => self.number(range)?.into_iter().for_each(|read| *number = read),
-                ValueMut::Whole(number) => self.whole(range)?.into_iter().for_each(|read| *number = read as u32),
-                ValueMut::Switch(switch) => self.boolean(range.name)?.into_iter().for_each(|read| *switch = read),
-                ValueMut::Choice(index, words) => {
+                DeclaredValueMut::Single([number]) => {
+                    self.number(range)?.into_iter().for_each(|read| *number = read as f32)
+                }
+                DeclaredValueMut::Double([number]) => self.number(range)?.into_iter().for_each(|read| *number = read),
+                DeclaredValueMut::Whole(number) => {
+                    self.whole(range)?.into_iter().for_each(|read| *number = read as u32)
+                }
+                DeclaredValueMut::Switch(switch) => {
+                    self.boolean(range.name)?.into_iter().for_each(|read| *switch = read)
+                }
+                DeclaredValueMut::Choice(index, words) => {
                     let read = self.choice(range.name, words, |word| word)?;
                     *index = words.iter().position(|word| Some(*word) == read).unwrap_or(*index);
                 }
-                ValueMut::Single(numbers) => {
+                DeclaredValueMut::Single(numbers) => {
                     let read = self.vector(range.name, [range; 3])?;
                     numbers.iter_mut().zip(read.iter().flatten()).for_each(|(number, read)| *number = *read as f32);
                 }
-                ValueMut::Double(numbers) => {
+                DeclaredValueMut::Double(numbers) => {
                     let read = self.vector(range.name, [range; 3])?;
                     numbers.iter_mut().zip(read.iter().flatten()).for_each(|(number, read)| *number = *read);
                 }

@@ -1,6 +1,6 @@
 //! Units, numbers and suggestions in messages.
 
-use afbc_types::{OutOfRange, Value};
+use afbc_types::{DeclaredValue, OutOfRange};
 
 /// Smallest similarity of two words (Jaro-Winkler) for a suggestion "did you mean".
 const LIKENESS: f64 = 0.8;
@@ -49,15 +49,15 @@ pub fn number(value: f64) -> String {
 }
 
 /// Formats a declared value as in a file, exactly.
-pub fn value(value: &Value<'_>) -> String {
+pub fn value(value: &DeclaredValue<'_>) -> String {
     match *value {
-        Value::Single([number]) => format!("{number:?}"),
-        Value::Double([number]) => format!("{number:?}"),
-        Value::Single(numbers) => format!("{numbers:?}"),
-        Value::Double(numbers) => format!("{numbers:?}"),
-        Value::Whole(number) => number.to_string(),
-        Value::Switch(on) => on.to_string(),
-        Value::Choice(index, words) => format!("{:?}", words.get(index).unwrap_or(&"")),
+        DeclaredValue::Single([number]) => format!("{number:?}"),
+        DeclaredValue::Double([number]) => format!("{number:?}"),
+        DeclaredValue::Single(numbers) => format!("{numbers:?}"),
+        DeclaredValue::Double(numbers) => format!("{numbers:?}"),
+        DeclaredValue::Whole(number) => number.to_string(),
+        DeclaredValue::Switch(on) => on.to_string(),
+        DeclaredValue::Choice(index, words) => format!("{:?}", words.get(index).unwrap_or(&"")),
     }
 }
 

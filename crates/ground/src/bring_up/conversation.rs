@@ -5,7 +5,7 @@ use super::heard::Heard;
 use crate::client::Client;
 use crate::commands::CommandState;
 use crate::repeated::Patience;
-use afbc_mavlink::{Answer, Command, Decoder, InertialSample, ReceivedFrame};
+use afbc_mavlink::{CommandResult, Decoder, InertialSample, ReceivedFrame, VehicleCommand};
 
 /// Carries bytes to the board and back.
 ///
@@ -84,7 +84,7 @@ impl<'a> Conversation<'a> {
     }
 
     /// Sends a command; returns the answer and the time since the last try \[ms\], or `None` without an answer.
-    pub(crate) fn command(&mut self, command: Command) -> Result<Option<(Answer, u64)>, Error> {
+    pub(crate) fn command(&mut self, command: VehicleCommand) -> Result<Option<(CommandResult, u64)>, Error> {
         self.client.command(command, Patience::REPEATED);
         loop {
             match self.client.state(command) {

@@ -1,6 +1,6 @@
 //! Messages in which the vehicle reported its sensors and its clock.
 
-use afbc_mavlink::telemetry::{ActuatorOutputs, BatteryStatus, Fix, SystemStatus, Version};
+use afbc_mavlink::telemetry::{ActuatorOutputs, BatteryStatus, GpsRawInt, SystemStatus, Version};
 use afbc_mavlink::{Downlink, HealthArray, InertialSample, Telemetry};
 use nalgebra::Vector3;
 
@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 pub(crate) struct Heard {
     pub(crate) health: Option<HealthArray>,
     pub(crate) system: Option<SystemStatus>,
-    pub(crate) fix: Option<Fix>,
+    pub(crate) fix: Option<GpsRawInt>,
     pub(crate) battery: Option<BatteryStatus>,
     pub(crate) version: Option<Version>,
     pub(crate) outputs: Option<ActuatorOutputs>,
@@ -39,11 +39,11 @@ impl Heard {
             }
             Downlink::Telemetry(telemetry) => match telemetry {
                 Telemetry::System(status) => self.system = Some(status),
-                Telemetry::Fix(fix) => self.fix = Some(fix),
+                Telemetry::GpsRawInt(fix) => self.fix = Some(fix),
                 Telemetry::Battery(battery) => self.battery = Some(battery),
                 Telemetry::Version(version) => self.version = Some(version),
                 Telemetry::Outputs(outputs) => self.outputs = Some(outputs),
-                Telemetry::Summary(summary) => self.altitudes_m.push(summary.altitude_m),
+                Telemetry::VfrHud(summary) => self.altitudes_m.push(summary.altitude_m),
                 _ => (),
             },
             _ => (),

@@ -5,7 +5,7 @@ use super::error::Error;
 use super::log::BringUpStep;
 use super::statistics::VectorStatistics;
 use crate::commands::PING;
-use afbc_mavlink::{Answer, Command, InertialSample};
+use afbc_mavlink::{CommandResult, InertialSample, VehicleCommand};
 use nalgebra::Vector3;
 
 /// MAVLink message that the bring-up requests.
@@ -41,7 +41,7 @@ const SELF_TEST_MS: u64 = 3_000;
 /// Reads the version of the firmware.
 pub(crate) fn version(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
     let mut step = BringUpStep::new("version");
-    talk.command(Command::RequestMessage { message: 148, index: 0 })?;
+    talk.command(VehicleCommand::RequestMessage { message: 148, index: 0 })?;
     talk.wait(1_000, |talk| talk.heard.version.is_some())?;
     match talk.heard.version {
         Some(version) => {
@@ -103,10 +103,10 @@ pub(crate) fn self_tests(talk: &mut Conversation<'_>) -> Result<BringUpStep, Err
     let results = |talk: &Conversation<'_>| -> Vec<String> {
         talk.texts_after(told).filter(|text| text.contains(SELF_TEST)).map(str::to_owned).collect()
     };
-    let answer = talk.command(Command::SelfTest)?;
+    let answer = talk.command(VehicleCommand::SelfTest)?;
     match answer {
-        Some((Answer::Accepted, _)) => (),
-        Some((Answer::Unsupported, _)) => return Ok(step.skipped("this vehicle has none")),
+        Some((CommandResult::Accepted, _)) => (),
+        Some((CommandResult::Unsupported, _)) => return Ok(step.skipped("this vehicle has none")),
         Some((answer, _)) => return Ok(step.skipped(format_args!("refused: {answer:?}"))),
         None => {
             step.check(false, "no answer");
@@ -182,7 +182,7 @@ pub(crate) fn senses(talk: &Conversation<'_>) -> bool {
 /// Starts or stops the inertial samples.
 pub(crate) fn show_samples(talk: &mut Conversation<'_>, shows: bool) -> Result<(), Error> {
     let interval_us = if shows { SAMPLE_US } else { 0 };
-    talk.command(Command::SetInterval { message: HIGHRES_IMU, interval_us })?;
+    talk.command(VehicleCommand::SetInterval { message: HIGHRES_IMU, interval_us })?;
     Ok(())
 }
 
@@ -344,7 +344,7 @@ pub(crate) fn motors(talk: &Conversation<'_>) -> BringUpStep {
 pub(crate) fn arming(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
     let mut step = BringUpStep::new("checks before arming");
     let told = talk.client.vehicle().texts.len();
-    let answer = talk.command(Command::CheckArming)?;
+    let answer = talk.command(VehicleCommand::CheckArming)?;
     talk.listen(1_500)?;
     step.check(answer.is_some(), "not answered");
     for text in talk.texts_after(told) {

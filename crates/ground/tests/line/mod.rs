@@ -2,8 +2,8 @@
 
 use afbc_ground::Client;
 use afbc_mavlink::{
-    Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Mission, MissionItem, MissionResult, ParameterError,
-    ParameterRequest, ParameterValue, Plan, Sender, Uplink,
+    Address, CommandResult, Decoder, Downlink, Encoder, FRAME_MAX, MissionItem, MissionMessage, MissionResult,
+    MissionType, ParameterError, ParameterRequest, ParameterValue, Uplink, VehicleCommand,
 };
 
 pub(crate) const VEHICLE: Address = Address { system: 1, component: 1 };
@@ -15,15 +15,15 @@ const STEP_MS: usize = 5;
 
 /// Test vehicle that answers commands, plans and parameters as the protocols say.
 pub(crate) struct Vehicle {
-    sender: Sender,
+    sender: Encoder,
     decoder: Decoder<Uplink>,
-    pub(crate) commands: Vec<Command>,
+    pub(crate) commands: Vec<VehicleCommand>,
     parameters: Vec<ParameterValue>,
     plans: [Vec<MissionItem>; 3],
     /// Upload in progress: plan, number of items, items received, and time of the last request \[ms\].
-    upload: Option<(Plan, usize, Vec<MissionItem>, u64)>,
+    upload: Option<(MissionType, usize, Vec<MissionItem>, u64)>,
     /// Plan of the last finished upload, and the number of its last item.
-    done: Option<(Plan, u16)>,
+    done: Option<(MissionType, u16)>,
 }
 
 impl Vehicle {
@@ -38,10 +38,10 @@ impl Vehicle {
             value: f32::from(place).to_le_bytes(),
             kind: 9,
             count: 25,
-            place,
+            index: place,
         };
         Vehicle {
-            sender: Sender::new(VEHICLE),
+            sender: Encoder::new(VEHICLE),
             decoder: Decoder::new(VEHICLE),
             commands: Vec::new(),
             parameters: (0..25).map(value).collect(),
@@ -55,7 +55,7 @@ impl Vehicle {
         self.parameters.clone()
     }
 
-    pub(crate) fn plan(&self, plan: Plan) -> &[MissionItem] {
+    pub(crate) fn plan(&self, plan: MissionType) -> &[MissionItem] {
         &self.plans[usize::from(plan.0)]
     }
 
@@ -70,7 +70,7 @@ impl Vehicle {
         match message {
             Uplink::Command(command) => {
                 self.commands.push(command);
-                vec![Downlink::Answer { command: command.id(), answer: Answer::Accepted, to }]
+                vec![Downlink::CommandAck { command: command.id(), answer: CommandResult::Accepted, to }]
             }
             Uplink::Mission(message) => self
                 .plan_message(message, now_ms)
@@ -80,12 +80,12 @@ impl Vehicle {
             Uplink::Parameter(ParameterRequest::List) => {
                 self.parameters.iter().copied().map(Downlink::Parameter).collect()
             }
-            Uplink::Parameter(ParameterRequest::ReadPlace(place)) => {
+            Uplink::Parameter(ParameterRequest::ReadIndex(place)) => {
                 vec![Downlink::Parameter(self.parameters[usize::from(place)])]
             }
             Uplink::Parameter(ParameterRequest::Set { name, value, .. }) => {
                 let Some(known) = self.parameters.iter_mut().find(|known| known.name == name) else {
-                    let error = ParameterError { name, place: -1, error: ParameterError::DOES_NOT_EXIST };
+                    let error = ParameterError { name, index: -1, error: ParameterError::DOES_NOT_EXIST };
                     return vec![Downlink::ParameterError { error, to }];
                 };
                 known.value = value;
@@ -95,22 +95,22 @@ impl Vehicle {
         }
     }
 
-    fn plan_message(&mut self, message: Mission, now_ms: u64) -> Option<Mission> {
+    fn plan_message(&mut self, message: MissionMessage, now_ms: u64) -> Option<MissionMessage> {
         match message {
-            Mission::Count(0, plan) => {
+            MissionMessage::Count(0, plan) => {
                 self.plans[usize::from(plan.0)].clear();
-                Some(Mission::Ack(MissionResult::ACCEPTED, plan))
+                Some(MissionMessage::Ack(MissionResult::ACCEPTED, plan))
             }
-            Mission::Count(count, plan) => {
+            MissionMessage::Count(count, plan) => {
                 self.upload = Some((plan, count.into(), Vec::new(), now_ms));
                 self.done = None;
-                Some(Mission::Request(0, plan))
+                Some(MissionMessage::Request(0, plan))
             }
-            Mission::Item(item, plan) => {
+            MissionMessage::Item(item, plan) => {
                 let Some((_, count, held, asked_ms)) = self.upload.as_mut().filter(|(of, ..)| *of == plan) else {
                     // The acknowledgement of the last item was lost: send it again.
                     let is_done = self.done == Some((plan, item.number));
-                    return is_done.then_some(Mission::Ack(MissionResult::ACCEPTED, plan));
+                    return is_done.then_some(MissionMessage::Ack(MissionResult::ACCEPTED, plan));
                 };
                 if usize::from(item.number) != held.len() {
                     return None;
@@ -118,11 +118,11 @@ impl Vehicle {
                 held.push(item);
                 if held.len() < *count {
                     *asked_ms = now_ms;
-                    return Some(Mission::Request(held.len() as u16, plan));
+                    return Some(MissionMessage::Request(held.len() as u16, plan));
                 }
                 self.plans[usize::from(plan.0)] = std::mem::take(held);
                 (self.upload, self.done) = (None, Some((plan, item.number)));
-                Some(Mission::Ack(MissionResult::ACCEPTED, plan))
+                Some(MissionMessage::Ack(MissionResult::ACCEPTED, plan))
             }
             _ => None,
         }
@@ -132,7 +132,7 @@ impl Vehicle {
     fn turn(&mut self, now_ms: u64) -> Option<Downlink> {
         let (plan, _, held, asked_ms) = self.upload.as_mut().filter(|(.., asked_ms)| now_ms > *asked_ms + AGAIN_MS)?;
         *asked_ms = now_ms;
-        let message = Mission::Request(held.len() as u16, *plan);
+        let message = MissionMessage::Request(held.len() as u16, *plan);
         Some(Downlink::Mission { message, to: Client::STATION })
     }
 }
@@ -141,7 +141,7 @@ impl Vehicle {
 pub(crate) struct Line {
     pub(crate) client: Client,
     pub(crate) vehicle: Vehicle,
-    strangers: [Sender; 2],
+    strangers: [Encoder; 2],
     /// Share of frames that are lost, and share that come twice \[%\]; longest delay \[ms\].
     faults: [u64; 3],
     random: u64,
@@ -158,7 +158,7 @@ impl Line {
         Line {
             client,
             vehicle: Vehicle::new(),
-            strangers: [Sender::new(OTHER_VEHICLE), Sender::new(COMPANION)],
+            strangers: [Encoder::new(OTHER_VEHICLE), Encoder::new(COMPANION)],
             faults,
             random: seed | 1,
             now_ms: 0,
@@ -205,12 +205,12 @@ impl Line {
 
     /// Adds frames of others: answers by another vehicle to this station, and answers to another station.
     fn disturb(&mut self) {
-        let plan = Plan((self.next() % 3) as u8);
+        let plan = MissionType((self.next() % 3) as u8);
         let refused = |to| {
-            let command = Command::Arm.id();
-            let ack = Downlink::Mission { message: Mission::Ack(MissionResult::ERROR, plan), to };
-            let request = Downlink::Mission { message: Mission::Request(0, plan), to };
-            [Downlink::Answer { command, answer: Answer::Denied, to }, ack, request]
+            let command = VehicleCommand::Arm.id();
+            let ack = Downlink::Mission { message: MissionMessage::Ack(MissionResult::ERROR, plan), to };
+            let request = Downlink::Mission { message: MissionMessage::Request(0, plan), to };
+            [Downlink::CommandAck { command, answer: CommandResult::Denied, to }, ack, request]
         };
         for message in refused(Client::STATION) {
             let frame = self.strangers[0].send(&message, &mut [0; FRAME_MAX]).to_vec();

@@ -4,7 +4,7 @@
 extern crate std;
 use super::*;
 use crate::limiter::{Limiter, LimiterTarget};
-use crate::settings::Limits;
+use crate::settings::MotionLimits;
 use afbc_types::State;
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -16,15 +16,15 @@ fn place() -> impl Strategy<Value = Vector2<f32>> {
     (-20.0_f32..20.0, -20.0_f32..20.0).prop_map(|(x, y)| Vector2::new(x, y))
 }
 
-fn limits() -> impl Strategy<Value = Limits> {
+fn limits() -> impl Strategy<Value = MotionLimits> {
     (1.0_f32..15.0, 1.0_f32..8.0, 4.0_f32..40.0, 1.0_f32..2.0).prop_map(|(speed_m_s, acceleration_m_s2, jerk, more)| {
-        Limits {
+        MotionLimits {
             speed_m_s,
             acceleration_m_s2,
             acceleration_max_m_s2: acceleration_m_s2 * more,
             jerk_m_s3: jerk,
             jerk_max_m_s3: jerk * more * 3.0,
-            ..Limits::DEFAULT
+            ..MotionLimits::DEFAULT
         }
     })
 }
@@ -182,7 +182,7 @@ fn what_is_no_area_is_refused() {
 #[test]
 fn only_what_leads_to_the_boundary_counts() {
     let (a, b) = (Vector2::new(-50.0, 0.0), Vector2::new(50.0, 0.0));
-    let braking = Limits::DEFAULT.braking();
+    let braking = MotionLimits::DEFAULT.braking();
     let nears = |y: f32, velocity: [f32; 2]| {
         let path = StopPath::of_vehicle(&braking, Vector2::new(0.0, y), velocity.into(), Vector2::zeros());
         path.nears_edge(a, b)

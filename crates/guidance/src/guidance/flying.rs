@@ -1,16 +1,16 @@
 //! Flies the mode: passes its output through the limiter and returns a setpoint.
 
-use super::{GuidanceInputs, Memory, Plan};
+use super::{GuidanceInputs, Memory, ModeMemory};
+use crate::available_thrust::{AccelerationTrim, AvailableThrust};
 use crate::course::{Hold, Land, Return, Takeoff};
-use crate::lift::{Lift, Trim};
 use crate::mode::FlightMode;
 use crate::mode_io::{ModeInputs, ModeOutput, Shaping};
-use crate::notice::{ModeReason, Notice, Notices};
+use crate::notice::{GuidanceNotice, GuidanceNotices, ModeReason};
+use crate::offboard::OffboardMemory;
 use crate::order::{Item, OffboardTarget, Orders, Sticks};
 use crate::place::is_within;
 use crate::settings::Settings;
 use crate::sticks;
-use crate::targets::Targets;
 use afbc_control::math::{abs_max, max};
 use afbc_flight_core::landing::LEFT_M;
 use afbc_flight_core::{Mode, Stamped};
@@ -52,7 +52,7 @@ impl Memory {
         target: Option<&Stamped<OffboardTarget>>,
         sticks: Option<&Sticks>,
         reached: &mut Option<u16>,
-        notices: &mut Notices,
+        notices: &mut GuidanceNotices,
     ) -> Option<(Option<Setpoint>, bool)> {
         let armed = given.core.armed();
         let airborne = armed && given.airborne;
@@ -61,7 +61,7 @@ impl Memory {
             self.limiter.rest(state);
             (self.enters, self.was_seen) = (false, true);
             (self.left, self.stood_m) = (false, state.position_m);
-            self.plan = Plan::New;
+            self.mode_memory = ModeMemory::New;
             return Some((self.limiter.setpoint(), false));
         }
         if given.core == Mode::Descending {
@@ -80,9 +80,9 @@ impl Memory {
             airborne,
             home_m,
             speed_m_s: self.speed_m_s,
-            ceiling_m: home_m.z + settings.net.ceiling_m(),
+            ceiling_m: home_m.z + settings.failsafe.ceiling_m(),
         };
-        let output = self.output(settings, &inputs, orders, target, sticks, &given.lift, reached, notices);
+        let output = self.output(settings, &inputs, orders, target, sticks, &given.available_thrust, reached, notices);
         if output.done {
             self.hold_what_is_reached(&output.shaping, notices);
         }
@@ -108,18 +108,18 @@ impl Memory {
             // priority over low thrust, and would push the vehicle about.
             return Some((Some(present), true));
         }
-        Some((self.shaped(output.shaping, settings, &inputs, &given.lift), false))
+        Some((self.shaped(output.shaping, settings, &inputs, &given.available_thrust), false))
     }
 
     /// Changes to hold at the place that the mode has reached.
-    fn hold_what_is_reached(&mut self, shaping: &Shaping, notices: &mut Notices) {
-        let at_m = match (&self.plan, shaping) {
-            (Plan::Takeoff(takeoff), _) => Some(takeoff.to_m),
+    fn hold_what_is_reached(&mut self, shaping: &Shaping, notices: &mut GuidanceNotices) {
+        let at_m = match (&self.mode_memory, shaping) {
+            (ModeMemory::Takeoff(takeoff), _) => Some(takeoff.to_m),
             (_, Shaping::Limited(aim)) if is_finite(&aim.position_m) => Some(aim.position_m),
             _ => None,
         };
         self.change(FlightMode::Hold, ModeReason::Done, notices);
-        (self.plan, self.enters) = (Plan::Hold(Hold { at_m, ..Hold::default() }), false);
+        (self.mode_memory, self.enters) = (ModeMemory::Hold(Hold { at_m, ..Hold::default() }), false);
     }
 
     /// True once a take-off has not left the ground for [`NO_LIFT_S`]. Rotors that carry part of the weight make the
@@ -129,8 +129,8 @@ impl Memory {
         let off_m = abs_max(&(state.position_m - self.stood_m));
         let behind = |to: Setpoint| abs_max(&(to.position_m - state.position_m)) > ANEW_M;
         self.left |= airborne && off_m > LEFT_M;
-        let lifts =
-            !self.left && (!airborne || given.lift.is_exhausted() || self.limiter.setpoint().is_some_and(behind));
+        let lifts = !self.left
+            && (!airborne || given.available_thrust.is_exhausted() || self.limiter.setpoint().is_some_and(behind));
         self.lift_s = if lifts { self.lift_s + dt_s } else { 0.0 };
         let gives_up = self.lift_s > NO_LIFT_S;
         // Give up only once: the mode that follows shall not be given up as well.
@@ -146,22 +146,22 @@ impl Memory {
         shaping: Shaping,
         settings: &Settings,
         inputs: &ModeInputs<'_>,
-        lift: &Lift,
+        lift: &AvailableThrust,
     ) -> Option<Setpoint> {
         let ModeInputs { state, dt_s, .. } = *inputs;
         match shaping {
             Shaping::Limited(aim) => {
-                (self.aim, self.trim) = (aim, Trim::default());
-                self.limiter.advance(&self.aim, dt_s);
+                (self.last_target, self.trim) = (aim, AccelerationTrim::default());
+                self.limiter.advance(&self.last_target, dt_s);
                 // Only the position can become implausible: the limiter bounds the rest.
                 self.limiter.setpoint().filter(|setpoint| abs_max(&setpoint.position_m) <= 1e5)
             }
             Shaping::Leaning(aim, [x, y]) => {
-                self.aim = aim;
+                self.last_target = aim;
                 self.limiter.advance(&aim, dt_s);
                 self.limiter.follow(state);
                 // The limiter's feedback holds the height, so the thrust is not trimmed.
-                let lift = &Lift { given_m_s2: None, ..*lift };
+                let lift = &AvailableThrust { given_m_s2: None, ..*lift };
                 let leaning = self.limiter.setpoint().map(|setpoint| Setpoint {
                     position_m: Vector3::new(state.position_m.x, state.position_m.y, setpoint.position_m.z),
                     velocity_m_s: Vector3::new(state.velocity_m_s.x, state.velocity_m_s.y, setpoint.velocity_m_s.z),
@@ -174,14 +174,14 @@ impl Memory {
                 self.limiter.anchor(state);
                 // If the state is lost, or the next mode has no target yet, the vehicle's present motion ends in a
                 // stop.
-                self.aim = inputs.stop();
+                self.last_target = inputs.stop();
                 let setpoint = lift.limited(&setpoint, state, &settings.limits);
                 let setpoint = self.trim.advance(lift, state, &setpoint, dt_s);
                 Some(setpoint).filter(Setpoint::is_plausible)
             }
             Shaping::Turning(target) => {
                 self.limiter.anchor(state);
-                (self.aim, self.rates) = (inputs.stop(), Some(target));
+                (self.last_target, self.rates) = (inputs.stop(), Some(target));
                 // The law flies this setpoint in the first 100 ms after a loss of the state, before the flight core
                 // counts the vehicle as flying again.
                 Some(Setpoint::hold(state))
@@ -229,58 +229,58 @@ impl Memory {
         orders: &Orders,
         target: Option<&Stamped<OffboardTarget>>,
         sticks: Option<&Sticks>,
-        lift: &Lift,
+        lift: &AvailableThrust,
         reached: &mut Option<u16>,
-        notices: &mut Notices,
+        notices: &mut GuidanceNotices,
     ) -> ModeOutput {
         match self.mode {
             FlightMode::Hold => {
-                if !matches!(self.plan, Plan::Hold(_) | Plan::Orbit(_)) || !inputs.airborne {
-                    self.plan = Plan::Hold(Hold::default());
+                if !matches!(self.mode_memory, ModeMemory::Hold(_) | ModeMemory::Orbit(_)) || !inputs.airborne {
+                    self.mode_memory = ModeMemory::Hold(Hold::default());
                 }
-                match &mut self.plan {
-                    Plan::Hold(hold) => ModeOutput::fly(hold.fly(inputs)),
-                    Plan::Orbit(orbit) => orbit.fly(inputs),
+                match &mut self.mode_memory {
+                    ModeMemory::Hold(hold) => ModeOutput::fly(hold.fly(inputs)),
+                    ModeMemory::Orbit(orbit) => orbit.fly(inputs),
                     // Unreachable: `plan` was just set for this mode. The same in the other modes.
                     _ => ModeOutput::fly(inputs.stop()),
                 }
             }
             FlightMode::Takeoff => {
-                if !matches!(self.plan, Plan::Takeoff(_)) {
-                    self.plan = Plan::Takeoff(Takeoff::new(inputs, inputs.flying.takeoff_height_m));
+                if !matches!(self.mode_memory, ModeMemory::Takeoff(_)) {
+                    self.mode_memory = ModeMemory::Takeoff(Takeoff::new(inputs, inputs.flying.takeoff_height_m));
                 }
-                match &self.plan {
-                    Plan::Takeoff(takeoff) => takeoff.fly(inputs),
+                match &self.mode_memory {
+                    ModeMemory::Takeoff(takeoff) => takeoff.fly(inputs),
                     _ => ModeOutput::fly(inputs.stop()),
                 }
             }
             FlightMode::Land => {
-                if !matches!(self.plan, Plan::Land(_)) {
-                    self.plan = Plan::Land(Land::default());
+                if !matches!(self.mode_memory, ModeMemory::Land(_)) {
+                    self.mode_memory = ModeMemory::Land(Land::default());
                 }
-                match &mut self.plan {
-                    Plan::Land(land) => land.fly(inputs),
+                match &mut self.mode_memory {
+                    ModeMemory::Land(land) => land.fly(inputs),
                     _ => ModeOutput::fly(inputs.stop()),
                 }
             }
             FlightMode::Return => {
-                if !matches!(self.plan, Plan::Return(_)) {
+                if !matches!(self.mode_memory, ModeMemory::Return(_)) {
                     let plausible = |to_m: &Vector2<f32>| to_m.iter().all(|value| is_within(*value));
                     let to_m = orders.safe_m.filter(plausible).unwrap_or(inputs.home_m.xy());
-                    self.plan = Plan::Return(Return::new(inputs, to_m));
+                    self.mode_memory = ModeMemory::Return(Return::new(inputs, to_m));
                 }
-                match &mut self.plan {
-                    Plan::Return(home) => home.fly(inputs),
+                match &mut self.mode_memory {
+                    ModeMemory::Return(home) => home.fly(inputs),
                     _ => ModeOutput::fly(inputs.stop()),
                 }
             }
             FlightMode::Mission => self.fly_mission(settings, inputs, orders, reached, notices),
             FlightMode::Offboard => {
-                if !matches!(self.plan, Plan::Targets(_)) {
-                    self.plan = Plan::Targets(Targets::default());
+                if !matches!(self.mode_memory, ModeMemory::Targets(_)) {
+                    self.mode_memory = ModeMemory::Targets(OffboardMemory::default());
                 }
-                match (&mut self.plan, target) {
-                    (Plan::Targets(targets), Some(target)) => targets.fly(target, inputs, lift),
+                match (&mut self.mode_memory, target) {
+                    (ModeMemory::Targets(targets), Some(target)) => targets.fly(target, inputs, lift),
                     _ => ModeOutput::fly(inputs.stop()),
                 }
             }
@@ -297,16 +297,16 @@ impl Memory {
         inputs: &ModeInputs<'_>,
         orders: &Orders,
         reached: &mut Option<u16>,
-        notices: &mut Notices,
+        notices: &mut GuidanceNotices,
     ) -> ModeOutput {
         if orders.leg.is_none_or(|leg| matches!(leg.item, Item::None)) {
             self.change(FlightMode::Hold, ModeReason::Cleared, notices);
             return ModeOutput::fly(inputs.stop());
         }
-        let progress = self.mission.fly(orders.leg.as_ref(), inputs, &settings.net);
+        let progress = self.mission.fly(orders.leg.as_ref(), inputs, &settings.failsafe);
         *reached = progress.reached;
         if progress.refused {
-            notices.push(Notice::ItemRefused);
+            notices.push(GuidanceNotice::ItemRefused);
             return ModeOutput { done: true, ..ModeOutput::fly(inputs.stop()) };
         }
         if let Some((mode, number)) = progress.then {

@@ -1,10 +1,10 @@
 //! Carries out orders or refuses them.
 
-use super::{Memory, Plan};
+use super::{Memory, ModeMemory};
 use crate::course::{Hold, Takeoff};
 use crate::mode::FlightMode;
-use crate::notice::{ModeReason, Notices};
-use crate::orbit::{self, Orbit, Round};
+use crate::notice::{GuidanceNotices, ModeReason};
+use crate::orbit::{self, Orbit, OrbitProgress};
 use crate::order::{Order, OrderRefusal};
 use crate::place::{is_place, is_within};
 use crate::settings::Settings;
@@ -21,7 +21,7 @@ impl Memory {
         order: &Order,
         state: Option<&State>,
         seen: &TransitionInputs,
-        notices: &mut Notices,
+        notices: &mut GuidanceNotices,
     ) -> Result<(), OrderRefusal> {
         match *order {
             Order::Select(mode) => self.select(settings, mode, state, seen, notices),
@@ -32,7 +32,8 @@ impl Memory {
             }
             Order::Orbit { centre_m, radius_m, speed_m_s, angle_deg, heading } => {
                 let angle_rad = if angle_deg == 0 { f32::INFINITY } else { f32::from(angle_deg).to_radians() };
-                let wanted = Orbit { centre_m, radius_m, speed_m_s, heading, angle_rad, round: Round::default() };
+                let wanted =
+                    Orbit { centre_m, radius_m, speed_m_s, heading, angle_rad, round: OrbitProgress::default() };
                 self.orbit(settings, wanted, seen, notices)
             }
             Order::Speed(speed_m_s) => {
@@ -69,7 +70,7 @@ impl Memory {
         mode: FlightMode,
         state: Option<&State>,
         seen: &TransitionInputs,
-        notices: &mut Notices,
+        notices: &mut GuidanceNotices,
     ) -> Result<(), OrderRefusal> {
         table::select(mode, seen)?;
         let height_m = Vector3::new(0.0, 0.0, settings.flying.takeoff_height_m);
@@ -94,7 +95,7 @@ impl Memory {
         height_m: Option<f32>,
         state: Option<&State>,
         seen: &TransitionInputs,
-        notices: &mut Notices,
+        notices: &mut GuidanceNotices,
     ) -> Result<(), OrderRefusal> {
         let height_m = height_m.unwrap_or(settings.flying.takeoff_height_m);
         if !(height_m > 0.0 && height_m <= 1000.0) {
@@ -108,7 +109,7 @@ impl Memory {
         self.must_be_inside(settings, &(state.position_m + Vector3::new(0.0, 0.0, height_m)))?;
         self.ordered(FlightMode::Takeoff, notices);
         self.limiter.rest(state);
-        self.plan = Plan::Takeoff(Takeoff::above(state.position_m, height_m));
+        self.mode_memory = ModeMemory::Takeoff(Takeoff::above(state.position_m, height_m));
         Ok(())
     }
 
@@ -119,7 +120,7 @@ impl Memory {
         position_m: &Vector3<f32>,
         to: Hold,
         seen: &TransitionInputs,
-        notices: &mut Notices,
+        notices: &mut GuidanceNotices,
     ) -> Result<(), OrderRefusal> {
         let turns = to.yaw_rad.is_none_or(|yaw_rad| yaw_rad.abs() <= 1e3);
         if !to.speed_m_s.is_none_or(is_speed) || !is_place(position_m) || !turns {
@@ -128,7 +129,7 @@ impl Memory {
         let to_m = or_kept(position_m, &self.can_go(seen)?);
         self.must_be_inside(settings, &to_m)?;
         self.ordered(FlightMode::Hold, notices);
-        self.plan = Plan::Hold(Hold { at_m: Some(to_m), ..to });
+        self.mode_memory = ModeMemory::Hold(Hold { at_m: Some(to_m), ..to });
         Ok(())
     }
 
@@ -138,7 +139,7 @@ impl Memory {
         settings: &Settings,
         wanted: Orbit,
         seen: &TransitionInputs,
-        notices: &mut Notices,
+        notices: &mut GuidanceNotices,
     ) -> Result<(), OrderRefusal> {
         let (left, radius_m) = (wanted.radius_m > 0.0, wanted.radius_m.abs());
         let most_m_s = orbit::speed_max_m_s(&settings.limits, radius_m);
@@ -161,7 +162,7 @@ impl Memory {
         self.must_be_inside(settings, &(centre_m + away_m))?;
         self.ordered(FlightMode::Hold, notices);
         let speed_m_s = if left { speed_m_s } else { -speed_m_s };
-        self.plan = Plan::Orbit(Orbit { centre_m, radius_m, speed_m_s, ..wanted });
+        self.mode_memory = ModeMemory::Orbit(Orbit { centre_m, radius_m, speed_m_s, ..wanted });
         Ok(())
     }
 
@@ -175,14 +176,14 @@ impl Memory {
         }
         table::select(FlightMode::Hold, seen)?;
         let present = self.limiter.setpoint().ok_or(OrderRefusal::NoPosition)?;
-        Ok(match &self.plan {
+        Ok(match &self.mode_memory {
             // Coordinates that an order leaves out are kept from the place ordered before, even if not yet reached.
-            Plan::Hold(Hold { at_m: Some(at_m), .. }) if self.mode == FlightMode::Hold => *at_m,
+            ModeMemory::Hold(Hold { at_m: Some(at_m), .. }) if self.mode == FlightMode::Hold => *at_m,
             _ => present.position_m,
         })
     }
 
-    fn ordered(&mut self, mode: FlightMode, notices: &mut Notices) {
+    fn ordered(&mut self, mode: FlightMode, notices: &mut GuidanceNotices) {
         self.change(mode, ModeReason::Ordered, notices);
         self.failsafe = None;
     }
@@ -192,7 +193,7 @@ impl Memory {
     }
 
     pub(super) fn is_inside(&self, settings: &Settings, place_m: &Vector3<f32>) -> bool {
-        self.home_m.is_none_or(|home_m| settings.net.encloses(&home_m, place_m, 0.0))
+        self.home_m.is_none_or(|home_m| settings.failsafe.encloses(&home_m, place_m, 0.0))
     }
 }
 

@@ -7,13 +7,13 @@ use proptest::prelude::*;
 /// Returns the wanted acceleration in double precision. The rate settles to the rate of approach, whose derivative is
 /// fed forward. The rate of approach is the one from which the heading stops in time, f(e) = sqrt(c^2 + 2 B |e|) - c,
 /// up to 99 % of the largest rate.
-fn acceleration(heading: &Heading, turn: &Turn, limits: &Turning) -> f64 {
+fn acceleration(heading: &Heading, turn: &HeadingTarget, limits: &YawLimits) -> f64 {
     let (rate, most) = (f64::from(heading.rate_rad_s), 0.99 * f64::from(limits.rate_rad_s));
     let largest = f64::from(limits.acceleration_rad_s2);
     let braking = 0.7 * largest;
     let (wanted, change) = match *turn {
-        Turn::By(goal_rad_s) => (f64::from(goal_rad_s).clamp(-most, most), 0.0),
-        Turn::To(yaw, goal_rad_s) => {
+        HeadingTarget::By(goal_rad_s) => (f64::from(goal_rad_s).clamp(-most, most), 0.0),
+        HeadingTarget::To(yaw, goal_rad_s) => {
             let goal_rad_s = f64::from(goal_rad_s);
             let e = (f64::from(yaw) - f64::from(heading.yaw_rad) + PI).rem_euclid(TAU) - PI;
             let c = braking / 2.0;
@@ -35,24 +35,24 @@ proptest! {
         yaw_rad in -3.1..3.1f32,
         rate in -1.5..1.5f32,
         turn in prop_oneof![
-            (-9.0..9.0f32, -1.5..1.5f32).prop_map(|(yaw, rate)| Turn::To(yaw, rate)),
-            (-9.0..9.0f32).prop_map(|yaw| Turn::To(yaw, 0.0)),
-            (-2.0..2.0f32).prop_map(Turn::By),
+            (-9.0..9.0f32, -1.5..1.5f32).prop_map(|(yaw, rate)| HeadingTarget::To(yaw, rate)),
+            (-9.0..9.0f32).prop_map(|yaw| HeadingTarget::To(yaw, 0.0)),
+            (-2.0..2.0f32).prop_map(HeadingTarget::By),
         ],
         near in prop::option::of(-0.02..0.02f32),
         rate_max in 0.3..2.0f32,
         acceleration_max in 0.5..8.0f32,
         dt_s in prop_oneof![Just(1e-3f32), 1e-3..0.05f32],
     ) {
-        let limits = Turning { rate_rad_s: rate_max, acceleration_rad_s2: acceleration_max };
+        let limits = YawLimits { rate_rad_s: rate_max, acceleration_rad_s2: acceleration_max };
         let before = Heading { yaw_rad, rate_rad_s: rate, acceleration_rad_s2: 9.0 };
         let turn = match (turn, near) {
-            (Turn::To(_, goal_rad_s), Some(near)) => Turn::To(yaw_rad + near, goal_rad_s),
+            (HeadingTarget::To(_, goal_rad_s), Some(near)) => HeadingTarget::To(yaw_rad + near, goal_rad_s),
             (turn, _) => turn,
         };
         let mut heading = before;
         heading.advance(&turn, &limits, dt_s);
-        if let Turn::To(yaw, goal_rad_s) = turn {
+        if let HeadingTarget::To(yaw, goal_rad_s) = turn {
             let off = wrap_angle(yaw - yaw_rad).abs();
             let off_rad_s = (goal_rad_s - rate).abs();
             let is_near = off <= REACHED_RAD + off_rad_s * dt_s;
@@ -79,10 +79,10 @@ proptest! {
 /// A heading counts as reached within the tolerances, and not beyond.
 #[test]
 fn it_is_reached_within_tolerances_only() {
-    let limits = Turning { rate_rad_s: 1.0, acceleration_rad_s2: 2.0 };
+    let limits = YawLimits { rate_rad_s: 1.0, acceleration_rad_s2: 2.0 };
     let hits = |off: f32, off_rad_s: f32, goal_rad_s: f32| {
         let mut heading = Heading { yaw_rad: 0.5 - off, rate_rad_s: goal_rad_s - off_rad_s, acceleration_rad_s2: 0.1 };
-        heading.advance(&Turn::To(0.5, goal_rad_s), &limits, 1e-3);
+        heading.advance(&HeadingTarget::To(0.5, goal_rad_s), &limits, 1e-3);
         heading == Heading { yaw_rad: 0.5, rate_rad_s: goal_rad_s, acceleration_rad_s2: 0.0 }
     };
     for sign in [1.0, -1.0] {

@@ -11,8 +11,8 @@ fn vector(most: f32) -> impl Strategy<Value = Vector3<f32>> {
     (-most..most, -most..most, -most..most).prop_map(|(x, y, z)| Vector3::new(x, y, z))
 }
 
-fn any_complete() -> impl Strategy<Value = Complete> {
-    (vector(20.0), vector(3.0), vector(2.0)).prop_map(|(position_m, velocity_m_s, acceleration_m_s2)| Complete {
+fn any_complete() -> impl Strategy<Value = CompleteTarget> {
+    (vector(20.0), vector(3.0), vector(2.0)).prop_map(|(position_m, velocity_m_s, acceleration_m_s2)| CompleteTarget {
         position_m,
         velocity_m_s,
         acceleration_m_s2,
@@ -34,7 +34,7 @@ proptest! {
     /// Between two messages, a stream that fits together is extrapolated with constant jerk.
     #[test]
     fn a_stream_goes_on_between_messages(begin in any_complete(), jerk in vector(30.0), steps in 1..40u32) {
-        let first = Stream {
+        let first = TargetStream {
             sent_us: 5,
             last: begin,
             present: begin,
@@ -49,7 +49,7 @@ proptest! {
             stream.advance(&begin, 5, 0.02, 100.0);
         }
         let t = steps as f32 * 0.02;
-        let Complete { position_m, velocity_m_s, acceleration_m_s2 } = stream.present;
+        let CompleteTarget { position_m, velocity_m_s, acceleration_m_s2 } = stream.present;
         prop_assert!((stream.since_s - t).abs() < 1e-5);
         prop_assert!(size(acceleration_m_s2 - begin.acceleration_m_s2 - jerk * t) < 1e-3);
         let velocity = begin.velocity_m_s + begin.acceleration_m_s2 * t + jerk * (0.5 * t * t);
@@ -62,7 +62,7 @@ proptest! {
         prop_assert!(size(position_m - position) < 2e-3 + size(jerk) * t * 0.02 * 0.02);
         prop_assert_eq!((stream.last, stream.jerk_m_s3, stream.fits), (begin, jerk, true));
         // A stream that does not fit together is not extrapolated.
-        let mut still = Stream { fits: false, ..first };
+        let mut still = TargetStream { fits: false, ..first };
         still.advance(&begin, 5, 0.02, 100.0);
         prop_assert_eq!(still.present, begin);
     }
@@ -81,8 +81,8 @@ proptest! {
         let mean = (first.velocity_m_s + velocity_m_s) * 0.5;
         let allowed_m = 0.5 * (MISFIT_M + MISFIT_TIME_S * size(mean));
         let position_m = first.position_m + mean * interval_s + oblique(off_share * allowed_m);
-        let second = Complete { position_m, velocity_m_s, acceleration_m_s2 };
-        let mut stream = Stream::new(&first, 100);
+        let second = CompleteTarget { position_m, velocity_m_s, acceleration_m_s2 };
+        let mut stream = TargetStream::new(&first, 100);
         prop_assert_eq!((stream.last, stream.present, stream.since_s, stream.fits), (first, first, 0.0, false));
         stream.advance(&second, 200, interval_s, 7.0);
         prop_assert_eq!((stream.sent_us, stream.last, stream.present, stream.since_s), (200, second, second, 0.0));
@@ -99,35 +99,38 @@ proptest! {
 
 #[test]
 fn after_a_pause_a_stream_begins_anew() {
-    let here =
-        Complete { position_m: oblique(3.0), velocity_m_s: Vector3::zeros(), acceleration_m_s2: Vector3::zeros() };
+    let here = CompleteTarget {
+        position_m: oblique(3.0),
+        velocity_m_s: Vector3::zeros(),
+        acceleration_m_s2: Vector3::zeros(),
+    };
     for (pause_s, goes_on) in [(INTERVAL_MAX_S, true), (INTERVAL_MAX_S * 1.001, false)] {
-        let mut stream = Stream::new(&here, 1);
+        let mut stream = TargetStream::new(&here, 1);
         stream.advance(&here, 2, pause_s, 100.0);
         assert_eq!((stream.fits, stream.interval_s), (goes_on, if goes_on { pause_s } else { 0.0 }));
     }
 }
 
 /// Returns a motion one step before `target` that misses it by these amounts in position, velocity and acceleration.
-fn now(target: &Complete, off_m: f32, off_m_s: f32, off_m_s2: f32, misfit: Option<Misfit>) -> Now {
+fn now(target: &CompleteTarget, off_m: f32, off_m_s: f32, off_m_s2: f32, misfit: Option<Misfit>) -> LimitedMotion {
     // It is compared after one more step.
     let acceleration = target.acceleration_m_s2 - oblique(off_m_s2);
     let velocity = target.velocity_m_s - oblique(off_m_s) - acceleration * DT_S;
     let position = target.position_m - oblique(off_m) - (velocity + acceleration * (0.5 * DT_S)) * DT_S;
     let one = |v: Vector3<f32>| Vector1::new(v.z);
-    Now {
-        horizontal: Motion::moving(position.xy(), velocity.xy(), acceleration.xy(), Vector2::zeros()),
-        vertical: Motion::moving(one(position), one(velocity), one(acceleration), Vector1::zeros()),
+    LimitedMotion {
+        horizontal: MotionState::moving(position.xy(), velocity.xy(), acceleration.xy(), Vector2::zeros()),
+        vertical: MotionState::moving(one(position), one(velocity), one(acceleration), Vector1::zeros()),
         heading: Heading::new(0.0),
         misfit,
     }
 }
 
-fn passes(target: &Complete, mut now: Now, limits: &Limits, interval_s: f32) -> bool {
+fn passes(target: &CompleteTarget, mut now: LimitedMotion, limits: &MotionLimits, interval_s: f32) -> bool {
     let jerk = Vector3::new(1.0, 2.0, 3.0);
     let passed = now.pass(target, jerk, limits, interval_s, DT_S);
     if passed {
-        let Now { horizontal: h, vertical: v, .. } = now;
+        let LimitedMotion { horizontal: h, vertical: v, .. } = now;
         let joined = |h: Vector2<f32>, v: Vector1<f32>| Vector3::new(h.x, h.y, v.x);
         assert_eq!(joined(h.position, v.position), target.position_m);
         assert_eq!(joined(h.velocity, v.velocity), target.velocity_m_s);
@@ -137,8 +140,8 @@ fn passes(target: &Complete, mut now: Now, limits: &Limits, interval_s: f32) -> 
     passed
 }
 
-fn moving(speed_m_s: f32, acceleration_m_s2: f32) -> Complete {
-    Complete {
+fn moving(speed_m_s: f32, acceleration_m_s2: f32) -> CompleteTarget {
+    CompleteTarget {
         position_m: Vector3::new(1.0, -2.0, 3.0),
         velocity_m_s: Vector3::new(0.0, 0.8, -0.6) * speed_m_s,
         acceleration_m_s2: Vector3::new(0.8, 0.6, 0.0) * acceleration_m_s2,
@@ -148,7 +151,13 @@ fn moving(speed_m_s: f32, acceleration_m_s2: f32) -> Complete {
 const NO_MISFIT: Misfit = Misfit { position_m: Vector3::new(0.0, 0.0, 0.0), velocity_m_s: Vector3::new(0.0, 0.0, 0.0) };
 
 /// Checks each tolerance by itself: slightly less passes, slightly more does not.
-fn is_tolerance(target: &Complete, limits: &Limits, interval_s: f32, misfit: Option<Misfit>, most: [f32; 3]) {
+fn is_tolerance(
+    target: &CompleteTarget,
+    limits: &MotionLimits,
+    interval_s: f32,
+    misfit: Option<Misfit>,
+    most: [f32; 3],
+) {
     for (kind, most) in most.into_iter().enumerate() {
         for (share, expected) in [(0.0, true), (0.97, true), (1.03, false), (30.0, false)] {
             for sign in [1.0, -1.0] {
@@ -163,7 +172,7 @@ fn is_tolerance(target: &Complete, limits: &Limits, interval_s: f32, misfit: Opt
 
 #[test]
 fn a_target_at_rest_is_caught_up_with_to_a_tenth_of_a_millimetre() {
-    let limits = Limits::DEFAULT;
+    let limits = MotionLimits::DEFAULT;
     is_tolerance(&moving(0.0, 0.0), &limits, 0.02, None, [STANDS_M, STANDS_M_S, STANDS_M_S2]);
 }
 
@@ -171,7 +180,7 @@ fn a_target_at_rest_is_caught_up_with_to_a_tenth_of_a_millimetre() {
 /// between two messages.
 #[test]
 fn a_moving_target_is_caught_up_with_within_its_tolerances() {
-    let limits = Limits { jerk_max_m_s3: 20.0, ..Limits::DEFAULT };
+    let limits = MotionLimits { jerk_max_m_s3: 20.0, ..MotionLimits::DEFAULT };
     for (speed, acceleration, interval_s) in [(1.5, 0.0, 0.0), (0.0, 2.0, 0.1), (2.0, 4.0, 0.03)] {
         let target = moving(speed, acceleration);
         let jerk = 1.25 * 20.0 * f32::max(interval_s, DT_S);
@@ -186,7 +195,7 @@ fn a_moving_target_is_caught_up_with_within_its_tolerances() {
 /// stays below the limit.
 #[test]
 fn misfits_add_up_and_fade() {
-    let limits = Limits::DEFAULT;
+    let limits = MotionLimits::DEFAULT;
     let target = moving(1.0, 0.0);
     let steps = MISFIT_S / DT_S;
     for (most, of) in [(MISFIT_M + MISFIT_TIME_S, 0), (MISFIT_M_S, 1)] {
@@ -213,17 +222,17 @@ fn misfits_add_up_and_fade() {
 /// A target beyond a limit does not pass, for each axis and direction.
 #[test]
 fn what_passes_is_within_the_limits() {
-    let limits = Limits {
+    let limits = MotionLimits {
         speed_m_s: 5.0,
         up_m_s: 2.0,
         down_m_s: 1.0,
         acceleration_max_m_s2: 4.0,
         vertical_acceleration_m_s2: 3.0,
-        ..Limits::DEFAULT
+        ..MotionLimits::DEFAULT
     };
     let zero = Vector3::zeros();
     let ok = |velocity_m_s: Vector3<f32>, acceleration_m_s2: Vector3<f32>| {
-        let target = Complete { position_m: Vector3::new(1.0, 2.0, 3.0), velocity_m_s, acceleration_m_s2 };
+        let target = CompleteTarget { position_m: Vector3::new(1.0, 2.0, 3.0), velocity_m_s, acceleration_m_s2 };
         let is_allowed = allowed(&target, &limits);
         assert_eq!(passes(&target, now(&target, 0.0, 0.0, 0.0, Some(NO_MISFIT)), &limits, 0.02), is_allowed);
         is_allowed
@@ -252,7 +261,8 @@ fn a_target_with_a_position_is_complete() {
     let half = Vector3::new(f32::NAN, 4.0, f32::NAN);
     let whole = complete(&LimiterTarget { position_m: place, velocity_m_s: half, ..aim }).unwrap();
     let zero = Vector3::zeros();
-    let expected = Complete { position_m: place, velocity_m_s: Vector3::new(0.0, 4.0, 0.0), acceleration_m_s2: zero };
+    let expected =
+        CompleteTarget { position_m: place, velocity_m_s: Vector3::new(0.0, 4.0, 0.0), acceleration_m_s2: zero };
     assert_eq!(whole, expected);
 }
 
@@ -262,11 +272,17 @@ fn a_goal_is_what_is_given() {
     let (nan, one, two) = (Vector2::new(1.0, f32::NAN), Vector2::new(1.0, 2.0), Vector2::new(3.0, 4.0));
     let zero = Vector2::zeros();
     let goals = [
-        (goal(nan, nan, two, one), Goal { position: None, velocity: None, acceleration: two, jerk: zero }),
-        (goal(nan, nan, nan, one), Goal { position: None, velocity: Some(zero), acceleration: zero, jerk: one }),
-        (goal(one, nan, two, one), Goal { position: Some(one), velocity: Some(zero), acceleration: two, jerk: one }),
-        (goal(nan, two, nan, zero), Goal { position: None, velocity: Some(two), acceleration: zero, jerk: zero }),
-        (goal(one, two, two, zero), Goal { position: Some(one), velocity: Some(two), acceleration: two, jerk: zero }),
+        (goal(nan, nan, two, one), MotionGoal { position: None, velocity: None, acceleration: two, jerk: zero }),
+        (goal(nan, nan, nan, one), MotionGoal { position: None, velocity: Some(zero), acceleration: zero, jerk: one }),
+        (
+            goal(one, nan, two, one),
+            MotionGoal { position: Some(one), velocity: Some(zero), acceleration: two, jerk: one },
+        ),
+        (goal(nan, two, nan, zero), MotionGoal { position: None, velocity: Some(two), acceleration: zero, jerk: zero }),
+        (
+            goal(one, two, two, zero),
+            MotionGoal { position: Some(one), velocity: Some(two), acceleration: two, jerk: zero },
+        ),
     ];
     for (found, expected) in goals {
         assert_eq!(found, expected);
@@ -277,7 +293,7 @@ fn a_goal_is_what_is_given() {
 /// horizontally only. A change of limits does not interrupt the motion.
 #[test]
 fn it_begins_and_goes_on_at_the_vehicle() {
-    let limits = Limits { speed_m_s: 5.0, up_m_s: 2.0, down_m_s: 1.0, ..Limits::DEFAULT };
+    let limits = MotionLimits { speed_m_s: 5.0, up_m_s: 2.0, down_m_s: 1.0, ..MotionLimits::DEFAULT };
     let state = State {
         position_m: Vector3::new(1.0, -2.0, 3.0),
         velocity_m_s: Vector3::new(6.0, -8.0, 0.5),
@@ -302,7 +318,7 @@ fn it_begins_and_goes_on_at_the_vehicle() {
     (0..300).for_each(|_| limiter.advance(&aim, DT_S));
     let before = limiter.setpoint().unwrap();
     assert!(before.jerk_m_s3.norm() > 0.1 && before.acceleration_m_s2.z != 0.0 && before.yaw_rate_rad_s > 0.1);
-    limiter.set(Limits { speed_m_s: 4.0, ..limits });
+    limiter.set(MotionLimits { speed_m_s: 4.0, ..limits });
     assert_eq!(limiter.setpoint(), Some(before));
     let there = State { position_m: Vector3::new(7.0, 8.0, 9.0), ..climbing(1.0) };
     limiter.follow(&there);
@@ -322,7 +338,7 @@ fn it_begins_and_goes_on_at_the_vehicle() {
 #[test]
 fn headings_and_rates_are_followed() {
     let turned = |yaw_rad: f32, yaw_rate_rad_s: f32| {
-        let mut limiter = Limiter::new(Limits::DEFAULT).unwrap();
+        let mut limiter = Limiter::new(MotionLimits::DEFAULT).unwrap();
         limiter.anchor(&State::default());
         let aim = LimiterTarget { yaw_rad: 0.0, yaw_rate_rad_s: 0.5, ..LimiterTarget::stop(1.0, 1.0, 1.0) };
         (0..1000).for_each(|_| limiter.advance(&aim, DT_S));
@@ -352,7 +368,7 @@ fn wrap(angle: f32) -> f32 {
 #[test]
 fn accelerations_of_what_is_no_flight_do_not_count() {
     let farthest = |interval: u32| {
-        let mut limiter = Limiter::new(Limits::DEFAULT).unwrap();
+        let mut limiter = Limiter::new(MotionLimits::DEFAULT).unwrap();
         limiter.anchor(&State::default());
         let mut farthest_m = 0.0_f32;
         for tick in 0..4000_u32 {

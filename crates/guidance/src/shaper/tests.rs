@@ -63,7 +63,12 @@ impl Page {
 
     /// Returns the wanted velocity, and its derivative without the goal's acceleration: that of the approach, or zero
     /// if the approach is limited.
-    fn wanted<const D: usize>(&self, motion: &Motion<D>, goal: &Goal<D>, reach: &Reach) -> (Vec64<D>, Vec64<D>) {
+    fn wanted<const D: usize>(
+        &self,
+        motion: &MotionState<D>,
+        goal: &MotionGoal<D>,
+        reach: &MotionBounds,
+    ) -> (Vec64<D>, Vec64<D>) {
         let zero = Vec64::<D>::zeros();
         let v = wide(&motion.velocity);
         let Some(given) = goal.velocity.as_ref().map(wide) else {
@@ -91,7 +96,7 @@ impl Page {
     }
 
     /// Returns the jerk of a step.
-    fn jerk<const D: usize>(&self, motion: &Motion<D>, goal: &Goal<D>, reach: &Reach) -> Vec64<D> {
+    fn jerk<const D: usize>(&self, motion: &MotionState<D>, goal: &MotionGoal<D>, reach: &MotionBounds) -> Vec64<D> {
         let (v, a) = (wide(&motion.velocity), wide(&motion.acceleration));
         let (wanted, change) = self.wanted(motion, goal, reach);
         let x = wanted - v;
@@ -135,22 +140,24 @@ fn vector(most: f32) -> impl Strategy<Value = Vector2<f32>> {
     prop_oneof![pair(most), pair(0.1 * most), pair(0.003 * most), Just(Vector2::zeros())]
 }
 
-fn any_motion() -> impl Strategy<Value = Motion<2>> {
-    (vector(50.0), vector(12.0), vector(6.0)).prop_map(|(p, v, a)| Motion::moving(p, v, a, Vector2::zeros()))
+fn any_motion() -> impl Strategy<Value = MotionState<2>> {
+    (vector(50.0), vector(12.0), vector(6.0)).prop_map(|(p, v, a)| MotionState::moving(p, v, a, Vector2::zeros()))
 }
 
-fn any_goal() -> impl Strategy<Value = Goal<2>> {
-    (0..6u8, vector(50.0), vector(6.0), vector(4.0), vector(20.0)).prop_map(|(kind, p, v, acceleration, jerk)| Goal {
-        position: (kind > 1).then_some(p),
-        velocity: (kind > 0).then_some(if kind > 4 { Vector2::zeros() } else { v }),
-        acceleration,
-        jerk,
+fn any_goal() -> impl Strategy<Value = MotionGoal<2>> {
+    (0..6u8, vector(50.0), vector(6.0), vector(4.0), vector(20.0)).prop_map(|(kind, p, v, acceleration, jerk)| {
+        MotionGoal {
+            position: (kind > 1).then_some(p),
+            velocity: (kind > 0).then_some(if kind > 4 { Vector2::zeros() } else { v }),
+            acceleration,
+            jerk,
+        }
     })
 }
 
-fn any_reach() -> impl Strategy<Value = Reach> {
+fn any_reach() -> impl Strategy<Value = MotionBounds> {
     (0.5..8.0f32, 0.5..8.0f32, 0.0..8.0f32, 0.0..8.0f32, 1.0..9.0f32, 3.0..200.0f32).prop_map(
-        |(a, b, more_a, more_b, acceleration, jerk)| Reach {
+        |(a, b, more_a, more_b, acceleration, jerk)| MotionBounds {
             approach: (a, b),
             speed: (a + more_a, b + more_b),
             acceleration,
@@ -172,7 +179,7 @@ proptest! {
         motion in any_motion(), goal in any_goal(), reach in any_reach(), a in 0.5..8.0f32, jerk_s in 0.5..60.0f32,
     ) {
         let j = a * jerk_s;
-        let (shape, page) = (Shape::new(a, j), Page::new(a, j));
+        let (shape, page) = (MotionShaper::new(a, j), Page::new(a, j));
         let mut moved = motion;
         shape.advance(&mut moved, &goal, &reach, DT_S);
         let expected = page.jerk(&motion, &goal, &reach);
@@ -180,10 +187,10 @@ proptest! {
         let hair = 2e-3 * (1.0 + expected.norm()) + 1e-3 * page.k3;
         prop_assert!((wide(&moved.jerk) - expected).norm() < hair, "{:?}, not {expected:?}", moved.jerk);
 
-        let motion = Motion { below: Vector1::new(1e-4), ..Motion::moving(
+        let motion = MotionState { below: Vector1::new(1e-4), ..MotionState::moving(
             of_one(&motion.position), of_one(&motion.velocity), of_one(&motion.acceleration), Vector1::zeros(),
         ) };
-        let goal = Goal {
+        let goal = MotionGoal {
             position: goal.position.as_ref().map(of_one),
             velocity: goal.velocity.as_ref().map(of_one),
             acceleration: of_one(&goal.acceleration),
@@ -199,7 +206,7 @@ proptest! {
     /// A step integrates its jerk, also far from the origin, where the position's two parts count together.
     #[test]
     fn a_step_integrates_its_jerk(motion in any_motion(), jerk in pair(100.0), far in -9e4..9e4f32) {
-        let mut moved = Motion { position: motion.position.map(|x| x + far), ..motion };
+        let mut moved = MotionState { position: motion.position.map(|x| x + far), ..motion };
         let begin = wide(&moved.position);
         // Long steps make every term visible.
         let dt = 0.05_f32;

@@ -27,10 +27,10 @@ pub(crate) struct Bench {
     pub wind_m_s2: Vector3<f32>,
     /// The mission.
     pub(crate) items: Vec<Item>,
-    pub(crate) said: Vec<Notice>,
+    pub(crate) said: Vec<GuidanceNotice>,
     pub(crate) reached: Vec<u16>,
     pub(crate) answers: Vec<(u8, Result<(), OrderRefusal>)>,
-    pub(crate) last: Option<Guided>,
+    pub(crate) last: Option<GuidanceOutputs>,
     /// Highest place of the flight \[m\].
     pub(crate) highest_m: f32,
     /// Estimator reset of the next tick, and the sum of all resets so far.
@@ -141,7 +141,7 @@ impl Bench {
     }
 
     /// Runs until `ends`. Returns the time that this took \[s\].
-    pub(crate) fn run_until(&mut self, most_s: f32, ends: impl Fn(&Guided) -> bool) -> f32 {
+    pub(crate) fn run_until(&mut self, most_s: f32, ends: impl Fn(&GuidanceOutputs) -> bool) -> f32 {
         for tick in 0..(most_s / DT_S) as u32 {
             if ends(&self.tick()) {
                 return tick as f32 * DT_S;
@@ -150,7 +150,7 @@ impl Bench {
         panic!("not within {most_s} s: {:?} at {:?}, said {:?}", self.last, self.state, self.said)
     }
 
-    pub(crate) fn tick(&mut self) -> Guided {
+    pub(crate) fn tick(&mut self) -> GuidanceOutputs {
         self.now_us += 1000;
         let rests = self.sees && ArmingLimits::DEFAULT.at_rest(&self.state);
         self.rest_us = if rests { self.rest_us + 1000 } else { 0 };
@@ -158,7 +158,7 @@ impl Bench {
             self.orders.heard_us = Some(self.now_us);
         }
         let wanted = self.last.map_or(0, |guided| guided.wanted);
-        self.orders.leg = self.items.get(usize::from(wanted)).map(|item| Leg {
+        self.orders.leg = self.items.get(usize::from(wanted)).map(|item| RequestedItem {
             number: wanted,
             upload: 1,
             item: *item,
@@ -174,7 +174,7 @@ impl Bench {
             rested: self.rested(),
             battery: self.battery,
             sensors: self.sensors,
-            lift: Lift { most_m_s2: 2.0 * G_M_S2, gravity_m_s2: G_M_S2, given_m_s2: None },
+            available_thrust: AvailableThrust { most_m_s2: 2.0 * G_M_S2, gravity_m_s2: G_M_S2, given_m_s2: None },
         };
         let guided = self.guidance.tick(&sight, &self.orders);
         self.reset = None;
@@ -190,7 +190,7 @@ impl Bench {
         guided
     }
 
-    fn fly(&mut self, guided: &Guided) {
+    fn fly(&mut self, guided: &GuidanceOutputs) {
         let State { position_m, velocity_m_s, .. } = self.state;
         let idles = !self.core.armed() || guided.idle_on_ground && self.core != Mode::Descending;
         let wanted_m_s2 = match &guided.setpoint {

@@ -4,7 +4,7 @@
 use afbc::Profile;
 use afbc_guidance::FlightMode;
 use afbc_hil::Host;
-use afbc_mavlink::{Address, FRAME_MAX, ParameterRequest, Sender, Uplink};
+use afbc_mavlink::{Address, Encoder, FRAME_MAX, ParameterRequest, Uplink};
 use afbc_onboard::Report;
 use afbc_rc::{Channels, CrsfFrame};
 use afbc_scenario::{Scenario, load};
@@ -44,7 +44,7 @@ pub(crate) struct Flier {
     pub(crate) ms: u64,
     pub(crate) random: Xoshiro256PlusPlus,
     pub(crate) report: Option<Report>,
-    pub(crate) sender: Sender,
+    pub(crate) sender: Encoder,
     pub(crate) texts: Vec<u8>,
 }
 
@@ -84,7 +84,7 @@ impl Flier {
             ms: 0,
             random: Xoshiro256PlusPlus::seed_from_u64(seed),
             report: None,
-            sender: Sender::new(STATION),
+            sender: Encoder::new(STATION),
             texts: Vec::new(),
         };
         flier.set("RC_MAP_KILL_SW", KILL as f32 + 1.0);

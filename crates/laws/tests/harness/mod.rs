@@ -3,7 +3,7 @@
 pub(crate) mod steps;
 
 use afbc_control::{Action, FlightController, Settings, Validated};
-use afbc_plant::{Environment, Gust, GustKind, Motion, ParameterChange, Plant, PlantModel, PlantParameter};
+use afbc_plant::{Environment, Gust, GustKind, Motion, Plant, PlantModel, PlantParameter, PlantParameterChange};
 use afbc_types::{Axis, Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use std::collections::VecDeque;
@@ -198,6 +198,6 @@ pub(crate) fn disturbed(inertia: f64, thrust: f64) -> Environment {
                 end_s: f64::INFINITY,
             });
     let changes = [(PlantParameter::Inertia, inertia), (PlantParameter::ThrustFactor, thrust)]
-        .map(|(quantity, factor)| ParameterChange { quantity, factor, start_s: 20.0, end_s: 40.0 });
+        .map(|(quantity, factor)| PlantParameterChange { quantity, factor, start_s: 20.0, end_s: 40.0 });
     Environment::new(Parameters::PAPER, changes.to_vec(), gusts.to_vec()).unwrap()
 }

@@ -1,7 +1,7 @@
 //! Collects the data of a tick for the topics.
 
 use crate::ulog::known::Known;
-use afbc_estimator::Origin;
+use afbc_estimator::GeodeticOrigin;
 use afbc_onboard::{EscTelemetry, Report, TickDetails};
 use afbc_types::State;
 use nalgebra::Vector3;
@@ -12,7 +12,7 @@ pub struct BesideTick<'a> {
     /// Telemetry of the motor controllers (ESCs), if there is a telemetry line.
     pub escs: Option<&'a EscTelemetry>,
     /// Geographic origin of the GNSS fixes, once it is known.
-    pub origin: Option<Origin>,
+    pub origin: Option<GeodeticOrigin>,
 }
 
 /// A tick of a vehicle with any number of rotors.

@@ -3,15 +3,15 @@
 mod read;
 mod write;
 
-use crate::place::{Height, Place};
+use crate::global_position::{GlobalPosition, Height};
 use mavlink::dialects::common::MavCmd;
 pub(crate) use read::{format, read};
 pub(crate) use write::write;
 
-/// A command, answered by [`Downlink::Answer`](crate::Downlink::Answer). It arrives as COMMAND_LONG (76), COMMAND_INT
-/// (75), SET_MODE (11) or SET_HOME_POSITION (243).
+/// A command, answered by [`Downlink::CommandAck`](crate::Downlink::CommandAck). It arrives as COMMAND_LONG (76),
+/// COMMAND_INT (75), SET_MODE (11) or SET_HOME_POSITION (243).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Command {
+pub enum VehicleCommand {
     /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 1. Arming cannot be forced.
     Arm,
     /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 0.
@@ -37,7 +37,7 @@ pub enum Command {
     /// MAV_CMD_DO_REPOSITION (192).
     Reposition {
         /// Destination.
-        place: Place,
+        place: GlobalPosition,
         /// Heading; NaN keeps the present one \[rad\].
         yaw_rad: f32,
         /// Horizontal speed; none for the default \[m/s\].
@@ -48,7 +48,7 @@ pub enum Command {
     /// MAV_CMD_DO_ORBIT (34).
     Orbit {
         /// Centre of the circle, with the height of the flight.
-        place: Place,
+        place: GlobalPosition,
         /// Radius, positive for clockwise; NaN for the default \[m\].
         radius_m: f32,
         /// Speed along the circle; NaN for the default \[m/s\].
@@ -61,7 +61,7 @@ pub enum Command {
     /// MAV_CMD_DO_CHANGE_SPEED (178): horizontal speed \[m/s\].
     Speed(f32),
     /// MAV_CMD_DO_SET_HOME (179) or SET_HOME_POSITION; none for the vehicle's present position.
-    Home(Option<Place>),
+    Home(Option<GlobalPosition>),
     /// MAV_CMD_MISSION_START (300): number of the first item and of the last; none for the end of the mission.
     StartMission(u16, Option<u16>),
     /// MAV_CMD_DO_SET_MISSION_CURRENT (224): item number, none for the present item; true resets the mission.
@@ -172,7 +172,7 @@ pub(crate) const CUSTOM_MODE: u32 = 1;
 /// Value for the default, in MAV_CMD_DO_REPOSITION and MAV_CMD_DO_CHANGE_SPEED.
 pub(crate) const USUAL: f32 = -1.0;
 
-impl Command {
+impl VehicleCommand {
     /// Numbers of the supported commands.
     pub const KNOWN: [u16; 25] = [
         RETURN,
@@ -205,32 +205,32 @@ impl Command {
     /// Returns the number of the MAVLink command, for its answer.
     pub const fn id(self) -> u16 {
         match self {
-            Command::Arm | Command::Disarm | Command::Kill => ARM_DISARM,
-            Command::Engage => ENGAGE,
-            Command::SelfTest => SELF_TEST,
-            Command::TakeOff(_) => TAKE_OFF,
-            Command::Land => LAND,
-            Command::Return => RETURN,
-            Command::SelectMode(_) => SELECT_MODE,
-            Command::SelectStandardMode(_) => SELECT_STANDARD_MODE,
-            Command::Reposition { .. } => REPOSITION,
-            Command::Orbit { .. } => ORBIT,
-            Command::Speed(_) => SPEED,
-            Command::Home(_) => HOME,
-            Command::StartMission(..) => START_MISSION,
-            Command::SetCurrent(..) => SET_CURRENT,
-            Command::SetInterval { .. } => SET_INTERVAL,
-            Command::GetInterval(_) => GET_INTERVAL,
-            Command::RequestMessage { .. } => REQUEST_MESSAGE,
-            Command::RequestProtocol => REQUEST_PROTOCOL,
-            Command::RequestCapabilities => REQUEST_CAPABILITIES,
-            Command::Reboot(_) => REBOOT,
-            Command::Storage(_) => STORAGE,
-            Command::Calibrate(_) => CALIBRATE,
-            Command::CheckArming => CHECK_ARMING,
-            Command::StartLogStream => START_LOG_STREAM,
-            Command::StopLogStream => STOP_LOG_STREAM,
-            Command::Denied(id) | Command::Other(id) => id,
+            VehicleCommand::Arm | VehicleCommand::Disarm | VehicleCommand::Kill => ARM_DISARM,
+            VehicleCommand::Engage => ENGAGE,
+            VehicleCommand::SelfTest => SELF_TEST,
+            VehicleCommand::TakeOff(_) => TAKE_OFF,
+            VehicleCommand::Land => LAND,
+            VehicleCommand::Return => RETURN,
+            VehicleCommand::SelectMode(_) => SELECT_MODE,
+            VehicleCommand::SelectStandardMode(_) => SELECT_STANDARD_MODE,
+            VehicleCommand::Reposition { .. } => REPOSITION,
+            VehicleCommand::Orbit { .. } => ORBIT,
+            VehicleCommand::Speed(_) => SPEED,
+            VehicleCommand::Home(_) => HOME,
+            VehicleCommand::StartMission(..) => START_MISSION,
+            VehicleCommand::SetCurrent(..) => SET_CURRENT,
+            VehicleCommand::SetInterval { .. } => SET_INTERVAL,
+            VehicleCommand::GetInterval(_) => GET_INTERVAL,
+            VehicleCommand::RequestMessage { .. } => REQUEST_MESSAGE,
+            VehicleCommand::RequestProtocol => REQUEST_PROTOCOL,
+            VehicleCommand::RequestCapabilities => REQUEST_CAPABILITIES,
+            VehicleCommand::Reboot(_) => REBOOT,
+            VehicleCommand::Storage(_) => STORAGE,
+            VehicleCommand::Calibrate(_) => CALIBRATE,
+            VehicleCommand::CheckArming => CHECK_ARMING,
+            VehicleCommand::StartLogStream => START_LOG_STREAM,
+            VehicleCommand::StopLogStream => STOP_LOG_STREAM,
+            VehicleCommand::Denied(id) | VehicleCommand::Other(id) => id,
         }
     }
 }

@@ -1,18 +1,18 @@
 //! Writing of commands, addressed to everyone.
 
 use super::read::{INT, LONG};
-use super::{CalibrationRequest, Command, FORCED, Reboot, Storage, USUAL};
+use super::{CalibrationRequest, FORCED, Reboot, Storage, USUAL, VehicleCommand};
 use crate::address::Address;
+use crate::global_position::{Datum, GlobalPosition, Height, frame};
 use crate::message::PAYLOAD_MAX;
-use crate::place::{Datum, Height, Place, frame};
 
 /// Writes COMMAND_LONG, or COMMAND_INT for a command with a place or a height above the sea or home.
-pub(crate) fn write(command: Command, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
-    let nowhere = |height| Place { latitude_e7: 0, longitude_e7: 0, height };
+pub(crate) fn write(command: VehicleCommand, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+    let nowhere = |height| GlobalPosition { latitude_e7: 0, longitude_e7: 0, height };
     let (first, place) = match command {
-        Command::Arm => ([1.0, 0.0, 0.0, 0.0], None),
-        Command::Kill => ([0.0, FORCED, 0.0, 0.0], None),
-        Command::Calibrate(asked) => {
+        VehicleCommand::Arm => ([1.0, 0.0, 0.0, 0.0], None),
+        VehicleCommand::Kill => ([0.0, FORCED, 0.0, 0.0], None),
+        VehicleCommand::Calibrate(asked) => {
             let (first, fifth) = match asked {
                 CalibrationRequest::Gyroscope => ([1.0, 0.0], 0.0),
                 CalibrationRequest::Magnetometer => ([0.0, 1.0], 0.0),
@@ -25,43 +25,43 @@ pub(crate) fn write(command: Command, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, 
             return LONG.write(&(parameters, command.id(), Address::default(), 0), payload);
         }
         // Infinity is invalid for every parameter of every command.
-        Command::Denied(id) => return LONG.write(&([f32::INFINITY; 7], id, Address::default(), 0), payload),
-        Command::Disarm
-        | Command::CheckArming
-        | Command::Engage
-        | Command::SelfTest
-        | Command::Land
-        | Command::Return
-        | Command::StartLogStream
-        | Command::StopLogStream
-        | Command::Other(_) => ([0.0; 4], None),
-        Command::TakeOff(height) => ([0.0; 4], Some(nowhere(height))),
-        Command::SelectMode(mode) => {
+        VehicleCommand::Denied(id) => return LONG.write(&([f32::INFINITY; 7], id, Address::default(), 0), payload),
+        VehicleCommand::Disarm
+        | VehicleCommand::CheckArming
+        | VehicleCommand::Engage
+        | VehicleCommand::SelfTest
+        | VehicleCommand::Land
+        | VehicleCommand::Return
+        | VehicleCommand::StartLogStream
+        | VehicleCommand::StopLogStream
+        | VehicleCommand::Other(_) => ([0.0; 4], None),
+        VehicleCommand::TakeOff(height) => ([0.0; 4], Some(nowhere(height))),
+        VehicleCommand::SelectMode(mode) => {
             let [_, _, main, sub] = mode.to_le_bytes();
             ([1.0, f32::from(main), f32::from(sub), 0.0], None)
         }
-        Command::SelectStandardMode(mode) => ([f32::from(mode), 0.0, 0.0, 0.0], None),
-        Command::Reposition { place, yaw_rad, speed_m_s, changes_mode } => {
+        VehicleCommand::SelectStandardMode(mode) => ([f32::from(mode), 0.0, 0.0, 0.0], None),
+        VehicleCommand::Reposition { place, yaw_rad, speed_m_s, changes_mode } => {
             ([speed_m_s.unwrap_or(USUAL), f32::from(u8::from(changes_mode)), 0.0, -yaw_rad], Some(place))
         }
-        Command::Orbit { place, radius_m, speed_m_s, angle_deg, heading } => {
+        VehicleCommand::Orbit { place, radius_m, speed_m_s, angle_deg, heading } => {
             let angle_rad = f32::from(angle_deg).to_radians();
             ([radius_m, speed_m_s, f32::from(heading), angle_rad], Some(place))
         }
-        Command::Speed(speed_m_s) => ([1.0, speed_m_s, USUAL, 0.0], None),
-        Command::Home(place) => ([f32::from(u8::from(place.is_none())), 0.0, 0.0, 0.0], place),
-        Command::StartMission(first, last) => ([f32::from(first), last.map_or(0.0, f32::from), 0.0, 0.0], None),
-        Command::SetCurrent(number, resets) => {
+        VehicleCommand::Speed(speed_m_s) => ([1.0, speed_m_s, USUAL, 0.0], None),
+        VehicleCommand::Home(place) => ([f32::from(u8::from(place.is_none())), 0.0, 0.0, 0.0], place),
+        VehicleCommand::StartMission(first, last) => ([f32::from(first), last.map_or(0.0, f32::from), 0.0, 0.0], None),
+        VehicleCommand::SetCurrent(number, resets) => {
             ([number.map_or(USUAL, f32::from), f32::from(u8::from(resets)), 0.0, 0.0], None)
         }
-        Command::SetInterval { message, interval_us } => ([message as f32, interval_us as f32, 0.0, 0.0], None),
-        Command::GetInterval(message) => ([message as f32, 0.0, 0.0, 0.0], None),
-        Command::RequestMessage { message, index } => ([message as f32, index as f32, 0.0, 0.0], None),
-        Command::RequestProtocol | Command::RequestCapabilities | Command::Reboot(Reboot::Program) => {
-            ([1.0, 0.0, 0.0, 0.0], None)
-        }
-        Command::Reboot(Reboot::BootLoader) => ([3.0, 0.0, 0.0, 0.0], None),
-        Command::Storage(storage) => {
+        VehicleCommand::SetInterval { message, interval_us } => ([message as f32, interval_us as f32, 0.0, 0.0], None),
+        VehicleCommand::GetInterval(message) => ([message as f32, 0.0, 0.0, 0.0], None),
+        VehicleCommand::RequestMessage { message, index } => ([message as f32, index as f32, 0.0, 0.0], None),
+        VehicleCommand::RequestProtocol
+        | VehicleCommand::RequestCapabilities
+        | VehicleCommand::Reboot(Reboot::Program) => ([1.0, 0.0, 0.0, 0.0], None),
+        VehicleCommand::Reboot(Reboot::BootLoader) => ([3.0, 0.0, 0.0, 0.0], None),
+        VehicleCommand::Storage(storage) => {
             let action = match storage {
                 Storage::Load => 0.0,
                 Storage::Save => 1.0,
@@ -72,7 +72,9 @@ pub(crate) fn write(command: Command, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, 
     };
     let to = Address::default();
     match place {
-        Some(Place { latitude_e7, longitude_e7, height: Height { metres, above } }) if above != Datum::Here => {
+        Some(GlobalPosition { latitude_e7, longitude_e7, height: Height { metres, above } })
+            if above != Datum::Here =>
+        {
             INT.write(&(first, [latitude_e7, longitude_e7], metres, command.id(), to, frame(above), [0; 2]), payload)
         }
         _ => {

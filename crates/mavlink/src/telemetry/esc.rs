@@ -1,7 +1,7 @@
 //! ESC telemetry, four ESCs per message.
 
 use crate::message::{MessageFormat, PAYLOAD_MAX};
-use crate::wire::Layout;
+use crate::wire::MessageLayout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{ESC_INFO_DATA, ESC_STATUS_DATA};
 
@@ -47,11 +47,11 @@ const DSHOT: u8 = 5;
 
 /// Fields: time, speeds, voltages, currents, index of the first ESC.
 type StatusFields = (u64, [i32; ESCS_PER_MESSAGE], [f32; ESCS_PER_MESSAGE], [f32; ESCS_PER_MESSAGE], u8);
-const STATUS: Layout<ESC_STATUS_DATA, StatusFields> = Layout::NEW;
+const STATUS: MessageLayout<ESC_STATUS_DATA, StatusFields> = MessageLayout::NEW;
 /// Fields: time; error counts; counter; failures, temperatures; index of the first ESC, number of ESCs, connection
 /// type, online bits.
 type InfoFields = (u64, [u32; ESCS_PER_MESSAGE], u16, [u16; ESCS_PER_MESSAGE], [i16; ESCS_PER_MESSAGE], [u8; 4]);
-const INFO: Layout<ESC_INFO_DATA, InfoFields> = Layout::NEW;
+const INFO: MessageLayout<ESC_INFO_DATA, InfoFields> = MessageLayout::NEW;
 
 pub(super) fn format(id: u32) -> Option<MessageFormat> {
     Some(match id {

@@ -1,14 +1,15 @@
 //! Telemetry for display by ground stations, in the frames of [`afbc_types`] unless a field says otherwise.
 
 mod esc;
+mod global_position;
 mod motion;
 mod orbit;
-mod place;
 mod system;
 
 use crate::channels::{self, RadioChannels};
-use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
+use crate::message::{FrameFault, MessageFormat, PAYLOAD_MAX};
 pub use esc::{ESCS_PER_MESSAGE, EscInfo, EscStatus};
+pub use global_position::{GlobalOrigin, GlobalPositionInt, GpsRawInt, HomePosition};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA, ESC_INFO_DATA,
@@ -18,7 +19,6 @@ use mavlink::dialects::common::{
 };
 pub use motion::{AttitudeQuaternion, VfrHud};
 pub use orbit::OrbitStatus;
-pub use place::{Fix, GlobalOrigin, GlobalPosition, Home};
 pub use system::{ActuatorOutputs, BatteryStatus, EstimatorStatus, SystemStatus, Version};
 
 /// A telemetry message.
@@ -28,15 +28,15 @@ pub enum Telemetry {
     /// ATTITUDE_QUATERNION (31).
     Attitude(AttitudeQuaternion),
     /// VFR_HUD (74).
-    Summary(VfrHud),
+    VfrHud(VfrHud),
     /// GLOBAL_POSITION_INT (33).
-    Global(GlobalPosition),
+    GlobalPositionInt(GlobalPositionInt),
     /// GPS_RAW_INT (24).
-    Fix(Fix),
+    GpsRawInt(GpsRawInt),
     /// HOME_POSITION (242).
-    Home(Home),
+    HomePosition(HomePosition),
     /// GPS_GLOBAL_ORIGIN (49).
-    Origin(GlobalOrigin),
+    GpsGlobalOrigin(GlobalOrigin),
     /// SYS_STATUS (1).
     System(SystemStatus),
     /// BATTERY_STATUS (147).
@@ -65,20 +65,20 @@ impl Telemetry {
     pub(crate) fn format(id: u32) -> Option<MessageFormat> {
         motion::format(id)
             .or_else(|| orbit::format(id))
-            .or_else(|| place::format(id))
+            .or_else(|| global_position::format(id))
             .or_else(|| system::format(id))
             .or_else(|| channels::format(id))
             .or_else(|| esc::format(id))
     }
 
-    pub(crate) fn read(id: u32, payload: &[u8]) -> Result<Self, Fault> {
+    pub(crate) fn read(id: u32, payload: &[u8]) -> Result<Self, FrameFault> {
         Ok(match id {
             ATTITUDE_QUATERNION_DATA::ID => Telemetry::Attitude(AttitudeQuaternion::read(payload)),
-            VFR_HUD_DATA::ID => Telemetry::Summary(VfrHud::read(payload)),
-            GLOBAL_POSITION_INT_DATA::ID => Telemetry::Global(GlobalPosition::read(payload)),
-            GPS_RAW_INT_DATA::ID => Telemetry::Fix(Fix::read(payload)),
-            HOME_POSITION_DATA::ID => Telemetry::Home(Home::read(payload)),
-            GPS_GLOBAL_ORIGIN_DATA::ID => Telemetry::Origin(GlobalOrigin::read(payload)),
+            VFR_HUD_DATA::ID => Telemetry::VfrHud(VfrHud::read(payload)),
+            GLOBAL_POSITION_INT_DATA::ID => Telemetry::GlobalPositionInt(GlobalPositionInt::read(payload)),
+            GPS_RAW_INT_DATA::ID => Telemetry::GpsRawInt(GpsRawInt::read(payload)),
+            HOME_POSITION_DATA::ID => Telemetry::HomePosition(HomePosition::read(payload)),
+            GPS_GLOBAL_ORIGIN_DATA::ID => Telemetry::GpsGlobalOrigin(GlobalOrigin::read(payload)),
             SYS_STATUS_DATA::ID => Telemetry::System(SystemStatus::read(payload)),
             BATTERY_STATUS_DATA::ID => Telemetry::Battery(BatteryStatus::read(payload)),
             EXTENDED_SYS_STATE_DATA::ID => Telemetry::Landed(system::read_landed(payload)),
@@ -90,18 +90,18 @@ impl Telemetry {
             ESC_STATUS_DATA::ID => Telemetry::EscStatus(EscStatus::read(payload)),
             ESC_INFO_DATA::ID => Telemetry::EscInfo(EscInfo::read(payload)),
             PROTOCOL_VERSION_DATA::ID => Telemetry::Protocol,
-            _ => return Err(Fault::Unknown),
+            _ => return Err(FrameFault::Unknown),
         })
     }
 
     pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         match self {
             Telemetry::Attitude(attitude) => attitude.write(payload),
-            Telemetry::Summary(summary) => summary.write(payload),
-            Telemetry::Global(position) => position.write(payload),
-            Telemetry::Fix(fix) => fix.write(payload),
-            Telemetry::Home(home) => home.write(payload),
-            Telemetry::Origin(origin) => origin.write(payload),
+            Telemetry::VfrHud(summary) => summary.write(payload),
+            Telemetry::GlobalPositionInt(position) => position.write(payload),
+            Telemetry::GpsRawInt(fix) => fix.write(payload),
+            Telemetry::HomePosition(home) => home.write(payload),
+            Telemetry::GpsGlobalOrigin(origin) => origin.write(payload),
             Telemetry::System(status) => status.write(payload),
             Telemetry::Battery(battery) => battery.write(payload),
             Telemetry::Landed(state) => system::write_landed(*state, payload),

@@ -2,7 +2,7 @@
 
 use crate::frames::{flip, flip_turn};
 use crate::message::{MessageFormat, PAYLOAD_MAX};
-use crate::wire::Layout;
+use crate::wire::MessageLayout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{ATTITUDE_QUATERNION_DATA, VFR_HUD_DATA};
 use nalgebra::Vector3;
@@ -33,9 +33,9 @@ pub struct VfrHud {
     pub throttle_percent: u16,
 }
 
-const ATTITUDE: Layout<ATTITUDE_QUATERNION_DATA, (u32, [f32; 4], [f32; 3], [f32; 4])> = Layout::NEW;
+const ATTITUDE: MessageLayout<ATTITUDE_QUATERNION_DATA, (u32, [f32; 4], [f32; 3], [f32; 4])> = MessageLayout::NEW;
 /// Fields: airspeed, ground speed, altitude, climb rate; heading, throttle.
-const SUMMARY: Layout<VFR_HUD_DATA, ([f32; 4], i16, u16)> = Layout::NEW;
+const SUMMARY: MessageLayout<VFR_HUD_DATA, ([f32; 4], i16, u16)> = MessageLayout::NEW;
 
 pub(super) fn format(id: u32) -> Option<MessageFormat> {
     match id {

@@ -1,7 +1,7 @@
 //! Orbit being flown.
 
 use crate::message::{MessageFormat, PAYLOAD_MAX};
-use crate::wire::Layout;
+use crate::wire::MessageLayout;
 use mavlink::MessageData;
 use mavlink::dialects::common::ORBIT_EXECUTION_STATUS_DATA;
 
@@ -19,7 +19,7 @@ pub struct OrbitStatus {
 }
 
 /// Fields: time; radius, place, altitude; frame.
-const ORBIT: Layout<ORBIT_EXECUTION_STATUS_DATA, (u64, f32, [i32; 2], f32, u8)> = Layout::NEW;
+const ORBIT: MessageLayout<ORBIT_EXECUTION_STATUS_DATA, (u64, f32, [i32; 2], f32, u8)> = MessageLayout::NEW;
 /// MAV_FRAME_GLOBAL_INT.
 const FRAME: u8 = 5;
 

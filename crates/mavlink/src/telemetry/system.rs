@@ -1,7 +1,7 @@
 //! Health, battery, outputs and versions.
 
 use crate::message::{MessageFormat, PAYLOAD_MAX};
-use crate::wire::Layout;
+use crate::wire::MessageLayout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     ACTUATOR_OUTPUT_STATUS_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA, ESTIMATOR_STATUS_DATA,
@@ -81,21 +81,21 @@ pub struct Version {
 
 /// Fields: sensors present, enabled, healthy; load, voltage; current; six counts; remaining charge; extended sensor
 /// sets.
-const SYSTEM: Layout<SYS_STATUS_DATA, ([u32; 3], [u16; 2], i16, [u16; 6], i8, [u32; 3])> = Layout::NEW;
+const SYSTEM: MessageLayout<SYS_STATUS_DATA, ([u32; 3], [u16; 2], i16, [u16; 6], i8, [u32; 3])> = MessageLayout::NEW;
 /// Fields: consumed charge and energy; temperature; cells; current; id, function, type; remaining charge; remaining
 /// time; charge state; further cells; mode; faults.
 type BatteryFields = (([i32; 2], i16, [u16; 10], i16), [u8; 3], i8, i32, u8, [u16; 4], u8, u32);
-const BATTERY: Layout<BATTERY_STATUS_DATA, BatteryFields> = Layout::NEW;
-const LANDED: Layout<EXTENDED_SYS_STATE_DATA, (u8, u8)> = Layout::NEW;
+const BATTERY: MessageLayout<BATTERY_STATUS_DATA, BatteryFields> = MessageLayout::NEW;
+const LANDED: MessageLayout<EXTENDED_SYS_STATE_DATA, (u8, u8)> = MessageLayout::NEW;
 /// Fields: time, six test ratios, two uncertainties, flags.
-const ESTIMATOR: Layout<ESTIMATOR_STATUS_DATA, (u64, [f32; 6], [f32; 2], u16)> = Layout::NEW;
-const OUTPUTS: Layout<ACTUATOR_OUTPUT_STATUS_DATA, (u64, u32, [f32; 8], [f32; 24])> = Layout::NEW;
+const ESTIMATOR: MessageLayout<ESTIMATOR_STATUS_DATA, (u64, [f32; 6], [f32; 2], u16)> = MessageLayout::NEW;
+const OUTPUTS: MessageLayout<ACTUATOR_OUTPUT_STATUS_DATA, (u64, u32, [f32; 8], [f32; 24])> = MessageLayout::NEW;
 /// Fields: capabilities, board id; software; versions of middleware, system, board; vendor, product; commits; long
 /// board id.
 type VersionFields = ([u64; 2], [u8; 4], [u32; 3], [u16; 2], [u8; 8], [u8; 16], [u8; 18]);
-const VERSION: Layout<AUTOPILOT_VERSION_DATA, VersionFields> = Layout::NEW;
+const VERSION: MessageLayout<AUTOPILOT_VERSION_DATA, VersionFields> = MessageLayout::NEW;
 /// Fields: version, minimum, maximum; hashes of specification and library.
-const PROTOCOL: Layout<PROTOCOL_VERSION_DATA, ([u16; 3], [u8; 16])> = Layout::NEW;
+const PROTOCOL: MessageLayout<PROTOCOL_VERSION_DATA, ([u16; 3], [u8; 16])> = MessageLayout::NEW;
 
 /// Values for a missing cell and an unknown temperature.
 const NO_CELL: u16 = u16::MAX;

@@ -1,7 +1,7 @@
 //! Location of a component's metadata: COMPONENT_METADATA, and the older COMPONENT_INFORMATION.
 
 use crate::message::PAYLOAD_MAX;
-use crate::wire::{Layout, Unused};
+use crate::wire::{MessageLayout, Unused};
 use mavlink::dialects::common::{COMPONENT_INFORMATION_DATA, COMPONENT_METADATA_DATA};
 
 /// Longest URI \[bytes\].
@@ -18,10 +18,10 @@ pub struct ComponentMetadata {
     pub uri: [u8; URI_MAX],
 }
 
-pub(super) const METADATA: Layout<COMPONENT_METADATA_DATA, ([u32; 2], [u8; URI_MAX])> = Layout::NEW;
+pub(super) const METADATA: MessageLayout<COMPONENT_METADATA_DATA, ([u32; 2], [u8; URI_MAX])> = MessageLayout::NEW;
 /// Fields: time, checksum, checksum of the peripherals' file; URI, URI of the peripherals' file.
-pub(super) const INFORMATION: Layout<COMPONENT_INFORMATION_DATA, ([u32; 3], [u8; URI_MAX], Unused<URI_MAX>)> =
-    Layout::NEW;
+pub(super) const INFORMATION: MessageLayout<COMPONENT_INFORMATION_DATA, ([u32; 3], [u8; URI_MAX], Unused<URI_MAX>)> =
+    MessageLayout::NEW;
 
 impl ComponentMetadata {
     /// Creates the message for a metadata file with a URI of up to 100 bytes.

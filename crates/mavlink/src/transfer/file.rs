@@ -2,7 +2,7 @@
 
 use crate::address::Address;
 use crate::message::PAYLOAD_MAX;
-use crate::wire::Layout;
+use crate::wire::MessageLayout;
 use mavlink::dialects::common::FILE_TRANSFER_PROTOCOL_DATA;
 
 /// Largest number of data bytes in a packet.
@@ -57,8 +57,10 @@ pub struct FilePacket {
 
 /// Fields: network, receiver, sequence number; session, opcode, size, requested opcode, "burst complete", padding;
 /// offset; data.
-pub(super) const LAYOUT: Layout<FILE_TRANSFER_PROTOCOL_DATA, (u8, Address, u16, [u8; 6], u32, [u8; FILE_DATA_MAX])> =
-    Layout::NEW;
+pub(super) const LAYOUT: MessageLayout<
+    FILE_TRANSFER_PROTOCOL_DATA,
+    (u8, Address, u16, [u8; 6], u32, [u8; FILE_DATA_MAX]),
+> = MessageLayout::NEW;
 
 impl FilePacket {
     /// Creates a request without data.

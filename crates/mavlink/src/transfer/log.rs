@@ -1,8 +1,8 @@
 //! Logs with their data: LOG_ENTRY and LOG_DATA.
 
 use crate::address::Address;
-use crate::message::{Fault, Message, MessageFormat, PAYLOAD_MAX};
-use crate::wire::Layout;
+use crate::message::{FrameFault, MessageFormat, MessageSet, PAYLOAD_MAX};
+use crate::wire::MessageLayout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{LOG_DATA_DATA, LOG_ENTRY_DATA};
 
@@ -38,8 +38,8 @@ pub struct LogData {
 }
 
 /// Fields: time, size; log id, number of logs, last log id.
-pub(super) const ENTRY: Layout<LOG_ENTRY_DATA, ([u32; 2], [u16; 3])> = Layout::NEW;
-pub(super) const DATA: Layout<LOG_DATA_DATA, (u32, u16, u8, [u8; LOG_DATA_MAX])> = Layout::NEW;
+pub(super) const ENTRY: MessageLayout<LOG_ENTRY_DATA, ([u32; 2], [u16; 3])> = MessageLayout::NEW;
+pub(super) const DATA: MessageLayout<LOG_DATA_DATA, (u32, u16, u8, [u8; LOG_DATA_MAX])> = MessageLayout::NEW;
 
 impl LogEntry {
     pub(super) fn read(payload: &[u8]) -> Self {
@@ -74,7 +74,7 @@ pub enum LogMessage {
     Data(LogData),
 }
 
-impl Message for LogMessage {
+impl MessageSet for LogMessage {
     fn format(id: u32) -> Option<MessageFormat> {
         match id {
             LOG_ENTRY_DATA::ID => Some(ENTRY.format()),
@@ -83,11 +83,11 @@ impl Message for LogMessage {
         }
     }
 
-    fn read(id: u32, payload: &[u8], _: Address) -> Result<Self, Fault> {
+    fn read(id: u32, payload: &[u8], _: Address) -> Result<Self, FrameFault> {
         match id {
             LOG_ENTRY_DATA::ID => Ok(LogMessage::Entry(LogEntry::read(payload))),
             LOG_DATA_DATA::ID => Ok(LogMessage::Data(LogData::read(payload))),
-            _ => Err(Fault::Unknown),
+            _ => Err(FrameFault::Unknown),
         }
     }
 

@@ -7,7 +7,7 @@ mod log;
 mod stream;
 
 use crate::address::Address;
-use crate::message::{Fault, Message, MessageFormat, PAYLOAD_MAX};
+use crate::message::{FrameFault, MessageFormat, MessageSet, PAYLOAD_MAX};
 pub use component::ComponentMetadata;
 pub use file::{FILE_DATA_MAX, FileOpcode, FilePacket};
 pub use log::{LOG_DATA_MAX, LogData, LogEntry, LogMessage};
@@ -39,7 +39,7 @@ pub enum Transfer {
     Information(ComponentMetadata),
 }
 
-impl Message for Transfer {
+impl MessageSet for Transfer {
     fn format(id: u32) -> Option<MessageFormat> {
         Some(match id {
             FILE_TRANSFER_PROTOCOL_DATA::ID => file::LAYOUT.format(),
@@ -52,7 +52,7 @@ impl Message for Transfer {
         })
     }
 
-    fn read(id: u32, payload: &[u8], receiver: Address) -> Result<Self, Fault> {
+    fn read(id: u32, payload: &[u8], receiver: Address) -> Result<Self, FrameFault> {
         Ok(match id {
             FILE_TRANSFER_PROTOCOL_DATA::ID => {
                 let (packet, to) = FilePacket::read(payload);
@@ -63,7 +63,7 @@ impl Message for Transfer {
             LOGGING_DATA_ACKED_DATA::ID => Transfer::LogPart(StreamedLog::read(payload, true)),
             COMPONENT_METADATA_DATA::ID => Transfer::Metadata(ComponentMetadata::read(payload)),
             COMPONENT_INFORMATION_DATA::ID => Transfer::Information(ComponentMetadata::read_information(payload)),
-            _ => return Err(Fault::Unknown),
+            _ => return Err(FrameFault::Unknown),
         })
     }
 

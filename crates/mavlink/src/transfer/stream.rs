@@ -2,7 +2,7 @@
 
 use crate::address::Address;
 use crate::message::PAYLOAD_MAX;
-use crate::wire::Layout;
+use crate::wire::MessageLayout;
 use mavlink::dialects::common::{LOGGING_DATA_ACKED_DATA, LOGGING_DATA_DATA};
 
 /// Largest number of bytes in one part of a streamed log.
@@ -28,9 +28,9 @@ pub struct StreamedLog {
 }
 
 /// Fields: sequence number; receiver, length, first record, data.
-type Fields = (u16, Address, u8, u8, [u8; STREAM_DATA_MAX]);
-pub(super) const SENT: Layout<LOGGING_DATA_DATA, Fields> = Layout::NEW;
-pub(super) const ACKED: Layout<LOGGING_DATA_ACKED_DATA, Fields> = Layout::NEW;
+type StreamedLogFields = (u16, Address, u8, u8, [u8; STREAM_DATA_MAX]);
+pub(super) const SENT: MessageLayout<LOGGING_DATA_DATA, StreamedLogFields> = MessageLayout::NEW;
+pub(super) const ACKED: MessageLayout<LOGGING_DATA_ACKED_DATA, StreamedLogFields> = MessageLayout::NEW;
 
 impl StreamedLog {
     pub(super) fn read(payload: &[u8], to_be_acknowledged: bool) -> Self {

@@ -4,7 +4,7 @@ use super::encoding::Kind;
 use super::reason::Reason;
 use crate::configuration::Configuration;
 use afbc_store::RecordName;
-use afbc_types::{Declaration, Declared, Range, Value, ValueMut};
+use afbc_types::{Declaration, Declared, DeclaredValue, DeclaredValueMut, Range};
 use core::convert::Infallible;
 
 /// A parameter: one number of a configuration.
@@ -79,8 +79,9 @@ impl Configuration {
     /// firmware image; a name does not.
     #[inline(never)]
     fn walk(&self, walk: &mut Walk) -> Result<(), Found> {
-        each_group!(self, |prefix, group| group
-            .visit(&mut |declaration: &Declaration, value: Value<'_>| { walk.value(prefix, declaration, value) }));
+        each_group!(self, |prefix, group| group.visit(&mut |declaration: &Declaration, value: DeclaredValue<'_>| {
+            walk.value(prefix, declaration, value)
+        }));
         Ok(())
     }
 
@@ -116,10 +117,10 @@ impl Configuration {
     #[inline(never)]
     fn write(&mut self, place: u16, value: f32, first: f32) -> Result<(), Found> {
         let mut left = usize::from(place);
-        let mut show = |_: &Declaration, at: ValueMut<'_>| {
+        let mut show = |_: &Declaration, at: DeclaredValueMut<'_>| {
             let length = match &at {
-                ValueMut::Single(numbers) => numbers.len(),
-                ValueMut::Double(numbers) => numbers.len(),
+                DeclaredValueMut::Single(numbers) => numbers.len(),
+                DeclaredValueMut::Double(numbers) => numbers.len(),
                 _ => 1,
             };
             if left >= length {
@@ -127,14 +128,16 @@ impl Configuration {
                 return Ok(());
             }
             match at {
-                ValueMut::Single(numbers) => numbers.get_mut(left).into_iter().for_each(|number| *number = value),
-                ValueMut::Double(numbers) => {
+                DeclaredValueMut::Single(numbers) => {
+                    numbers.get_mut(left).into_iter().for_each(|number| *number = value)
+                }
+                DeclaredValueMut::Double(numbers) => {
                     numbers.get_mut(left).into_iter().for_each(|number| *number = value.into())
                 }
-                ValueMut::Whole(number) => *number = value as u32,
-                ValueMut::Switch(switch) => *switch = value != 0.0,
+                DeclaredValueMut::Whole(number) => *number = value as u32,
+                DeclaredValueMut::Switch(switch) => *switch = value != 0.0,
                 // Not negative: `put` has checked the range, which begins at `first`.
-                ValueMut::Choice(index, _) => *index = (value - first) as usize,
+                DeclaredValueMut::Choice(index, _) => *index = (value - first) as usize,
             }
             Err(Found)
         };
@@ -147,13 +150,13 @@ impl Configuration {
     /// Shows the declaration of every parameter in the order of the list, with the words of a choice. A vector's
     /// declaration is shown three times. Used to describe parameters to stations; no firmware image needs it.
     pub(crate) fn show_declarations(&self, show: &mut dyn FnMut(&Declaration, &'static [&'static str])) {
-        let mut visit = |declaration: &Declaration, value: Value<'_>| {
+        let mut visit = |declaration: &Declaration, value: DeclaredValue<'_>| {
             let (length, words): (_, &'static [&'static str]) = match value {
-                Value::Single(numbers) => (numbers.len(), &[]),
-                Value::Double(numbers) => (numbers.len(), &[]),
-                Value::Choice(_, words) => (1, words),
-                Value::Whole(_) => (1, &[]),
-                Value::Switch(_) => (1, &["off", "on"]),
+                DeclaredValue::Single(numbers) => (numbers.len(), &[]),
+                DeclaredValue::Double(numbers) => (numbers.len(), &[]),
+                DeclaredValue::Choice(_, words) => (1, words),
+                DeclaredValue::Whole(_) => (1, &[]),
+                DeclaredValue::Switch(_) => (1, &["off", "on"]),
             };
             (0..length).for_each(|_| show(declaration, words));
             Ok::<(), Infallible>(())
@@ -169,11 +172,16 @@ impl Configuration {
 impl Walk {
     /// Passes one number, or the three numbers of a vector.
     #[inline(never)]
-    fn value(&mut self, prefix: &'static str, declaration: &Declaration, value: Value<'_>) -> Result<(), Found> {
+    fn value(
+        &mut self,
+        prefix: &'static str,
+        declaration: &Declaration,
+        value: DeclaredValue<'_>,
+    ) -> Result<(), Found> {
         let length = match value {
-            Value::Single(numbers) => numbers.len(),
-            Value::Double(numbers) => numbers.len(),
-            Value::Whole(_) | Value::Switch(_) | Value::Choice(..) => 1,
+            DeclaredValue::Single(numbers) => numbers.len(),
+            DeclaredValue::Double(numbers) => numbers.len(),
+            DeclaredValue::Whole(_) | DeclaredValue::Switch(_) | DeclaredValue::Choice(..) => 1,
         };
         // Skips parameters before the wanted index without building their names, which would take half a millisecond
         // per parameter on a board.
@@ -191,12 +199,14 @@ impl Walk {
             self.passed += 1;
             if self.key == Key::Name(name) || self.key == Key::Place(place) {
                 let (kind, value) = match value {
-                    Value::Single(numbers) => (Kind::Real32, numbers.get(index).copied().unwrap_or_default()),
-                    Value::Double(numbers) => (Kind::Real32, numbers.get(index).copied().unwrap_or_default() as f32),
+                    DeclaredValue::Single(numbers) => (Kind::Real32, numbers.get(index).copied().unwrap_or_default()),
+                    DeclaredValue::Double(numbers) => {
+                        (Kind::Real32, numbers.get(index).copied().unwrap_or_default() as f32)
+                    }
                     // All whole numbers are below 2^24 and exact as `f32`.
-                    Value::Whole(number) => (Kind::Int32, number as f32),
-                    Value::Switch(switch) => (Kind::Int32, f32::from(u8::from(switch))),
-                    Value::Choice(index, _) => (Kind::Int32, declaration.range.min as f32 + index as f32),
+                    DeclaredValue::Whole(number) => (Kind::Int32, number as f32),
+                    DeclaredValue::Switch(switch) => (Kind::Int32, f32::from(u8::from(switch))),
+                    DeclaredValue::Choice(index, _) => (Kind::Int32, declaration.range.min as f32 + index as f32),
                 };
                 self.found = Some(Parameter { name, place, kind, value, range: declaration.range });
                 return Err(Found);

@@ -1,6 +1,6 @@
 //! Computes times on the buses of sensors and motors.
 
-use afbc_drivers::{SensorPart, Step};
+use afbc_drivers::{ScriptStep, SensorPart};
 use afbc_flight_core::dshot::DshotRate;
 
 /// Bits of a DSHOT frame, plus one without a pulse at the end.
@@ -81,15 +81,15 @@ pub(super) fn script<P: SensorPart>(wire: Wire) -> Script {
     };
     for step in P::CYCLE {
         match *step {
-            Step::Read(_, length) => add(length as u64, true),
-            Step::Identify(..) | Step::Await(..) => add(1, true),
-            Step::Set(..) | Step::Write(..) => add(1, false),
-            Step::SetLike(..) => {
+            ScriptStep::Read(_, length) => add(length as u64, true),
+            ScriptStep::Identify(..) | ScriptStep::Await(..) => add(1, true),
+            ScriptStep::Set(..) | ScriptStep::Write(..) => add(1, false),
+            ScriptStep::SetLike(..) => {
                 add(1, true);
                 add(1, false);
             }
-            Step::WriteAll(_, bytes) => add(bytes.len() as u64, false),
-            Step::Wait(_) | Step::Ready(_) => (),
+            ScriptStep::WriteAll(_, bytes) => add(bytes.len() as u64, false),
+            ScriptStep::Wait(_) | ScriptStep::Ready(_) => (),
         }
     }
     add(1, true);

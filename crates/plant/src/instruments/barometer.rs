@@ -1,8 +1,8 @@
 //! Barometer in simulation: noise, offset, drift, propeller wash, delay.
 
-use super::markov::Markov;
-use super::schedule::{Clock, Transit};
-use crate::noise::{Noise, Stream};
+use super::markov::GaussMarkov;
+use super::schedule::{LatencyQueue, SampleClock};
+use crate::noise::{Noise, NoiseStream};
 use crate::truth::Truth;
 use afbc_types::parameters;
 use alloc::vec::Vec;
@@ -14,7 +14,7 @@ parameters! {
     /// immediate.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-    pub struct Barometer {
+    pub struct BarometerModel {
         /// Measurements per second.
         #[parameter(RATE, "Hz", 0.1..=1000.0)]
         pub rate_hz: f64 = 50.0,
@@ -48,7 +48,7 @@ parameters! {
 
 /// Measured height above the origin of the earth frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HeightFix {
+pub struct BarometerReading {
     /// Time of the measurement \[s\].
     pub true_at_s: f64,
     /// Height \[m\].
@@ -57,27 +57,27 @@ pub struct HeightFix {
 
 /// Barometer in simulation.
 #[derive(Clone, Debug)]
-pub(super) struct Pressure {
-    barometer: Barometer,
-    clock: Clock,
+pub(super) struct SimulatedBarometer {
+    barometer: BarometerModel,
+    clock: SampleClock,
     random: Noise,
     offset_m: f64,
-    drift: Markov,
-    transit: Transit<HeightFix>,
+    drift: GaussMarkov,
+    transit: LatencyQueue<BarometerReading>,
 }
 
-impl Pressure {
-    pub(super) fn new(barometer: &Barometer, seed: u64, step_s: f64) -> Self {
-        let mut random = Noise::new(seed, Stream::Barometer);
+impl SimulatedBarometer {
+    pub(super) fn new(barometer: &BarometerModel, seed: u64, step_s: f64) -> Self {
+        let mut random = Noise::new(seed, NoiseStream::Barometer);
         // The drift advances once per measurement, and there is at most one measurement per step.
         let period_s = (1.0 / barometer.rate_hz).max(step_s);
-        Pressure {
+        SimulatedBarometer {
             barometer: *barometer,
-            clock: Clock::new(barometer.rate_hz, step_s),
+            clock: SampleClock::new(barometer.rate_hz, step_s),
             offset_m: random.normal() * barometer.offset_m,
-            drift: Markov::new(Vector3::z() * barometer.drift_m, barometer.drift_time_s, period_s, &mut random),
+            drift: GaussMarkov::new(Vector3::z() * barometer.drift_m, barometer.drift_time_s, period_s, &mut random),
             random,
-            transit: Transit::new(),
+            transit: LatencyQueue::new(),
         }
     }
 
@@ -85,10 +85,10 @@ impl Pressure {
     pub(super) fn measure(
         &mut self,
         truth: &Truth,
-        spoil: impl FnOnce(HeightFix) -> Option<HeightFix>,
-    ) -> Vec<HeightFix> {
+        spoil: impl FnOnce(BarometerReading) -> Option<BarometerReading>,
+    ) -> Vec<BarometerReading> {
         if self.clock.ticks() {
-            let fix = HeightFix { true_at_s: truth.time_s, height_m: self.height_m(truth) };
+            let fix = BarometerReading { true_at_s: truth.time_s, height_m: self.height_m(truth) };
             let arrives_s = truth.time_s + self.barometer.delay_s;
             spoil(fix).into_iter().for_each(|fix| self.transit.send(arrives_s, fix));
         }
@@ -96,7 +96,7 @@ impl Pressure {
     }
 
     fn height_m(&mut self, truth: &Truth) -> f64 {
-        let Barometer { noise_m, wash_m, wash_height_m, lsb_m, .. } = self.barometer;
+        let BarometerModel { noise_m, wash_m, wash_height_m, lsb_m, .. } = self.barometer;
         self.drift.advance(&mut self.random);
         let height = truth.position_m.z;
         let wash = wash_m * truth.thrust_share * exp(-height.max(0.0) / wash_height_m);

@@ -1,12 +1,12 @@
 //! Failures of instruments. A failure affects measurements taken while it lasts; measurements under way still arrive.
 
-use super::barometer::HeightFix;
+use super::barometer::BarometerReading;
 use super::gnss::GnssFix;
 use super::imu::ImuReading;
-use super::magnetometer::FieldFix;
+use super::magnetometer::MagnetometerReading;
 use super::markov::draw;
 use super::tracker::TrackerFix;
-use crate::noise::{Noise, Stream};
+use crate::noise::{Noise, NoiseStream};
 use afbc_types::{OutOfRange, Range};
 use alloc::vec::Vec;
 use libm::{cos, exp, sin, sqrt};
@@ -15,7 +15,7 @@ use nalgebra::{Quaternion, Vector3};
 /// Kind of failure of an instrument.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub enum Failure {
+pub enum FailureKind {
     /// The IMU repeats the last sample before the onset.
     ImuStuck,
     /// The IMU sends nothing.
@@ -84,73 +84,74 @@ pub enum Failure {
     },
 }
 
-impl Failure {
+impl FailureKind {
     /// One failure of each kind, with its numbers zero.
-    pub const ALL: [Failure; 17] = {
+    pub const ALL: [FailureKind; 17] = {
         let zero = Vector3::new(0.0, 0.0, 0.0);
         [
-            Failure::ImuStuck,
-            Failure::ImuDead,
-            Failure::ImuNoisy { rates_rad_s: 0.0, specific_force_m_s2: 0.0 },
-            Failure::ImuClipped { rates_rad_s: 0.0, specific_force_m_s2: 0.0 },
-            Failure::ImuBiased { rates_bias_rad_s: zero, force_bias_m_s2: zero },
-            Failure::TrackerLost,
-            Failure::TrackerFrozen,
-            Failure::TrackerJumped { by_m: zero, yaw_rad: 0.0 },
-            Failure::GnssLost,
-            Failure::GnssJumped { by_m: zero },
-            Failure::GnssMultipath { deviation_m: 0.0, correlation_time_s: 1.0 },
-            Failure::BarometerLost,
-            Failure::BarometerStuck,
-            Failure::BarometerBlocked,
-            Failure::MagnetometerLost,
-            Failure::MagnetometerStuck,
-            Failure::MagnetometerDisturbed { field_ut: zero },
+            FailureKind::ImuStuck,
+            FailureKind::ImuDead,
+            FailureKind::ImuNoisy { rates_rad_s: 0.0, specific_force_m_s2: 0.0 },
+            FailureKind::ImuClipped { rates_rad_s: 0.0, specific_force_m_s2: 0.0 },
+            FailureKind::ImuBiased { rates_bias_rad_s: zero, force_bias_m_s2: zero },
+            FailureKind::TrackerLost,
+            FailureKind::TrackerFrozen,
+            FailureKind::TrackerJumped { by_m: zero, yaw_rad: 0.0 },
+            FailureKind::GnssLost,
+            FailureKind::GnssJumped { by_m: zero },
+            FailureKind::GnssMultipath { deviation_m: 0.0, correlation_time_s: 1.0 },
+            FailureKind::BarometerLost,
+            FailureKind::BarometerStuck,
+            FailureKind::BarometerBlocked,
+            FailureKind::MagnetometerLost,
+            FailureKind::MagnetometerStuck,
+            FailureKind::MagnetometerDisturbed { field_ut: zero },
         ]
     };
 
     /// Returns the name used in scenario files: the instrument and the kind of failure.
     pub const fn name(self) -> &'static str {
         match self {
-            Failure::ImuStuck => "imu-stuck",
-            Failure::ImuDead => "imu-dead",
-            Failure::ImuNoisy { .. } => "imu-noisy",
-            Failure::ImuClipped { .. } => "imu-clipped",
-            Failure::ImuBiased { .. } => "imu-biased",
-            Failure::TrackerLost => "tracker-lost",
-            Failure::TrackerFrozen => "tracker-frozen",
-            Failure::TrackerJumped { .. } => "tracker-jumped",
-            Failure::GnssLost => "gnss-lost",
-            Failure::GnssJumped { .. } => "gnss-jumped",
-            Failure::GnssMultipath { .. } => "gnss-multipath",
-            Failure::BarometerLost => "barometer-lost",
-            Failure::BarometerStuck => "barometer-stuck",
-            Failure::BarometerBlocked => "barometer-blocked",
-            Failure::MagnetometerLost => "magnetometer-lost",
-            Failure::MagnetometerStuck => "magnetometer-stuck",
-            Failure::MagnetometerDisturbed { .. } => "magnetometer-disturbed",
+            FailureKind::ImuStuck => "imu-stuck",
+            FailureKind::ImuDead => "imu-dead",
+            FailureKind::ImuNoisy { .. } => "imu-noisy",
+            FailureKind::ImuClipped { .. } => "imu-clipped",
+            FailureKind::ImuBiased { .. } => "imu-biased",
+            FailureKind::TrackerLost => "tracker-lost",
+            FailureKind::TrackerFrozen => "tracker-frozen",
+            FailureKind::TrackerJumped { .. } => "tracker-jumped",
+            FailureKind::GnssLost => "gnss-lost",
+            FailureKind::GnssJumped { .. } => "gnss-jumped",
+            FailureKind::GnssMultipath { .. } => "gnss-multipath",
+            FailureKind::BarometerLost => "barometer-lost",
+            FailureKind::BarometerStuck => "barometer-stuck",
+            FailureKind::BarometerBlocked => "barometer-blocked",
+            FailureKind::MagnetometerLost => "magnetometer-lost",
+            FailureKind::MagnetometerStuck => "magnetometer-stuck",
+            FailureKind::MagnetometerDisturbed { .. } => "magnetometer-disturbed",
         }
     }
 
     /// Returns the failure scaled by `share`, `None` for a failure without a size.
     pub fn scaled(self, share: f64) -> Option<Self> {
         Some(match self {
-            Failure::ImuNoisy { rates_rad_s, specific_force_m_s2 } => {
-                Failure::ImuNoisy { rates_rad_s: rates_rad_s * share, specific_force_m_s2: specific_force_m_s2 * share }
-            }
-            Failure::ImuBiased { rates_bias_rad_s, force_bias_m_s2 } => Failure::ImuBiased {
+            FailureKind::ImuNoisy { rates_rad_s, specific_force_m_s2 } => FailureKind::ImuNoisy {
+                rates_rad_s: rates_rad_s * share,
+                specific_force_m_s2: specific_force_m_s2 * share,
+            },
+            FailureKind::ImuBiased { rates_bias_rad_s, force_bias_m_s2 } => FailureKind::ImuBiased {
                 rates_bias_rad_s: rates_bias_rad_s * share,
                 force_bias_m_s2: force_bias_m_s2 * share,
             },
-            Failure::TrackerJumped { by_m, yaw_rad } => {
-                Failure::TrackerJumped { by_m: by_m * share, yaw_rad: yaw_rad * share }
+            FailureKind::TrackerJumped { by_m, yaw_rad } => {
+                FailureKind::TrackerJumped { by_m: by_m * share, yaw_rad: yaw_rad * share }
             }
-            Failure::GnssJumped { by_m } => Failure::GnssJumped { by_m: by_m * share },
-            Failure::GnssMultipath { deviation_m, correlation_time_s } => {
-                Failure::GnssMultipath { deviation_m: deviation_m * share, correlation_time_s }
+            FailureKind::GnssJumped { by_m } => FailureKind::GnssJumped { by_m: by_m * share },
+            FailureKind::GnssMultipath { deviation_m, correlation_time_s } => {
+                FailureKind::GnssMultipath { deviation_m: deviation_m * share, correlation_time_s }
             }
-            Failure::MagnetometerDisturbed { field_ut } => {
-                Failure::MagnetometerDisturbed { field_ut: field_ut * share }
+            FailureKind::MagnetometerDisturbed { field_ut } => {
+                FailureKind::MagnetometerDisturbed { field_ut: field_ut * share }
             }
             _ => return None,
         })
@@ -162,7 +163,7 @@ impl Failure {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct InstrumentFault {
     /// Kind of failure.
-    pub failure: Failure,
+    pub failure: FailureKind,
     /// Onset \[s\].
     pub start_s: f64,
     /// End \[s\], infinite for a permanent failure.
@@ -190,7 +191,7 @@ pub mod limits {
 
 impl InstrumentFault {
     /// Returns the failure at `now_s`, scaled while it grows.
-    fn at(&self, now_s: f64) -> Failure {
+    fn at(&self, now_s: f64) -> FailureKind {
         if now_s >= self.start_s + self.rise_s {
             return self.failure;
         }
@@ -205,25 +206,25 @@ impl InstrumentFault {
         limits::RISE.check(self.rise_s)?;
         let each = |range: Range, vector: &Vector3<f64>| vector.iter().try_for_each(|&number| range.check(number));
         match &self.failure {
-            Failure::ImuNoisy { rates_rad_s, specific_force_m_s2 }
-            | Failure::ImuClipped { rates_rad_s, specific_force_m_s2 } => {
+            FailureKind::ImuNoisy { rates_rad_s, specific_force_m_s2 }
+            | FailureKind::ImuClipped { rates_rad_s, specific_force_m_s2 } => {
                 limits::RATES.check(*rates_rad_s)?;
                 limits::FORCE.check(*specific_force_m_s2)
             }
-            Failure::ImuBiased { rates_bias_rad_s, force_bias_m_s2 } => {
+            FailureKind::ImuBiased { rates_bias_rad_s, force_bias_m_s2 } => {
                 each(limits::RATES_BIAS, rates_bias_rad_s)?;
                 each(limits::FORCE_BIAS, force_bias_m_s2)
             }
-            Failure::TrackerJumped { by_m, yaw_rad } => {
+            FailureKind::TrackerJumped { by_m, yaw_rad } => {
                 each(limits::JUMP, by_m)?;
                 limits::YAW.check(*yaw_rad)
             }
-            Failure::GnssJumped { by_m } => each(limits::JUMP, by_m),
-            Failure::GnssMultipath { deviation_m, correlation_time_s } => {
+            FailureKind::GnssJumped { by_m } => each(limits::JUMP, by_m),
+            FailureKind::GnssMultipath { deviation_m, correlation_time_s } => {
                 limits::DEVIATION.check(*deviation_m)?;
                 limits::CORRELATION.check(*correlation_time_s)
             }
-            Failure::MagnetometerDisturbed { field_ut } => each(limits::FIELD, field_ut),
+            FailureKind::MagnetometerDisturbed { field_ut } => each(limits::FIELD, field_ut),
             _ => Ok(()),
         }
     }
@@ -231,38 +232,38 @@ impl InstrumentFault {
 
 /// Readings from before the onset, and the present value of a wandering error.
 #[derive(Clone, Copy, Debug, Default)]
-struct Held {
+struct FailureMemory {
     imu: Option<ImuReading>,
     tracker: Option<TrackerFix>,
-    height: Option<HeightFix>,
+    height: Option<BarometerReading>,
     true_height_m: Option<f64>,
-    field: Option<FieldFix>,
+    field: Option<MagnetometerReading>,
     /// Wandering error in standard deviations, and its time \[s\].
     wander: Option<(Vector3<f64>, f64)>,
 }
 
 /// Failures of a flight, applied one after the other in the listed order.
 #[derive(Clone, Debug)]
-pub(super) struct Failures {
-    faults: Vec<(InstrumentFault, Held)>,
+pub(super) struct SimulatedFailures {
+    faults: Vec<(InstrumentFault, FailureMemory)>,
     /// Last reading of each instrument.
-    last: Held,
+    last: FailureMemory,
     random: Noise,
 }
 
 /// Tolerance when comparing times, far below any step \[s\].
 const TIME_SLACK_S: f64 = 1e-9;
 
-impl Failures {
+impl SimulatedFailures {
     pub(super) fn new(faults: &[InstrumentFault], seed: u64) -> Self {
-        let faults = faults.iter().map(|fault| (*fault, Held::default())).collect();
-        Failures { faults, last: Held::default(), random: Noise::new(seed, Stream::Failures) }
+        let faults = faults.iter().map(|fault| (*fault, FailureMemory::default())).collect();
+        SimulatedFailures { faults, last: FailureMemory::default(), random: Noise::new(seed, NoiseStream::Failures) }
     }
 
     /// Adds a failure, and forgets failures that end before it begins.
     pub(super) fn add(&mut self, fault: InstrumentFault) {
         self.faults.retain(|(earlier, _)| earlier.end_s > fault.start_s);
-        self.faults.push((fault, Held::default()));
+        self.faults.push((fault, FailureMemory::default()));
     }
 
     pub(super) fn end(&mut self) {
@@ -270,7 +271,10 @@ impl Failures {
     }
 
     /// Returns the failures active at `now_s`, each with its stored readings.
-    fn active(faults: &mut [(InstrumentFault, Held)], now_s: f64) -> impl Iterator<Item = (Failure, &mut Held)> {
+    fn active(
+        faults: &mut [(InstrumentFault, FailureMemory)],
+        now_s: f64,
+    ) -> impl Iterator<Item = (FailureKind, &mut FailureMemory)> {
         let now_s = now_s + TIME_SLACK_S;
         let active = faults.iter_mut().filter(move |(fault, _)| (fault.start_s..fault.end_s).contains(&now_s));
         active.map(move |(fault, held)| (fault.at(now_s), held))
@@ -282,17 +286,17 @@ impl Failures {
         for (failure, held) in Self::active(&mut self.faults, seen.at_s) {
             let ImuReading { at_s, rates_rad_s: rates, specific_force_m_s2: force } = &mut seen;
             match failure {
-                Failure::ImuStuck => seen = ImuReading { at_s: *at_s, ..*held.imu.get_or_insert(before) },
-                Failure::ImuDead => alive = false,
-                Failure::ImuNoisy { rates_rad_s, specific_force_m_s2 } => {
+                FailureKind::ImuStuck => seen = ImuReading { at_s: *at_s, ..*held.imu.get_or_insert(before) },
+                FailureKind::ImuDead => alive = false,
+                FailureKind::ImuNoisy { rates_rad_s, specific_force_m_s2 } => {
                     *rates += draw(&mut self.random) * rates_rad_s;
                     *force += draw(&mut self.random) * specific_force_m_s2;
                 }
-                Failure::ImuClipped { rates_rad_s, specific_force_m_s2 } => {
+                FailureKind::ImuClipped { rates_rad_s, specific_force_m_s2 } => {
                     *rates = rates.map(|rate| rate.clamp(-rates_rad_s, rates_rad_s));
                     *force = force.map(|force| force.clamp(-specific_force_m_s2, specific_force_m_s2));
                 }
-                Failure::ImuBiased { rates_bias_rad_s, force_bias_m_s2 } => {
+                FailureKind::ImuBiased { rates_bias_rad_s, force_bias_m_s2 } => {
                     (*rates, *force) = (*rates + rates_bias_rad_s, *force + force_bias_m_s2);
                 }
                 _ => {}
@@ -309,11 +313,11 @@ impl Failures {
         // By the true time: an error of the stamp must not shift the failure.
         for (failure, held) in Self::active(&mut self.faults, now_s) {
             match failure {
-                Failure::TrackerLost => alive = false,
-                Failure::TrackerFrozen => {
+                FailureKind::TrackerLost => alive = false,
+                FailureKind::TrackerFrozen => {
                     seen = TrackerFix { true_at_s: seen.true_at_s, ..*held.tracker.get_or_insert(before) };
                 }
-                Failure::TrackerJumped { by_m, yaw_rad } => {
+                FailureKind::TrackerJumped { by_m, yaw_rad } => {
                     let (c, s) = (cos(yaw_rad), sin(yaw_rad));
                     let [[x, y, z]] = seen.position_m.data.0;
                     seen.position_m = by_m + Vector3::new(c * x - s * y, s * x + c * y, z);
@@ -332,9 +336,9 @@ impl Failures {
         // By the true time, as for the tracker.
         for (failure, held) in Self::active(&mut self.faults, now_s) {
             match failure {
-                Failure::GnssLost => alive = false,
-                Failure::GnssJumped { by_m } => seen.position_m += by_m,
-                Failure::GnssMultipath { deviation_m, correlation_time_s } => {
+                FailureKind::GnssLost => alive = false,
+                FailureKind::GnssJumped { by_m } => seen.position_m += by_m,
+                FailureKind::GnssMultipath { deviation_m, correlation_time_s } => {
                     let drawn = draw(&mut self.random);
                     let off = held.wander.map_or(drawn, |(off, since_s)| {
                         let kept = exp((since_s - now_s) / correlation_time_s);
@@ -350,14 +354,14 @@ impl Failures {
     }
 
     /// Applies the failures to a height. `true_height_m` is the height without any error.
-    pub(super) fn barometer(&mut self, true_height_m: f64, mut seen: HeightFix) -> Option<HeightFix> {
+    pub(super) fn barometer(&mut self, true_height_m: f64, mut seen: BarometerReading) -> Option<BarometerReading> {
         let before = *self.last.height.get_or_insert(seen);
         let mut alive = true;
         for (failure, held) in Self::active(&mut self.faults, seen.true_at_s) {
             match failure {
-                Failure::BarometerLost => alive = false,
-                Failure::BarometerStuck => seen.height_m = held.height.get_or_insert(before).height_m,
-                Failure::BarometerBlocked => {
+                FailureKind::BarometerLost => alive = false,
+                FailureKind::BarometerStuck => seen.height_m = held.height.get_or_insert(before).height_m,
+                FailureKind::BarometerBlocked => {
                     seen.height_m += *held.true_height_m.get_or_insert(true_height_m) - true_height_m;
                 }
                 _ => {}
@@ -367,14 +371,14 @@ impl Failures {
         alive.then_some(seen)
     }
 
-    pub(super) fn magnetometer(&mut self, mut seen: FieldFix) -> Option<FieldFix> {
+    pub(super) fn magnetometer(&mut self, mut seen: MagnetometerReading) -> Option<MagnetometerReading> {
         let before = *self.last.field.get_or_insert(seen);
         let mut alive = true;
         for (failure, held) in Self::active(&mut self.faults, seen.true_at_s) {
             match failure {
-                Failure::MagnetometerLost => alive = false,
-                Failure::MagnetometerStuck => seen.field_ut = held.field.get_or_insert(before).field_ut,
-                Failure::MagnetometerDisturbed { field_ut } => seen.field_ut += field_ut,
+                FailureKind::MagnetometerLost => alive = false,
+                FailureKind::MagnetometerStuck => seen.field_ut = held.field.get_or_insert(before).field_ut,
+                FailureKind::MagnetometerDisturbed { field_ut } => seen.field_ut += field_ut,
                 _ => {}
             }
         }

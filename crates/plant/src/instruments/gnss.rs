@@ -1,9 +1,9 @@
 //! GNSS receiver in simulation: noise, slow error, delay, losses.
 
-use super::markov::{Markov, draw};
-use super::schedule::{Clock, Transit};
-use crate::dropouts::{Dropouts, Outage};
-use crate::noise::{Noise, Stream};
+use super::markov::{GaussMarkov, draw};
+use super::schedule::{LatencyQueue, SampleClock};
+use crate::dropouts::{MeasurementDropouts, SimulatedDropouts};
+use crate::noise::{Noise, NoiseStream};
 use crate::truth::Truth;
 use afbc_types::parameters;
 use alloc::vec::Vec;
@@ -14,7 +14,7 @@ parameters! {
     /// Properties of a GNSS receiver, which measures in the earth frame. The default is perfect and immediate.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-    pub struct Gnss {
+    pub struct GnssModel {
         /// Fixes per second.
         #[parameter(RATE, "Hz", 0.1..=1000.0)]
         pub rate_hz: f64 = 10.0,
@@ -48,7 +48,7 @@ parameters! {
         pub reported: f64 = 1.0,
         /// Intervals without fixes.
         #[group("loss")]
-        pub loss: Dropouts = Dropouts::DEFAULT,
+        pub loss: MeasurementDropouts = MeasurementDropouts::DEFAULT,
     }
 }
 
@@ -71,28 +71,28 @@ pub struct GnssFix {
 
 /// GNSS receiver in simulation.
 #[derive(Clone, Debug)]
-pub(super) struct Receiver {
-    gnss: Gnss,
-    clock: Clock,
+pub(super) struct SimulatedGnssReceiver {
+    gnss: GnssModel,
+    clock: SampleClock,
     random: Noise,
-    slow: Markov,
-    loss: Outage,
-    transit: Transit<GnssFix>,
+    slow: GaussMarkov,
+    loss: SimulatedDropouts,
+    transit: LatencyQueue<GnssFix>,
 }
 
-impl Receiver {
-    pub(super) fn new(gnss: &Gnss, seed: u64, step_s: f64) -> Self {
-        let mut random = Noise::new(seed, Stream::Gnss);
+impl SimulatedGnssReceiver {
+    pub(super) fn new(gnss: &GnssModel, seed: u64, step_s: f64) -> Self {
+        let mut random = Noise::new(seed, NoiseStream::Gnss);
         let slow = Vector3::new(gnss.horizontal_m, gnss.horizontal_m, gnss.vertical_m);
         // The slow error advances once per fix.
         let period_s = (1.0 / gnss.rate_hz).max(step_s);
-        Receiver {
+        SimulatedGnssReceiver {
             gnss: *gnss,
-            clock: Clock::new(gnss.rate_hz, step_s),
-            slow: Markov::new(slow, gnss.correlation_time_s, period_s, &mut random),
+            clock: SampleClock::new(gnss.rate_hz, step_s),
+            slow: GaussMarkov::new(slow, gnss.correlation_time_s, period_s, &mut random),
             random,
-            loss: Outage::new(&gnss.loss, Noise::new(seed, Stream::GnssLoss), step_s),
-            transit: Transit::new(),
+            loss: SimulatedDropouts::new(&gnss.loss, Noise::new(seed, NoiseStream::GnssLoss), step_s),
+            transit: LatencyQueue::new(),
         }
     }
 
@@ -109,7 +109,7 @@ impl Receiver {
 
     /// Returns the fix of this step and its arrival time. Draws the same random numbers for any settings.
     fn take(&mut self, truth: &Truth) -> (GnssFix, f64) {
-        let Gnss { horizontal_m, vertical_m, noise_m, velocity_m_s, reported, .. } = self.gnss;
+        let GnssModel { horizontal_m, vertical_m, noise_m, velocity_m_s, reported, .. } = self.gnss;
         self.slow.advance(&mut self.random);
         let sigma = |slow: f64| reported * sqrt(slow * slow + noise_m * noise_m);
         let fix = GnssFix {

@@ -1,9 +1,9 @@
 //! Inertial measurement unit in simulation: gyroscope and accelerometer.
 
-use super::mounting::Mounted;
-use super::triad::{Quality, Triad};
-use super::vibration::Vibration;
-use crate::noise::{Noise, Stream};
+use super::mounting::MountedSensor;
+use super::triad::{SimulatedTriad, TriadErrors};
+use super::vibration::SimulatedVibration;
+use crate::noise::{Noise, NoiseStream};
 use crate::truth::Truth;
 use afbc_types::{Mounting, parameters};
 use nalgebra::Vector3;
@@ -12,7 +12,7 @@ parameters! {
     /// Properties of a gyroscope. The default is perfect.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-    pub struct Gyroscope {
+    pub struct GyroscopeModel {
         /// One-sided density of white noise, as in data sheets: its standard deviation in a sample is this times the
         /// root of half the sampling rate, before the filter.
         #[parameter(NOISE, "rad/s/rtHz", 0.0..=0.1)]
@@ -55,7 +55,7 @@ parameters! {
     /// Properties of an accelerometer. The default is perfect.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-    pub struct Accelerometer {
+    pub struct AccelerometerModel {
         /// One-sided density of white noise, as in data sheets: its standard deviation in a sample is this times the
         /// root of half the sampling rate, before the filter.
         #[parameter(NOISE, "m/s2/rtHz", 0.0..=1.0)]
@@ -98,13 +98,13 @@ parameters! {
     /// Properties of an inertial measurement unit, which is read in every step. The default is perfect.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-    pub struct Imu {
+    pub struct ImuModel {
         /// Gyroscope.
         #[group("gyro")]
-        pub gyro: Gyroscope = Gyroscope::DEFAULT,
+        pub gyro: GyroscopeModel = GyroscopeModel::DEFAULT,
         /// Accelerometer.
         #[group("accel")]
-        pub accel: Accelerometer = Accelerometer::DEFAULT,
+        pub accel: AccelerometerModel = AccelerometerModel::DEFAULT,
         /// Amplitudes of the vibration at one, two and three times a rotor's frequency, relative to the first.
         #[parameter(HARMONICS, "1", 0.0..=10.0)]
         pub harmonics: Vector3<f64> = Vector3::new(1.0, 0.5, 0.25),
@@ -139,9 +139,9 @@ pub struct ImuBias {
     pub specific_force_m_s2: Vector3<f64>,
 }
 
-impl Gyroscope {
-    fn quality(&self) -> Quality {
-        Quality {
+impl GyroscopeModel {
+    fn quality(&self) -> TriadErrors {
+        TriadErrors {
             noise: self.noise_rad_s_rthz,
             instability: self.instability_rad_s,
             instability_s: self.instability_time_s,
@@ -156,9 +156,9 @@ impl Gyroscope {
     }
 }
 
-impl Accelerometer {
-    fn quality(&self) -> Quality {
-        Quality {
+impl AccelerometerModel {
+    fn quality(&self) -> TriadErrors {
+        TriadErrors {
             noise: self.noise_m_s2_rthz,
             instability: self.instability_m_s2,
             instability_s: self.instability_time_s,
@@ -175,23 +175,23 @@ impl Accelerometer {
 
 /// IMU in simulation.
 #[derive(Clone, Debug)]
-pub(super) struct Inertial {
-    mounted: Mounted,
-    gyro: Triad,
-    accel: Triad,
-    vibration: Vibration,
+pub(super) struct SimulatedImu {
+    mounted: MountedSensor,
+    gyro: SimulatedTriad,
+    accel: SimulatedTriad,
+    vibration: SimulatedVibration,
     random: Noise,
 }
 
-impl Inertial {
-    pub(super) fn new(imu: &Imu, seed: u64, step_s: f64) -> Self {
-        let mut random = Noise::new(seed, Stream::Imu);
+impl SimulatedImu {
+    pub(super) fn new(imu: &ImuModel, seed: u64, step_s: f64) -> Self {
+        let mut random = Noise::new(seed, NoiseStream::Imu);
         let amplitudes = [imu.gyro.vibration_rad_s, imu.accel.vibration_m_s2];
-        Inertial {
-            mounted: Mounted::new(&imu.mounting, &imu.lever_m),
-            gyro: Triad::new(&imu.gyro.quality(), &mut random, step_s),
-            accel: Triad::new(&imu.accel.quality(), &mut random, step_s),
-            vibration: Vibration::new(amplitudes, imu.harmonics, seed, step_s),
+        SimulatedImu {
+            mounted: MountedSensor::new(&imu.mounting, &imu.lever_m),
+            gyro: SimulatedTriad::new(&imu.gyro.quality(), &mut random, step_s),
+            accel: SimulatedTriad::new(&imu.accel.quality(), &mut random, step_s),
+            vibration: SimulatedVibration::new(amplitudes, imu.harmonics, seed, step_s),
             random,
         }
     }

@@ -1,8 +1,8 @@
 //! Magnetometer in simulation: earth's field, iron, motor currents, noise, delay.
 
 use super::markov::draw;
-use super::schedule::{Clock, Transit};
-use crate::noise::{Noise, Stream};
+use super::schedule::{LatencyQueue, SampleClock};
+use crate::noise::{Noise, NoiseStream};
 use crate::truth::Truth;
 use afbc_types::parameters;
 use alloc::vec::Vec;
@@ -15,7 +15,7 @@ parameters! {
     /// The default is perfect and immediate, in a field as in central Europe.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-    pub struct Magnetometer {
+    pub struct MagnetometerModel {
         /// Measurements per second.
         #[parameter(RATE, "Hz", 0.1..=1000.0)]
         pub rate_hz: f64 = 50.0,
@@ -53,10 +53,10 @@ parameters! {
     }
 }
 
-impl Magnetometer {
+impl MagnetometerModel {
     /// Returns the earth's field, earth frame \[uT\].
     pub fn earth_field_ut(&self) -> Vector3<f64> {
-        let Magnetometer { strength_ut, inclination_rad, declination_rad, .. } = *self;
+        let MagnetometerModel { strength_ut, inclination_rad, declination_rad, .. } = *self;
         let level = strength_ut * cos(inclination_rad);
         Vector3::new(level * cos(declination_rad), -level * sin(declination_rad), -strength_ut * sin(inclination_rad))
     }
@@ -64,7 +64,7 @@ impl Magnetometer {
 
 /// Measured magnetic field, body frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FieldFix {
+pub struct MagnetometerReading {
     /// Time of the measurement \[s\].
     pub true_at_s: f64,
     /// Field \[uT\].
@@ -73,34 +73,38 @@ pub struct FieldFix {
 
 /// Magnetometer in simulation.
 #[derive(Clone, Debug)]
-pub(super) struct Compass {
-    magnetometer: Magnetometer,
-    clock: Clock,
+pub(super) struct SimulatedMagnetometer {
+    magnetometer: MagnetometerModel,
+    clock: SampleClock,
     random: Noise,
     earth_ut: Vector3<f64>,
     hard_ut: Vector3<f64>,
     soft: Matrix3<f64>,
-    transit: Transit<FieldFix>,
+    transit: LatencyQueue<MagnetometerReading>,
 }
 
-impl Compass {
-    pub(super) fn new(magnetometer: &Magnetometer, seed: u64, step_s: f64) -> Self {
-        let mut random = Noise::new(seed, Stream::Magnetometer);
-        Compass {
+impl SimulatedMagnetometer {
+    pub(super) fn new(magnetometer: &MagnetometerModel, seed: u64, step_s: f64) -> Self {
+        let mut random = Noise::new(seed, NoiseStream::Magnetometer);
+        SimulatedMagnetometer {
             magnetometer: *magnetometer,
-            clock: Clock::new(magnetometer.rate_hz, step_s),
+            clock: SampleClock::new(magnetometer.rate_hz, step_s),
             earth_ut: magnetometer.earth_field_ut(),
             hard_ut: draw(&mut random) * magnetometer.hard_iron_ut,
             soft: Matrix3::identity() + Matrix3::from_fn(|_, _| random.normal()) * magnetometer.soft_iron,
             random,
-            transit: Transit::new(),
+            transit: LatencyQueue::new(),
         }
     }
 
     /// Returns the fields that arrive in this step. A new measurement passes `spoil` first.
-    pub(super) fn measure(&mut self, truth: &Truth, spoil: impl FnOnce(FieldFix) -> Option<FieldFix>) -> Vec<FieldFix> {
+    pub(super) fn measure(
+        &mut self,
+        truth: &Truth,
+        spoil: impl FnOnce(MagnetometerReading) -> Option<MagnetometerReading>,
+    ) -> Vec<MagnetometerReading> {
         if self.clock.ticks() {
-            let fix = FieldFix { true_at_s: truth.time_s, field_ut: self.field_ut(truth) };
+            let fix = MagnetometerReading { true_at_s: truth.time_s, field_ut: self.field_ut(truth) };
             let arrives_s = truth.time_s + self.magnetometer.delay_s;
             spoil(fix).into_iter().for_each(|fix| self.transit.send(arrives_s, fix));
         }
@@ -108,7 +112,7 @@ impl Compass {
     }
 
     fn field_ut(&mut self, truth: &Truth) -> Vector3<f64> {
-        let Magnetometer { noise_ut, motor_ut, range_ut, lsb_ut, .. } = self.magnetometer;
+        let MagnetometerModel { noise_ut, motor_ut, range_ut, lsb_ut, .. } = self.magnetometer;
         let range_ut = if range_ut > 0.0 { range_ut } else { f64::INFINITY };
         let outside = self.soft * truth.to_body(&self.earth_ut);
         let sensed = outside + self.hard_ut + motor_ut * truth.thrust_share + draw(&mut self.random) * noise_ut;

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 /// First-order Gauss-Markov process of three independent coordinates, dx/dt = -x/T + w, discretised exactly. It starts
 /// in its stationary distribution.
 #[derive(Clone, Debug)]
-pub(super) struct Markov {
+pub(super) struct GaussMarkov {
     /// Decay per step, exp(-dt/T).
     decay: f64,
     /// Standard deviation of the noise added per step.
@@ -16,12 +16,12 @@ pub(super) struct Markov {
     pub(super) value: Vector3<f64>,
 }
 
-impl Markov {
+impl GaussMarkov {
     /// Creates the process with the stationary standard deviation `sigma` and correlation time `correlation_s`.
     pub(super) fn new(sigma: Vector3<f64>, correlation_s: f64, step_s: f64, random: &mut Noise) -> Self {
         let decay = exp(-step_s / correlation_s);
         let value = draw(random).component_mul(&sigma);
-        Markov { decay, kick: sigma * sqrt(1.0 - decay * decay), value }
+        GaussMarkov { decay, kick: sigma * sqrt(1.0 - decay * decay), value }
     }
 
     /// Advances by one step.

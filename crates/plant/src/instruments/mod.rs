@@ -2,7 +2,7 @@
 //!
 //! Each instrument has its own random streams, so its readings do not depend on the presence or settings of other
 //! instruments. All values are `f64`, in the frames of [`afbc_types`] with north along earth x. [`presets`] has known
-//! parts, and [`Failure`] the failures.
+//! parts, and [`FailureKind`] the failures.
 //!
 //! ```
 //! use afbc_types::{Parameters, RotorSpeeds};
@@ -40,38 +40,38 @@ mod tracker;
 mod triad;
 mod vibration;
 
-pub use barometer::{Barometer, HeightFix};
-pub use failure::{Failure, InstrumentFault, limits};
-pub use gnss::{Gnss, GnssFix};
-pub use imu::{Accelerometer, Gyroscope, Imu, ImuBias, ImuReading};
-pub use magnetometer::{FieldFix, Magnetometer};
+pub use barometer::{BarometerModel, BarometerReading};
+pub use failure::{FailureKind, InstrumentFault, limits};
+pub use gnss::{GnssFix, GnssModel};
+pub use imu::{AccelerometerModel, GyroscopeModel, ImuBias, ImuModel, ImuReading};
+pub use magnetometer::{MagnetometerModel, MagnetometerReading};
 pub use presets::Preset;
 pub use tracker::{TrackerFix, TrackerModel};
 
 use crate::truth::Truth;
 use afbc_types::{Declared, OutOfRange};
 use alloc::vec::Vec;
-use barometer::Pressure;
-use failure::Failures;
-use gnss::Receiver;
-use imu::Inertial;
-use magnetometer::Compass;
-use tracker::Tracking;
+use barometer::SimulatedBarometer;
+use failure::SimulatedFailures;
+use gnss::SimulatedGnssReceiver;
+use imu::SimulatedImu;
+use magnetometer::SimulatedMagnetometer;
+use tracker::SimulatedTracker;
 
 /// Instruments of a vehicle. The default has none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct InstrumentSuite {
     /// IMU.
-    pub imu: Option<Imu>,
+    pub imu: Option<ImuModel>,
     /// Tracker.
     pub tracker: Option<TrackerModel>,
     /// GNSS receiver.
-    pub gnss: Option<Gnss>,
+    pub gnss: Option<GnssModel>,
     /// Barometer.
-    pub barometer: Option<Barometer>,
+    pub barometer: Option<BarometerModel>,
     /// Magnetometer.
-    pub magnetometer: Option<Magnetometer>,
+    pub magnetometer: Option<MagnetometerModel>,
 }
 
 impl InstrumentSuite {
@@ -98,23 +98,23 @@ pub struct InstrumentReadings {
     /// GNSS fixes that arrive in this step.
     pub gnss: Vec<GnssFix>,
     /// Heights that arrive in this step.
-    pub barometer: Vec<HeightFix>,
+    pub barometer: Vec<BarometerReading>,
     /// Magnetic fields that arrive in this step.
-    pub magnetometer: Vec<FieldFix>,
+    pub magnetometer: Vec<MagnetometerReading>,
 }
 
 /// Instruments in simulation.
 #[derive(Clone, Debug)]
-pub struct Instruments {
-    imu: Option<Inertial>,
-    tracker: Option<Tracking>,
-    gnss: Option<Receiver>,
-    barometer: Option<Pressure>,
-    magnetometer: Option<Compass>,
-    failures: Failures,
+pub struct SimulatedInstruments {
+    imu: Option<SimulatedImu>,
+    tracker: Option<SimulatedTracker>,
+    gnss: Option<SimulatedGnssReceiver>,
+    barometer: Option<SimulatedBarometer>,
+    magnetometer: Option<SimulatedMagnetometer>,
+    failures: SimulatedFailures,
 }
 
-impl Instruments {
+impl SimulatedInstruments {
     /// Creates instruments that are read every `step_s`. The seed may be the plant's, because the streams differ.
     ///
     /// # Errors
@@ -128,13 +128,15 @@ impl Instruments {
         suite.validate()?;
         faults.iter().try_for_each(InstrumentFault::validate)?;
         crate::realism::STEP.check(step_s)?;
-        Ok(Instruments {
-            imu: suite.imu.map(|imu| Inertial::new(&imu, seed, step_s)),
-            tracker: suite.tracker.map(|tracker| Tracking::new(&tracker, seed, step_s)),
-            gnss: suite.gnss.map(|gnss| Receiver::new(&gnss, seed, step_s)),
-            barometer: suite.barometer.map(|barometer| Pressure::new(&barometer, seed, step_s)),
-            magnetometer: suite.magnetometer.map(|magnetometer| Compass::new(&magnetometer, seed, step_s)),
-            failures: Failures::new(faults, seed),
+        Ok(SimulatedInstruments {
+            imu: suite.imu.map(|imu| SimulatedImu::new(&imu, seed, step_s)),
+            tracker: suite.tracker.map(|tracker| SimulatedTracker::new(&tracker, seed, step_s)),
+            gnss: suite.gnss.map(|gnss| SimulatedGnssReceiver::new(&gnss, seed, step_s)),
+            barometer: suite.barometer.map(|barometer| SimulatedBarometer::new(&barometer, seed, step_s)),
+            magnetometer: suite
+                .magnetometer
+                .map(|magnetometer| SimulatedMagnetometer::new(&magnetometer, seed, step_s)),
+            failures: SimulatedFailures::new(faults, seed),
         })
     }
 
@@ -172,6 +174,6 @@ impl Instruments {
 
     /// Returns the true biases of the IMU, if there is one, for comparison with estimates.
     pub fn imu_bias(&self) -> Option<ImuBias> {
-        self.imu.as_ref().map(Inertial::bias)
+        self.imu.as_ref().map(SimulatedImu::bias)
     }
 }

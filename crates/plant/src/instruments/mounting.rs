@@ -8,17 +8,17 @@ use nalgebra::Vector3;
 
 /// Mounting with precomputed rotation.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Mounted {
+pub(super) struct MountedSensor {
     position_m: Vector3<f64>,
     /// Sensor axes in the body frame; [`BodyAxes`] is used with body in place of earth and sensor in place of body.
     axes: BodyAxes,
 }
 
-impl Mounted {
+impl MountedSensor {
     /// Creates the mounting of a sensor that is displaced by `lever_m` from its stated position.
     pub(super) fn new(mounting: &Mounting<f64>, lever_m: &Vector3<f64>) -> Self {
         let [w, x, y, z] = quaternion(&mounting.attitude_rad);
-        Mounted { position_m: mounting.position_m + lever_m, axes: BodyAxes::of_quaternion(w, x, y, z) }
+        MountedSensor { position_m: mounting.position_m + lever_m, axes: BodyAxes::of_quaternion(w, x, y, z) }
     }
 
     /// Returns angular rate and specific force at the sensor in sensor axes: f + d omega/dt x r + omega x (omega x r).

@@ -4,10 +4,10 @@
 //! three standard deviations. They do not state bias instability and drift in flight, so those figures are estimated.
 //! Effects of the vehicle, such as vibration, hard iron and propeller wash, are left out or marked as estimated.
 
-use super::barometer::Barometer;
-use super::gnss::Gnss;
-use super::imu::{Accelerometer, Gyroscope, Imu};
-use super::magnetometer::Magnetometer;
+use super::barometer::BarometerModel;
+use super::gnss::GnssModel;
+use super::imu::{AccelerometerModel, GyroscopeModel, ImuModel};
+use super::magnetometer::MagnetometerModel;
 use super::tracker::TrackerModel;
 use core::f64::consts::PI;
 
@@ -27,14 +27,14 @@ pub struct Preset<T> {
     pub settings: T,
 }
 
-impl Imu {
+impl ImuModel {
     /// TDK InvenSense ICM-42688-P at 2000 deg/s and 16 g.
     ///
     /// Data sheet DS-000347, Table 1 (gyroscope: 0.0028 deg/s/rtHz, 16.4 LSB per deg/s, zero-rate 0.5 deg/s, scale 0.5
     /// %, cross-axis 1.25 %) and Table 2 (accelerometer: 70 ug/rtHz, 2048 LSB/g, zero-g 20 mg, scale 0.5 %, cross-axis
     /// 1 %). The anti-alias filter is set to 258 Hz, one of its options.
-    pub const ICM_42688_P: Self = Imu {
-        gyro: Gyroscope {
+    pub const ICM_42688_P: Self = ImuModel {
+        gyro: GyroscopeModel {
             noise_rad_s_rthz: 0.0028 * DEG,
             instability_rad_s: 0.002 * DEG,
             walk_rad_s2_rthz: 1e-5,
@@ -44,9 +44,9 @@ impl Imu {
             range_rad_s: 2000.0 * DEG,
             lsb_rad_s: DEG / 16.4,
             cutoff_hz: 258.0,
-            ..Gyroscope::DEFAULT
+            ..GyroscopeModel::DEFAULT
         },
-        accel: Accelerometer {
+        accel: AccelerometerModel {
             noise_m_s2_rthz: 70e-6 * G,
             instability_m_s2: 40e-6 * G,
             walk_m_s3_rthz: 1e-4,
@@ -56,9 +56,9 @@ impl Imu {
             range_m_s2: 16.0 * G,
             lsb_m_s2: G / 2048.0,
             cutoff_hz: 258.0,
-            ..Accelerometer::DEFAULT
+            ..AccelerometerModel::DEFAULT
         },
-        ..Imu::DEFAULT
+        ..ImuModel::DEFAULT
     };
 
     /// Bosch Sensortec BMI270 at 2000 deg/s and 16 g.
@@ -66,8 +66,8 @@ impl Imu {
     /// Data sheet BST-BMI270-DS000: gyroscope 0.007 deg/s/rtHz in performance mode, 16.384 LSB per deg/s, zero-rate 0.5
     /// deg/s; accelerometer 160 ug/rtHz, 2048 LSB/g, zero-g 20 mg. Estimated: scale 0.4 % after component retrimming,
     /// cross-axis 1 %, a filter of 250 Hz (up to 751 Hz can be set).
-    pub const BMI270: Self = Imu {
-        gyro: Gyroscope {
+    pub const BMI270: Self = ImuModel {
+        gyro: GyroscopeModel {
             noise_rad_s_rthz: 0.007 * DEG,
             instability_rad_s: 0.003 * DEG,
             walk_rad_s2_rthz: 2e-5,
@@ -77,9 +77,9 @@ impl Imu {
             range_rad_s: 2000.0 * DEG,
             lsb_rad_s: DEG / 16.384,
             cutoff_hz: 250.0,
-            ..Gyroscope::DEFAULT
+            ..GyroscopeModel::DEFAULT
         },
-        accel: Accelerometer {
+        accel: AccelerometerModel {
             noise_m_s2_rthz: 160e-6 * G,
             instability_m_s2: 60e-6 * G,
             walk_m_s3_rthz: 2e-4,
@@ -89,9 +89,9 @@ impl Imu {
             range_m_s2: 16.0 * G,
             lsb_m_s2: G / 2048.0,
             cutoff_hz: 250.0,
-            ..Accelerometer::DEFAULT
+            ..AccelerometerModel::DEFAULT
         },
-        ..Imu::DEFAULT
+        ..ImuModel::DEFAULT
     };
 
     /// InvenSense MPU-6000 at 2000 deg/s and 16 g.
@@ -99,8 +99,8 @@ impl Imu {
     /// Product specification PS-MPU-6000A-00, revision 3.4, section 6.1 (gyroscope: 0.005 deg/s/rtHz, 16.4 LSB per
     /// deg/s, zero-rate 20 deg/s, scale 3 %, cross-axis 2 %, filter 256 Hz) and section 6.2 (accelerometer:
     /// 400 ug/rtHz, 2048 LSB/g, zero-g 50 mg in x and y, scale 3 %, cross-axis 2 %, filter 260 Hz).
-    pub const MPU_6000: Self = Imu {
-        gyro: Gyroscope {
+    pub const MPU_6000: Self = ImuModel {
+        gyro: GyroscopeModel {
             noise_rad_s_rthz: 0.005 * DEG,
             instability_rad_s: 0.005 * DEG,
             walk_rad_s2_rthz: 4e-5,
@@ -110,9 +110,9 @@ impl Imu {
             range_rad_s: 2000.0 * DEG,
             lsb_rad_s: DEG / 16.4,
             cutoff_hz: 256.0,
-            ..Gyroscope::DEFAULT
+            ..GyroscopeModel::DEFAULT
         },
-        accel: Accelerometer {
+        accel: AccelerometerModel {
             noise_m_s2_rthz: 400e-6 * G,
             instability_m_s2: 100e-6 * G,
             walk_m_s3_rthz: 5e-4,
@@ -122,9 +122,9 @@ impl Imu {
             range_m_s2: 16.0 * G,
             lsb_m_s2: G / 2048.0,
             cutoff_hz: 260.0,
-            ..Accelerometer::DEFAULT
+            ..AccelerometerModel::DEFAULT
         },
-        ..Imu::DEFAULT
+        ..ImuModel::DEFAULT
     };
 
     /// Every preset.
@@ -151,13 +151,13 @@ impl TrackerModel {
     pub const PRESETS: [Preset<Self>; 1] = [Preset { name: "mocap-100", settings: Self::MOCAP_100 }];
 }
 
-impl Gnss {
+impl GnssModel {
     /// u-blox M10, four constellations at 10 Hz.
     ///
     /// Data sheet of the module MAX-M10S, UBX-20035208, table of performance: position 1.5 m CEP, which is 1.27 m per
     /// coordinate, and velocity 0.05 m/s. The position error is split into a slow part of 1.2 m and noise of 0.4 m.
     /// Estimated: that split, a height error 1.5 times larger, the correlation time, and a delay of 120 ms.
-    pub const M10: Self = Gnss {
+    pub const M10: Self = GnssModel {
         rate_hz: 10.0,
         delay_s: 0.12,
         jitter_s: 0.01,
@@ -173,12 +173,12 @@ impl Gnss {
     pub const PRESETS: [Preset<Self>; 1] = [Preset { name: "m10", settings: Self::M10 }];
 }
 
-impl Barometer {
+impl BarometerModel {
     /// Infineon DPS310 at 50 Hz, eight times oversampled.
     ///
     /// Data sheet DPS310: precision 0.4 Pa at this oversampling, 14.8 ms per measurement, relative accuracy 6 Pa, used
     /// as the standard deviation of the drift. The wash is estimated.
-    pub const DPS310: Self = Barometer {
+    pub const DPS310: Self = BarometerModel {
         rate_hz: 50.0,
         delay_s: 0.015,
         noise_m: 0.4 * M_PA,
@@ -191,7 +191,7 @@ impl Barometer {
     ///
     /// Data sheet BST-BMP388-DS001: relative accuracy 8 Pa, used as the standard deviation of the drift. Estimated: a
     /// noise of 1.2 Pa without the part's filter, 20 ms per measurement, and the wash.
-    pub const BMP388: Self = Barometer {
+    pub const BMP388: Self = BarometerModel {
         rate_hz: 50.0,
         delay_s: 0.02,
         noise_m: 1.2 * M_PA,
@@ -205,12 +205,12 @@ impl Barometer {
         [Preset { name: "dps310", settings: Self::DPS310 }, Preset { name: "bmp388", settings: Self::BMP388 }];
 }
 
-impl Magnetometer {
+impl MagnetometerModel {
     /// iSentek IST8310 at 50 Hz.
     ///
     /// Data sheet IST8310: 0.3 uT/LSB, range 1600 uT in x and y. Estimated: noise, delay, and the hard iron, soft iron
     /// and motor field that remain after calibration.
-    pub const IST8310: Self = Magnetometer {
+    pub const IST8310: Self = MagnetometerModel {
         rate_hz: 50.0,
         delay_s: 0.01,
         noise_ut: 0.5,
@@ -226,7 +226,8 @@ impl Magnetometer {
     ///
     /// Data sheet QMC5883L: 3000 LSB/G, field resolution 2 mG, used as the noise. Estimated: delay, and the hard iron,
     /// soft iron and motor field that remain after calibration.
-    pub const QMC5883L: Self = Magnetometer { noise_ut: 0.2, range_ut: 800.0, lsb_ut: 100.0 / 3000.0, ..Self::IST8310 };
+    pub const QMC5883L: Self =
+        MagnetometerModel { noise_ut: 0.2, range_ut: 800.0, lsb_ut: 100.0 / 3000.0, ..Self::IST8310 };
 
     /// Every preset.
     pub const PRESETS: [Preset<Self>; 2] =

@@ -7,16 +7,16 @@ const TIME_SLACK_S: f64 = 1e-9;
 
 /// Sampling clock of a sensor with any rate: the first step, then the first step after each period.
 #[derive(Clone, Debug)]
-pub(super) struct Clock {
+pub(super) struct SampleClock {
     /// Samples per step.
     per_step: f64,
     steps: u64,
     taken: u64,
 }
 
-impl Clock {
+impl SampleClock {
     pub(super) fn new(rate_hz: f64, step_s: f64) -> Self {
-        Clock { per_step: rate_hz * step_s, steps: 0, taken: 0 }
+        SampleClock { per_step: rate_hz * step_s, steps: 0, taken: 0 }
     }
 
     /// Returns true if the sensor samples in this step. Call it in every step.
@@ -32,14 +32,14 @@ impl Clock {
 
 /// Measurements under way, which arrive in the order of their arrival times.
 #[derive(Clone, Debug)]
-pub(super) struct Transit<T> {
+pub(super) struct LatencyQueue<T> {
     /// Measurements with their arrival times \[s\], sorted by arrival.
     waiting: Vec<(f64, T)>,
 }
 
-impl<T> Transit<T> {
+impl<T> LatencyQueue<T> {
     pub(super) fn new() -> Self {
-        Transit { waiting: Vec::new() }
+        LatencyQueue { waiting: Vec::new() }
     }
 
     /// Sends a measurement that arrives at `arrives_s`.

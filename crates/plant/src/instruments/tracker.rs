@@ -1,9 +1,9 @@
 //! Tracker in simulation: a motion-capture system with noise, delay, outliers and dropouts.
 
 use super::markov::draw;
-use super::schedule::{Clock, Transit};
-use crate::dropouts::{Dropouts, Outage};
-use crate::noise::{Noise, Stream};
+use super::schedule::{LatencyQueue, SampleClock};
+use crate::dropouts::{MeasurementDropouts, SimulatedDropouts};
+use crate::noise::{Noise, NoiseStream};
 use crate::truth::Truth;
 use afbc_types::parameters;
 use alloc::vec::Vec;
@@ -53,10 +53,10 @@ parameters! {
         pub frame_yaw_rad: f64 = 0.0,
         /// Intervals without fixes.
         #[group("loss")]
-        pub loss: Dropouts = Dropouts::DEFAULT,
+        pub loss: MeasurementDropouts = MeasurementDropouts::DEFAULT,
         /// Intervals in which the last pose before is sent again and again, with new stamps.
         #[group("freeze")]
-        pub freeze: Dropouts = Dropouts::DEFAULT,
+        pub freeze: MeasurementDropouts = MeasurementDropouts::DEFAULT,
     }
 }
 
@@ -73,27 +73,27 @@ pub struct TrackerFix {
 
 /// Tracker in simulation.
 #[derive(Clone, Debug)]
-pub(super) struct Tracking {
+pub(super) struct SimulatedTracker {
     tracker: TrackerModel,
-    clock: Clock,
+    clock: SampleClock,
     random: Noise,
-    loss: Outage,
-    freeze: Outage,
+    loss: SimulatedDropouts,
+    freeze: SimulatedDropouts,
     /// Last pose that was not frozen.
     last: Option<TrackerFix>,
-    transit: Transit<TrackerFix>,
+    transit: LatencyQueue<TrackerFix>,
 }
 
-impl Tracking {
+impl SimulatedTracker {
     pub(super) fn new(tracker: &TrackerModel, seed: u64, step_s: f64) -> Self {
-        Tracking {
+        SimulatedTracker {
             tracker: *tracker,
-            clock: Clock::new(tracker.rate_hz, step_s),
-            random: Noise::new(seed, Stream::Tracker),
-            loss: Outage::new(&tracker.loss, Noise::new(seed, Stream::TrackerLoss), step_s),
-            freeze: Outage::new(&tracker.freeze, Noise::new(seed, Stream::TrackerFreeze), step_s),
+            clock: SampleClock::new(tracker.rate_hz, step_s),
+            random: Noise::new(seed, NoiseStream::Tracker),
+            loss: SimulatedDropouts::new(&tracker.loss, Noise::new(seed, NoiseStream::TrackerLoss), step_s),
+            freeze: SimulatedDropouts::new(&tracker.freeze, Noise::new(seed, NoiseStream::TrackerFreeze), step_s),
             last: None,
-            transit: Transit::new(),
+            transit: LatencyQueue::new(),
         }
     }
 

@@ -1,14 +1,14 @@
 //! Three axes of a gyroscope or accelerometer.
 
 use super::low_pass::LowPass;
-use super::markov::{Markov, draw};
+use super::markov::{GaussMarkov, draw};
 use crate::noise::Noise;
 use libm::{rint, sqrt};
 use nalgebra::{Matrix3, Vector3};
 
 /// Properties of a triad, in the unit of the measured quantity. Zero switches an error off.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Quality {
+pub(super) struct TriadErrors {
     /// One-sided density of the white noise, per root of hertz.
     pub(super) noise: f64,
     /// Stationary standard deviation of the bias instability, and its correlation time \[s\].
@@ -29,10 +29,10 @@ pub(super) struct Quality {
 
 /// Triad in simulation: scale and misalignment, bias and noise, then filter, range and quantisation.
 #[derive(Clone, Debug)]
-pub(super) struct Triad {
+pub(super) struct SimulatedTriad {
     distortion: Matrix3<f64>,
     constant: Vector3<f64>,
-    instability: Markov,
+    instability: GaussMarkov,
     walk: Vector3<f64>,
     walk_per_step: f64,
     white: f64,
@@ -41,17 +41,17 @@ pub(super) struct Triad {
     lsb: f64,
 }
 
-impl Triad {
-    pub(super) fn new(quality: &Quality, random: &mut Noise, step_s: f64) -> Self {
+impl SimulatedTriad {
+    pub(super) fn new(quality: &TriadErrors, random: &mut Noise, step_s: f64) -> Self {
         let constant = draw(random) * quality.bias;
         let scale = draw(random) * quality.scale;
         let mut distortion = Matrix3::from_fn(|_, _| random.normal() * quality.misalignment);
         distortion.set_diagonal(&(Vector3::repeat(1.0) + scale));
         let instability = Vector3::repeat(quality.instability);
-        Triad {
+        SimulatedTriad {
             distortion,
             constant,
-            instability: Markov::new(instability, quality.instability_s, step_s, random),
+            instability: GaussMarkov::new(instability, quality.instability_s, step_s, random),
             walk: Vector3::zeros(),
             walk_per_step: quality.walk * sqrt(step_s),
             // White noise of this density up to half the sampling rate.

@@ -1,8 +1,8 @@
 //! Vibration of the body at the rotor frequencies.
 
 use super::low_pass::LowPass;
-use crate::frame::Lanes;
-use crate::noise::{Noise, Stream};
+use crate::frame::PerRotor;
+use crate::noise::{Noise, NoiseStream};
 use crate::truth::Truth;
 use core::f64::consts::TAU;
 use libm::{cos, floor, sin, sincos};
@@ -12,19 +12,19 @@ use nalgebra::Vector3;
 const HARMONICS: usize = 3;
 
 /// Cosine and sine of a phase.
-type Phase = (f64, f64);
+type CosineSine = (f64, f64);
 
 /// Vibration as a sum over the rotors of A_k (omega/omega_hover)^2 cos(k theta + phi) on each axis, with the rotor
 /// angle theta and random constant phases phi. The force of an unbalanced rotor is proportional to omega^2, hence the
 /// square.
 #[derive(Clone, Debug)]
-pub(super) struct Vibration {
+pub(super) struct SimulatedVibration {
     /// Angle of each rotor, within 0 to 2 pi \[rad\].
-    angle: Lanes,
+    angle: PerRotor,
     /// Rotor speeds at the last step.
-    speeds_rad_s: Option<Lanes>,
+    speeds_rad_s: Option<PerRotor>,
     /// Phases by rotor, harmonic, sensor (gyroscope, accelerometer) and axis.
-    phases: [[[[Phase; 3]; 2]; HARMONICS]; afbc_types::ROTORS_MAX],
+    phases: [[[[CosineSine; 3]; 2]; HARMONICS]; afbc_types::ROTORS_MAX],
     /// Relative amplitudes of the harmonics.
     harmonics: Vector3<f64>,
     /// Amplitude of a rotor's first harmonic at hover, by sensor.
@@ -32,17 +32,17 @@ pub(super) struct Vibration {
     step_s: f64,
 }
 
-impl Vibration {
+impl SimulatedVibration {
     /// Creates the vibration with the amplitudes `[rad/s, m/s2]`.
     pub(super) fn new(amplitudes: [f64; 2], harmonics: Vector3<f64>, seed: u64, step_s: f64) -> Self {
-        let mut random = Noise::new(seed, Stream::Vibration);
-        let angle = Lanes::from_fn(|_, _| TAU * random.uniform());
+        let mut random = Noise::new(seed, NoiseStream::Vibration);
+        let angle = PerRotor::from_fn(|_, _| TAU * random.uniform());
         let mut phases = [[[[(1.0, 0.0); 3]; 2]; HARMONICS]; afbc_types::ROTORS_MAX];
         phases.as_flattened_mut().as_flattened_mut().as_flattened_mut().iter_mut().for_each(|phase| {
             let phi = TAU * random.uniform();
             *phase = (cos(phi), sin(phi));
         });
-        Vibration { angle, speeds_rad_s: None, phases, harmonics, amplitudes, step_s }
+        SimulatedVibration { angle, speeds_rad_s: None, phases, harmonics, amplitudes, step_s }
     }
 
     /// Returns the vibration as `[angular rate, specific force]` after the sensors' filters.
@@ -72,7 +72,7 @@ impl Vibration {
                 let sensors = sum.iter_mut().zip(phases).zip(self.amplitudes).zip(filters);
                 for (((sum, [x, y, z]), amplitude), filter) in sensors {
                     let size = amplitude * relative * growth * filter.share(frequency_hz);
-                    let part = |(cos_phi, sin_phi): &Phase| ck * cos_phi - sk * sin_phi;
+                    let part = |(cos_phi, sin_phi): &CosineSine| ck * cos_phi - sk * sin_phi;
                     *sum += Vector3::new(part(x), part(y), part(z)) * size;
                 }
             }

@@ -1,7 +1,9 @@
 //! Input of the instruments, and statistics.
 
 use afbc_plant::instruments::InstrumentFault;
-use afbc_plant::{Environment, InstrumentReadings, InstrumentSuite, Instruments, Motion, Plant, PlantModel, Truth};
+use afbc_plant::{
+    Environment, InstrumentReadings, InstrumentSuite, Motion, Plant, PlantModel, SimulatedInstruments, Truth,
+};
 use afbc_types::Parameters;
 use nalgebra::{Quaternion, Vector3};
 
@@ -18,8 +20,8 @@ pub(crate) fn at(truth: Truth, k: u32) -> Truth {
     Truth { time_s: f64::from(k) * STEP_S, ..truth }
 }
 
-pub(crate) fn instruments(suite: InstrumentSuite, seed: u64) -> Instruments {
-    Instruments::new(&suite, &[], seed, STEP_S).unwrap()
+pub(crate) fn instruments(suite: InstrumentSuite, seed: u64) -> SimulatedInstruments {
+    SimulatedInstruments::new(&suite, &[], seed, STEP_S).unwrap()
 }
 
 /// Returns the readings of `steps` steps of a motion.
@@ -39,7 +41,7 @@ pub(crate) fn run_with(
     steps: u32,
     truth: impl Fn(u32) -> Truth,
 ) -> Vec<InstrumentReadings> {
-    let mut instruments = Instruments::new(&suite, faults, seed, STEP_S).unwrap();
+    let mut instruments = SimulatedInstruments::new(&suite, faults, seed, STEP_S).unwrap();
     (0..steps).map(|k| instruments.measure(&at(truth(k), k))).collect()
 }
 

@@ -9,7 +9,7 @@ use crate::earth::Field;
 use crate::order::rising;
 use crate::recording::{Aiding, LoggedReset, LoggedState, Recording, SampleSource, Sensor, flip, flip_rotation};
 use crate::{compass, earth, states};
-use afbc_estimator::{ImuSample, Origin};
+use afbc_estimator::{GeodeticOrigin, ImuSample};
 
 /// Delay of a receiver that the log does not state \[ms\]: PX4's default.
 const GNSS_DELAY_MS: f64 = 110.0;
@@ -28,7 +28,7 @@ pub(super) fn recording(tables: &Tables) -> Result<Recording, String> {
     let first = aids::begin(&fixes.fixes).copied();
     recording.origin = reference(tables).or_else(|| {
         let [latitude, longitude, altitude] = first?.place;
-        Origin::new(latitude, longitude, altitude)
+        GeodeticOrigin::new(latitude, longitude, altitude)
     });
     let delay_us =
         |name: &str, usual_ms: f64| (tables.parameter(name).unwrap_or(usual_ms).clamp(0.0, 1000.0) * 1e3) as u64;
@@ -165,14 +165,14 @@ fn fix(row: &Row) -> Option<Fix> {
 }
 
 /// Returns the first reference of the log's local position, so that both estimates have the same origin.
-fn reference(tables: &Tables) -> Option<Origin> {
+fn reference(tables: &Tables) -> Option<GeodeticOrigin> {
     tables.first(VEHICLE_LOCAL_POSITION).iter().find_map(own_origin)
 }
 
-fn own_origin(row: &Row) -> Option<Origin> {
+fn own_origin(row: &Row) -> Option<GeodeticOrigin> {
     let [latitude, longitude, altitude] = row.vector(["ref_lat", "ref_lon", "ref_alt"]);
     // In old layouts the reference is zero until it is set.
-    Origin::new(latitude, longitude, altitude).filter(|_| (latitude, longitude) != (0.0, 0.0))
+    GeodeticOrigin::new(latitude, longitude, altitude).filter(|_| (latitude, longitude) != (0.0, 0.0))
 }
 
 /// Takes heights from the first topic that has any.
@@ -272,7 +272,7 @@ pub(super) fn attitudes(tables: &Tables) -> (Vec<LoggedState>, SampleSource) {
     states::collect(rows.iter().filter_map(state).collect(), rows.len(), Sensor::Attitude, VEHICLE_ATTITUDE.0)
 }
 
-fn motions(tables: &Tables, origin: Option<&Origin>) -> (Vec<LoggedState>, SampleSource) {
+fn motions(tables: &Tables, origin: Option<&GeodeticOrigin>) -> (Vec<LoggedState>, SampleSource) {
     let rows = tables.first(VEHICLE_LOCAL_POSITION);
     let state = |row: &Row| {
         let valid = |names: [&str; 2]| names.iter().all(|name| row.get(name) > 0.0);

@@ -14,7 +14,7 @@ use crate::grid::{self, TableFormat};
 use crate::groups::groups;
 use afbc_campaign::compare::Comparison;
 use afbc_files::{Error, Folder};
-use afbc_sim::flown::Flown;
+use afbc_sim::flown::ScenarioFlight;
 use std::path::PathBuf;
 
 /// Writes all results of `comparisons` into `folder`, and removes all earlier files of the same command. Returns the
@@ -32,7 +32,7 @@ use std::path::PathBuf;
 /// # Errors
 /// Fails at the first file that cannot be written, or that another command has written.
 pub fn write(folder: &Folder, comparisons: &[Comparison]) -> Result<Vec<PathBuf>, Error> {
-    let flown: Vec<Flown> =
+    let flown: Vec<ScenarioFlight> =
         comparisons.iter().flat_map(|comparison| &comparison.entries).map(|entry| entry.first.clone()).collect();
     let prefixes: Vec<_> = groups(&flown).into_iter().map(|group| group.figure_prefix).collect();
     let sets: Vec<Vec<Picture>> = comparisons.iter().map(draw).collect();
@@ -69,7 +69,7 @@ pub fn tables(comparisons: &[Comparison], format: TableFormat) -> String {
 }
 
 fn draw(comparison: &Comparison) -> Vec<Picture> {
-    let flights: Vec<&Flown> = comparison.entries.iter().map(|entry| &entry.first).collect();
+    let flights: Vec<&ScenarioFlight> = comparison.entries.iter().map(|entry| &entry.first).collect();
     let flown = figures::flights::named(&flights, &[("fig7-errors", "errors"), ("fig4-trajectory", "trajectory")]);
     figures::compare::draw(comparison).into_iter().chain(flown).collect()
 }

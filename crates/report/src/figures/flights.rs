@@ -6,8 +6,8 @@ use super::plotted::{LINE_PX, Plotted, REFERENCE};
 use super::time_chart::{Chart, Line, PLOT_PX, Panel};
 use super::{canvas, trajectory};
 use crate::words;
-use afbc_sim::flight::{Estimated, Sample};
-use afbc_sim::flown::Flown;
+use afbc_sim::flight::{EstimateErrors, Sample};
+use afbc_sim::flown::ScenarioFlight;
 use afbc_sim::metrics::tracking_error;
 use nalgebra::Vector4;
 
@@ -36,7 +36,7 @@ const ERRORS: [(&str, Value); 4] = [
     ("ψ⟨d⟩\u{a0}− ψ [rad]", |s| tracking_error(s).w),
 ];
 /// A coordinate of the vehicle's own estimate: label, error and standard deviation.
-type Coordinate = (&'static str, fn(&Estimated) -> f32, fn(&Estimated) -> f32);
+type Coordinate = (&'static str, fn(&EstimateErrors) -> f32, fn(&EstimateErrors) -> f32);
 
 /// Errors of the estimate, which are small: in centimetres and degrees.
 const ESTIMATE: [Coordinate; 9] = [
@@ -54,7 +54,7 @@ const ESTIMATE: [Coordinate; 9] = [
 const INPUTS: [(&str, Input); 4] = [("U₁ [N]", |u| u.x), ("U₂ [N]", |u| u.y), ("U₃ [N]", |u| u.z), ("U₄ [N]", |u| u.w)];
 
 /// Draws the figures in `names`, in that order. Each pair is a figure's name and its new name.
-pub(crate) fn named(flights: &[&Flown], names: &[(&str, &'static str)]) -> Vec<Picture> {
+pub(crate) fn named(flights: &[&ScenarioFlight], names: &[(&str, &'static str)]) -> Vec<Picture> {
     let mut figures = draw(flights);
     let take = |(figure, name): &(&str, &'static str)| {
         let index = figures.iter().position(|drawn| drawn.name == *figure)?;
@@ -64,7 +64,7 @@ pub(crate) fn named(flights: &[&Flown], names: &[(&str, &'static str)]) -> Vec<P
 }
 
 /// Draws all figures of one scenario's flights; none without flights.
-pub(crate) fn draw(flights: &[&Flown]) -> Vec<Picture> {
+pub(crate) fn draw(flights: &[&ScenarioFlight]) -> Vec<Picture> {
     // The longest flight covers most of the reference.
     let Some(longest) = flights.iter().max_by_key(|flight| flight.run.log.len()) else { return Vec::new() };
     let scenario = &longest.scenario;
@@ -95,7 +95,8 @@ pub(crate) fn draw(flights: &[&Flown]) -> Vec<Picture> {
         lines: rough_first.iter().map(|law| law.input(end_s, input)).collect(),
     });
 
-    let of = |sample: &Sample, value: fn(&Estimated) -> f32| sample.estimated.map_or(f64::NAN, |e| value(&e).into());
+    let of =
+        |sample: &Sample, value: fn(&EstimateErrors) -> f32| sample.estimated.map_or(f64::NAN, |e| value(&e).into());
     let estimate = ESTIMATE.map(|(label, error, sigma)| {
         let band = |law: &&Plotted| {
             let edge = |sign: f64| law.line(law.pale(), end_s, move |s| sign * 3.0 * of(s, sigma));

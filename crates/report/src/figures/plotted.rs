@@ -5,7 +5,7 @@ use super::time_chart::{self, Line};
 use super::{palette, reduce};
 use afbc_drawing::Rgb;
 use afbc_sim::flight::Sample;
-use afbc_sim::flown::Flown;
+use afbc_sim::flown::ScenarioFlight;
 use afbc_sim::metrics::inputs;
 use nalgebra::Vector4;
 
@@ -16,7 +16,7 @@ pub(super) const LINE_PX: f64 = 1.3;
 
 /// A law's flight, with the style of its lines.
 pub(super) struct Plotted<'a> {
-    pub(super) flight: &'a Flown,
+    pub(super) flight: &'a ScenarioFlight,
     pub(super) ink: Ink,
 }
 

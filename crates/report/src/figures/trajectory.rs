@@ -10,7 +10,7 @@ use super::time_chart::{Line, PLOT_PX, range};
 use crate::explore::{Explorable, ExplorableScene};
 use afbc_drawing::{Point, Rgb, TextAnchor, Ticks};
 use afbc_sim::flight::Sample;
-use afbc_sim::flown::Flown;
+use afbc_sim::flown::ScenarioFlight;
 use nalgebra::Vector3;
 use std::collections::HashSet;
 
@@ -75,7 +75,12 @@ impl View {
 }
 
 /// Draws the flights of `laws`, and the reference of the longest flight.
-pub(super) fn picture(laws: &[Plotted], longest: &Flown, conditions: &str, mut legend: Vec<(String, Ink)>) -> Picture {
+pub(super) fn picture(
+    laws: &[Plotted],
+    longest: &ScenarioFlight,
+    conditions: &str,
+    mut legend: Vec<(String, Ink)>,
+) -> Picture {
     let scenario = &longest.scenario;
     let end_s = longest.run.log.last().map_or(0.0, |last| last.time_s);
     let range_along = |axis: Vector3<f64>| {
@@ -145,7 +150,7 @@ pub(super) fn picture(laws: &[Plotted], longest: &Flown, conditions: &str, mut l
 }
 
 /// Returns the same flights for the page's script.
-fn scene(laws: &[Plotted], longest: &Flown, view: &View) -> ExplorableScene {
+fn scene(laws: &[Plotted], longest: &ScenarioFlight, view: &View) -> ExplorableScene {
     let scenario = &longest.scenario;
     let arm_m = scenario.vehicle.arm_m;
     let end_s = longest.run.log.last().map_or(0.0, |last| last.time_s);

@@ -10,7 +10,7 @@ pub use crate::table::table;
 use crate::claims::Claim;
 use crate::{csv, figures, groups, report, summary};
 use afbc_files::{Error, Folder};
-use afbc_sim::flown::Flown;
+use afbc_sim::flown::ScenarioFlight;
 use std::path::PathBuf;
 
 /// Writes all results of `flown` into `folder`, and removes all earlier files of the same command. Returns the paths
@@ -28,7 +28,7 @@ use std::path::PathBuf;
 ///
 /// # Errors
 /// Fails at the first file that cannot be written, or that another command has written.
-pub fn write(folder: &Folder, flown: &[Flown], claims: &[Claim]) -> Result<Vec<PathBuf>, Error> {
+pub fn write(folder: &Folder, flown: &[ScenarioFlight], claims: &[Claim]) -> Result<Vec<PathBuf>, Error> {
     let groups = groups::groups(flown);
     let sets: Vec<_> = groups.iter().map(|group| figures::flights::draw(&group.flights)).collect();
     let svg_name =

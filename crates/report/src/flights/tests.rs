@@ -3,12 +3,12 @@
 use super::*;
 use crate::claims::Claim;
 use afbc::Profile;
-use afbc_plant::{Environment, Gust, GustKind, ParameterChange, PlantModel, PlantParameter};
+use afbc_plant::{Environment, Gust, GustKind, PlantModel, PlantParameter, PlantParameterChange};
 use afbc_scenario::case::{Case, Reading};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::paper::scenario;
 use afbc_scenario::{Scenario, built_in};
-use afbc_sim::run::Run;
+use afbc_sim::run::FlightResult;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, HashSet};
 use std::{fs, io};
@@ -41,11 +41,14 @@ impl Drop for Scratch {
     }
 }
 
-fn fly(scenario: &Scenario, kind: ControllerKind) -> Flown {
-    Flown { run: Run::fly(scenario, scenario.contender(kind).unwrap(), 9).unwrap(), scenario: scenario.clone() }
+fn fly(scenario: &Scenario, kind: ControllerKind) -> ScenarioFlight {
+    ScenarioFlight {
+        run: FlightResult::fly(scenario, scenario.contender(kind).unwrap(), 9).unwrap(),
+        scenario: scenario.clone(),
+    }
 }
 
-fn both(scenario: &Scenario) -> Vec<Flown> {
+fn both(scenario: &Scenario) -> Vec<ScenarioFlight> {
     ControllerKind::PAPER.map(|kind| fly(scenario, kind)).into()
 }
 
@@ -175,7 +178,8 @@ fn unusual_flights_have_figures() {
     // Many events at once, under a name that must be escaped in file names and markup.
     let gust = |axis, size| Gust { axis, kind: GustKind::Force, size, start_s: 1.0, end_s: 1.5 };
     let gusts = afbc_types::Axis::ALL.map(|axis| gust(axis, 0.001)).to_vec();
-    let change = ParameterChange { quantity: PlantParameter::Mass, factor: 1.013, start_s: 0.5, end_s: f64::INFINITY };
+    let change =
+        PlantParameterChange { quantity: PlantParameter::Mass, factor: 1.013, start_s: 0.5, end_s: f64::INFINITY };
     let stormy = Scenario {
         name: "../a <b> & \"c\" ⟨d⟩".into(),
         environment: Environment::new(calm.vehicle, vec![change], gusts).unwrap(),
@@ -191,7 +195,7 @@ fn unusual_flights_have_figures() {
     }
     broken.run.metrics.final_error.x = f64::NAN;
     flown.push(broken.clone());
-    let mut empty = Flown { scenario: Scenario { name: "empty".into(), ..calm }, ..broken };
+    let mut empty = ScenarioFlight { scenario: Scenario { name: "empty".into(), ..calm }, ..broken };
     empty.run.log.clear();
     flown.push(empty);
 
@@ -328,7 +332,10 @@ fn real_flights_of_many_contenders_leave_everything() {
     let named = |name: &str| Contender { name: name.into(), ..Contender::of(ControllerKind::Pid, Profile::Flight) };
     scenario.contenders.truncate(1);
     scenario.contenders.extend(["pid", "a/b", "a b", "<&\"'> δ = 0 of thirty-two."].map(named));
-    let fly = |contender| Flown { run: Run::fly(&scenario, contender, 9).unwrap(), scenario: scenario.clone() };
+    let fly = |contender| ScenarioFlight {
+        run: FlightResult::fly(&scenario, contender, 9).unwrap(),
+        scenario: scenario.clone(),
+    };
     let flown: Vec<_> = scenario.contenders.iter().map(fly).collect();
     let scratch = Scratch::new("many");
     write(&scratch.open(), &flown, &[]).unwrap();

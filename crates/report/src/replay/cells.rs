@@ -1,7 +1,7 @@
 //! Texts and numbers about a replay, for the HTML page and the terminal.
 
 use super::Replay;
-use afbc_estimator::{Aid, Resets};
+use afbc_estimator::{AidSource, Resets};
 use afbc_replay::{ErrorFigure, EstimatorStart, SampleSource};
 
 /// Column heads.
@@ -114,12 +114,12 @@ pub(super) fn sentences(replay: &Replay<'_>) -> Vec<String> {
 }
 
 /// Names of the measurements.
-pub(super) const AIDS: [(&str, Aid); 5] = [
-    ("gnss-position", Aid::GnssPosition),
-    ("gnss-height", Aid::GnssHeight),
-    ("gnss-velocity", Aid::GnssVelocity),
-    ("height", Aid::Height),
-    ("heading", Aid::Heading),
+pub(super) const AIDS: [(&str, AidSource); 5] = [
+    ("gnss-position", AidSource::GnssPosition),
+    ("gnss-height", AidSource::GnssHeight),
+    ("gnss-velocity", AidSource::GnssVelocity),
+    ("height", AidSource::Height),
+    ("heading", AidSource::Heading),
 ];
 
 fn start(replay: &Replay<'_>) -> String {

@@ -3,11 +3,11 @@
 
 use afbc_campaign::{self as campaign, Drawn, FIGURES, Manifest, QUANTITIES, Row, Shard, Summary};
 use afbc_files::Folder;
-use afbc_plant::{CosineGust, Environment, Gust, GustKind, ParameterChange, Payload, PlantParameter, RotorFault};
+use afbc_plant::{CosineGust, Environment, Gust, GustKind, Payload, PlantParameter, PlantParameterChange, RotorFault};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::{Outage, Scenario, built_in};
-use afbc_sim::flown::Flown;
-use afbc_sim::run::Run;
+use afbc_sim::flown::ScenarioFlight;
+use afbc_sim::run::FlightResult;
 use nalgebra::Vector3;
 use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
@@ -59,10 +59,13 @@ pub(crate) fn named(name: &str) -> Contender {
 }
 
 /// Flies `scenario` under contenders with these names.
-pub(crate) fn flown(scenario: &Scenario, names: &[&str]) -> Vec<Flown> {
+pub(crate) fn flown(scenario: &Scenario, names: &[&str]) -> Vec<ScenarioFlight> {
     let contenders: Vec<_> = names.iter().map(|name| named(name)).collect();
     let scenario = Scenario { contenders, ..scenario.clone() };
-    let fly = |contender| Flown { run: Run::fly(&scenario, contender, 10).unwrap(), scenario: scenario.clone() };
+    let fly = |contender| ScenarioFlight {
+        run: FlightResult::fly(&scenario, contender, 10).unwrap(),
+        scenario: scenario.clone(),
+    };
     scenario.contenders.iter().map(fly).collect()
 }
 
@@ -108,7 +111,7 @@ pub(crate) fn gone_alike(names: &[&str], drawn: &[&str], flights: u64, lost: imp
 pub(crate) fn eventful() -> Scenario {
     let calm = hover(12.0);
     let gust = |axis, start_s, end_s| Gust { axis, kind: GustKind::Force, size: 0.01, start_s, end_s };
-    let change = |quantity, factor, start_s, end_s| ParameterChange { quantity, factor, start_s, end_s };
+    let change = |quantity, factor, start_s, end_s| PlantParameterChange { quantity, factor, start_s, end_s };
     let environment = Environment::new(
         calm.vehicle,
         vec![

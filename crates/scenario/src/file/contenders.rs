@@ -13,24 +13,24 @@ const NAME_LENGTH: usize = 32;
 
 /// Vehicle that the contenders fly: from a vehicle file, or the paper's with these nominal parameters.
 #[derive(Clone, Copy)]
-pub(super) enum Flown<'a> {
+pub(super) enum FlownVehicle<'a> {
     File(&'a Vehicle),
     Paper(&'a Parameters<f64>),
 }
 
-impl Flown<'_> {
+impl FlownVehicle<'_> {
     /// Returns AFBC's gains for the vehicle.
     fn gains(self, profile: Profile) -> PerAxis<adaptive::Gains> {
         match self {
-            Flown::File(vehicle) => vehicle.gains(profile),
-            Flown::Paper(parameters) => profile.gains_for(&parameters.to_f32(), LAG_S),
+            FlownVehicle::File(vehicle) => vehicle.gains(profile),
+            FlownVehicle::Paper(parameters) => profile.gains_for(&parameters.to_f32(), LAG_S),
         }
     }
 
     fn settings(self, profile: Profile) -> Settings {
         match self {
-            Flown::File(vehicle) => vehicle.settings(profile),
-            Flown::Paper(_) => profile.settings(),
+            FlownVehicle::File(vehicle) => vehicle.settings(profile),
+            FlownVehicle::Paper(_) => profile.settings(),
         }
     }
 
@@ -38,8 +38,8 @@ impl Flown<'_> {
     fn law(self, kind: ControllerKind, profile: Profile, afbc: &PerAxis<adaptive::Gains>) -> Result<Law, FileError> {
         let law = Law::beside(kind, afbc);
         match self {
-            Flown::File(vehicle) if !kind.in_cascade() => Law::on(kind, vehicle, profile),
-            Flown::File(vehicle) if kind != ControllerKind::Afbc && profile == Profile::Flight => {
+            FlownVehicle::File(vehicle) if !kind.in_cascade() => Law::on(kind, vehicle, profile),
+            FlownVehicle::File(vehicle) if kind != ControllerKind::Afbc && profile == Profile::Flight => {
                 law_gains(vehicle, law)
             }
             _ => Ok(law),
@@ -50,7 +50,7 @@ impl Flown<'_> {
 /// Defaults for a contender.
 #[derive(Clone, Copy)]
 struct Defaults<'a> {
-    flown: Flown<'a>,
+    flown: FlownVehicle<'a>,
     profile: Profile,
     gains: PerAxis<adaptive::Gains>,
     settings: Settings,
@@ -67,7 +67,7 @@ impl Defaults<'_> {
 }
 
 /// Reads all contenders, those of `controllers` first.
-pub(super) fn read(root: &mut Table<'_>, flown: Flown<'_>) -> Result<Vec<Contender>, FileError> {
+pub(super) fn read(root: &mut Table<'_>, flown: FlownVehicle<'_>) -> Result<Vec<Contender>, FileError> {
     let controllers = root.choices("controllers", &ControllerKind::all(), ControllerKind::name)?;
     let profile = root.choice("profile", &Profile::ALL, Profile::name)?.unwrap_or(Profile::Flight);
     let mut axes = flown.gains(profile);

@@ -4,7 +4,8 @@ use crate::definition::Outage;
 use afbc_files::read::words::out_of_range;
 use afbc_files::read::{FileError, Table};
 use afbc_plant::{
-    Environment, Gust, GustKind, PAYLOAD_AHEAD, PAYLOAD_BELOW, PAYLOAD_LEFT, ParameterChange, Payload, PlantParameter,
+    Environment, Gust, GustKind, PAYLOAD_AHEAD, PAYLOAD_BELOW, PAYLOAD_LEFT, Payload, PlantParameter,
+    PlantParameterChange,
 };
 use afbc_types::{Axis, Parameters, Range};
 
@@ -104,7 +105,7 @@ fn gust(mut table: Table<'_>) -> Result<Gust, FileError> {
     Ok(Gust { axis, kind, size, start_s, end_s })
 }
 
-fn change(table: &mut Table<'_>) -> Result<ParameterChange, FileError> {
+fn change(table: &mut Table<'_>) -> Result<PlantParameterChange, FileError> {
     let quantities = [
         PlantParameter::Mass,
         PlantParameter::Inertia,
@@ -127,7 +128,7 @@ fn change(table: &mut Table<'_>) -> Result<ParameterChange, FileError> {
         matches!(quantity, PlantParameter::RollMoment | PlantParameter::PitchMoment | PlantParameter::YawMoment);
     let factor = table.need_number(if is_moment { &MOMENT_FACTOR } else { &FACTOR })?;
     let [start_s, end_s] = interval(table)?;
-    Ok(ParameterChange { quantity, factor, start_s, end_s })
+    Ok(PlantParameterChange { quantity, factor, start_s, end_s })
 }
 
 pub(super) fn interval(table: &mut Table<'_>) -> Result<[f64; 2], FileError> {

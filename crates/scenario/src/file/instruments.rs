@@ -2,10 +2,12 @@
 //! sensor properties that its software is told.
 
 use super::environment::interval;
-use crate::told::{Told, stated};
+use crate::told::{AssumedInstruments, stated};
 use afbc_files::read::{FileError, Table};
 use afbc_plant::InstrumentSuite;
-use afbc_plant::instruments::{Barometer, Failure, Gnss, Imu, InstrumentFault, Magnetometer, TrackerModel, limits};
+use afbc_plant::instruments::{
+    BarometerModel, FailureKind, GnssModel, ImuModel, InstrumentFault, MagnetometerModel, TrackerModel, limits,
+};
 use afbc_vehicles::{Vehicle, parts};
 
 /// Reads the instruments of `table`; without a table there are none.
@@ -25,11 +27,11 @@ pub(super) fn read(table: Option<Table<'_>>) -> Result<InstrumentSuite, FileErro
 fn suite(table: &mut Table<'_>, base: &InstrumentSuite) -> Result<InstrumentSuite, FileError> {
     let InstrumentSuite { imu, tracker, gnss, barometer, magnetometer } = *base;
     Ok(InstrumentSuite {
-        imu: parts::instrument(table, "imu", imu, &Imu::PRESETS, &parts::TRIADS)?,
+        imu: parts::instrument(table, "imu", imu, &ImuModel::PRESETS, &parts::TRIADS)?,
         tracker: parts::instrument(table, "tracker", tracker, &TrackerModel::PRESETS, &["loss", "freeze"])?,
-        gnss: parts::instrument(table, "gnss", gnss, &Gnss::PRESETS, &["loss"])?,
-        barometer: parts::instrument(table, "barometer", barometer, &Barometer::PRESETS, &[])?,
-        magnetometer: parts::instrument(table, "magnetometer", magnetometer, &Magnetometer::PRESETS, &[])?,
+        gnss: parts::instrument(table, "gnss", gnss, &GnssModel::PRESETS, &["loss"])?,
+        barometer: parts::instrument(table, "barometer", barometer, &BarometerModel::PRESETS, &[])?,
+        magnetometer: parts::instrument(table, "magnetometer", magnetometer, &MagnetometerModel::PRESETS, &[])?,
     })
 }
 
@@ -38,7 +40,7 @@ pub(super) fn told(
     root: &mut Table<'_>,
     instruments: &InstrumentSuite,
     vehicle: Option<&Vehicle>,
-) -> Result<Told, FileError> {
+) -> Result<AssumedInstruments, FileError> {
     const KEY: &str = "told";
     if root.has(KEY) && instruments.imu.is_none() {
         root.clash(
@@ -48,9 +50,11 @@ pub(super) fn told(
         )?;
     }
     if !root.holds_table(KEY) {
-        return Ok(root.choice(KEY, &[()], |()| "drawn")?.map_or(Told::Stated, |()| Told::Drawn));
+        return Ok(root
+            .choice(KEY, &[()], |()| "drawn")?
+            .map_or(AssumedInstruments::Stated, |()| AssumedInstruments::Drawn));
     }
-    let Some(mut table) = root.table(KEY)? else { return Ok(Told::Stated) };
+    let Some(mut table) = root.table(KEY)? else { return Ok(AssumedInstruments::Stated) };
     let there = [
         ("tracker", instruments.tracker.is_some()),
         ("gnss", instruments.gnss.is_some()),
@@ -63,7 +67,7 @@ pub(super) fn told(
     let base = stated(instruments, vehicle);
     let told = suite(&mut table, &base)?;
     table.finish()?;
-    Ok(Told::Suite(Box::new(InstrumentSuite {
+    Ok(AssumedInstruments::Suite(Box::new(InstrumentSuite {
         imu: told.imu.or(base.imu),
         tracker: told.tracker.or(base.tracker),
         gnss: told.gnss.or(base.gnss),
@@ -78,33 +82,33 @@ pub(super) fn faults(root: &mut Table<'_>, suite: &InstrumentSuite) -> Result<Ve
 }
 
 fn fault(mut table: Table<'_>, suite: &InstrumentSuite) -> Result<InstrumentFault, FileError> {
-    let kind = table.need_choice("failure", &Failure::ALL, Failure::name)?;
+    let kind = table.need_choice("failure", &FailureKind::ALL, FailureKind::name)?;
     let failure = match kind {
-        Failure::ImuNoisy { .. } => Failure::ImuNoisy {
+        FailureKind::ImuNoisy { .. } => FailureKind::ImuNoisy {
             rates_rad_s: table.need_number(&limits::RATES)?,
             specific_force_m_s2: table.need_number(&limits::FORCE)?,
         },
-        Failure::ImuClipped { .. } => Failure::ImuClipped {
+        FailureKind::ImuClipped { .. } => FailureKind::ImuClipped {
             rates_rad_s: table.need_number(&limits::RATES)?,
             specific_force_m_s2: table.need_number(&limits::FORCE)?,
         },
-        Failure::ImuBiased { .. } => Failure::ImuBiased {
+        FailureKind::ImuBiased { .. } => FailureKind::ImuBiased {
             rates_bias_rad_s: table.need_vector(limits::RATES_BIAS.name, &limits::RATES_BIAS)?,
             force_bias_m_s2: table.need_vector(limits::FORCE_BIAS.name, &limits::FORCE_BIAS)?,
         },
-        Failure::TrackerJumped { .. } => Failure::TrackerJumped {
+        FailureKind::TrackerJumped { .. } => FailureKind::TrackerJumped {
             by_m: table.need_vector(limits::JUMP.name, &limits::JUMP)?,
             yaw_rad: table.number(&limits::YAW)?.unwrap_or(0.0),
         },
-        Failure::GnssJumped { .. } => {
-            Failure::GnssJumped { by_m: table.need_vector(limits::JUMP.name, &limits::JUMP)? }
+        FailureKind::GnssJumped { .. } => {
+            FailureKind::GnssJumped { by_m: table.need_vector(limits::JUMP.name, &limits::JUMP)? }
         }
-        Failure::GnssMultipath { .. } => Failure::GnssMultipath {
+        FailureKind::GnssMultipath { .. } => FailureKind::GnssMultipath {
             deviation_m: table.need_number(&limits::DEVIATION)?,
             correlation_time_s: table.need_number(&limits::CORRELATION)?,
         },
-        Failure::MagnetometerDisturbed { .. } => {
-            Failure::MagnetometerDisturbed { field_ut: table.need_vector(limits::FIELD.name, &limits::FIELD)? }
+        FailureKind::MagnetometerDisturbed { .. } => {
+            FailureKind::MagnetometerDisturbed { field_ut: table.need_vector(limits::FIELD.name, &limits::FIELD)? }
         }
         plain => plain,
     };

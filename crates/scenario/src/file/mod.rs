@@ -20,10 +20,10 @@ use crate::contender::Contender;
 use crate::trajectory::Trajectory;
 use afbc_files::read::words::out_of_range;
 use afbc_files::read::{Example, FileError, Table};
-use afbc_plant::{Frame, PlantModel, Realism, Sensing};
+use afbc_plant::{PlantModel, Realism, RotorLayout, Sensing};
 use afbc_types::{PLUS, ROTORS, Range};
 use afbc_vehicles::parts;
-use contenders::Flown;
+use contenders::FlownVehicle;
 use std::path::Path;
 
 /// Default duration of a flight \[s\].
@@ -66,7 +66,7 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
     let is_known = root.knows("vehicle") && table.as_ref().is_none_or(|table| table.knows("name"));
     let (vehicle_file, vehicle) = vehicle::read(table)?;
     let truth = parts::parameters(root.table("truth")?, vehicle)?;
-    let flown = vehicle_file.as_ref().map_or(Flown::Paper(&vehicle), Flown::File);
+    let flown = vehicle_file.as_ref().map_or(FlownVehicle::Paper(&vehicle), FlownVehicle::File);
     let contenders = contenders::read(&mut root, flown)?;
     let trajectory = match (root.table("trajectory")?, trajectory) {
         (Some(table), _) => trajectory::read(table)?,
@@ -80,7 +80,7 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
     let environment = environment::read(&mut root, truth)?;
     let step_s = contenders.first().map_or(afbc_control::Settings::DT.range.max, Contender::step_s);
     let rotors = vehicle_file.as_ref().map_or(PLUS.map(|rotor| rotor.to_f64()).to_vec(), |file| file.rotors.clone());
-    let frame = Frame::new(&rotors).map_err(|error| root.fault_at("vehicle", out_of_range(&error)))?;
+    let frame = RotorLayout::new(&rotors).map_err(|error| root.fault_at("vehicle", out_of_range(&error)))?;
     let real = vehicle_file.as_ref().map_or(Realism::default(), |file| file.realism.clone());
     let count = if is_known { frame.count() } else { ROTORS.max as usize };
     let realism = realism::read(&mut root, &real, &truth, (&frame, count), step_s)?;

@@ -4,7 +4,7 @@
 //! (`duration,x^0,...,x^7,y^0,...,yaw^7`).
 
 use super::reference::{START, flyable};
-use crate::trajectory::polynomial::{COEFFICIENTS, Coefficients, PolynomialPiece, through};
+use crate::trajectory::polynomial::{COEFFICIENTS, PolynomialCoefficients, PolynomialPiece, through};
 use crate::trajectory::spline::PathSamples;
 use crate::trajectory::{Reference, Trajectory, nearest_heading};
 use afbc_files::read::{FileError, Separated, Source, Table};
@@ -43,7 +43,7 @@ pub(super) fn read(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let shown = path.display().to_string();
     let text = std::fs::read_to_string(&path)
         .map_err(|error| table.fault_at(FILE, format!("{shown} cannot be read ({error}); name a file of text")))?;
-    let file = Lines { source: Source { file: &shown, text: &text } };
+    let file = PathLines { source: Source { file: &shown, text: &text } };
     let mut pieces = file.pieces().map_err(|error| table.through(FILE, error))?;
     let first_s = pieces.first().map_or(0.0, |piece| piece.start_s);
     let start_s = start_s.unwrap_or(first_s);
@@ -74,11 +74,11 @@ fn paced(piece: &PolynomialPiece, first_s: f64, start_s: f64, pace: f64) -> Poly
 }
 
 /// A path's file.
-struct Lines<'a> {
+struct PathLines<'a> {
     source: Source<'a>,
 }
 
-impl Lines<'_> {
+impl PathLines<'_> {
     fn pieces(&self) -> Result<Vec<PolynomialPiece>, FileError> {
         let mut reader = ReaderBuilder::new()
             .delimiter(self.form().separator)
@@ -146,7 +146,7 @@ impl Lines<'_> {
             if duration_s <= 0.0 {
                 return Err(self.fault(row, DURATION, "a piece must last longer than 0 s".into()));
             }
-            let mut coefficients: [Coefficients; 4] = Default::default();
+            let mut coefficients: [PolynomialCoefficients; 4] = Default::default();
             for (i, coefficient) in coefficients.iter_mut().flatten().enumerate() {
                 *coefficient = self.number(row, i + 1, head)?;
             }

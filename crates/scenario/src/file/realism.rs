@@ -5,7 +5,7 @@ use super::environment::{LENGTH, START};
 use afbc_files::read::{FileError, Table};
 use afbc_plant::rotors::limits::{EFFICIENCY, ROTOR};
 use afbc_plant::{
-    Battery, Contact, CosineGust, Drag, Frame, GroundEffect, Realism, RotorFault, Turbulence, Wind, wind,
+    BatteryModel, Contact, CosineGust, Drag, GroundEffect, Realism, RotorFault, RotorLayout, Turbulence, Wind, wind,
 };
 use afbc_types::{Parameters, Range};
 use afbc_vehicles::parts::{self, DragConditions};
@@ -19,14 +19,14 @@ pub(super) fn read(
     root: &mut Table<'_>,
     default: &Realism,
     truth: &Parameters<f64>,
-    (frame, count): (&Frame, usize),
+    (frame, count): (&RotorLayout, usize),
     step_s: f64,
 ) -> Result<Realism, FileError> {
     let mut rotors = parts::rotors(root.table("rotors")?, default.rotors.clone(), truth)?;
     let faults = root.few_tables("rotor_fault")?.into_iter().map(|table| fault(table, count));
     rotors.faults = faults.collect::<Result<_, _>>()?;
     if let Some(table) = root.table("battery")? {
-        rotors.battery = Some(parts::battery(table, rotors.battery.unwrap_or(Battery::THREE_CELLS))?);
+        rotors.battery = Some(parts::battery(table, rotors.battery.unwrap_or(BatteryModel::THREE_CELLS))?);
     }
     let conditions = DragConditions { parameters: truth, frame, rotor_max_rad_s: rotors.max_rad_s, step_s };
     let drag = match root.table("drag")? {

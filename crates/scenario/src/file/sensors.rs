@@ -2,7 +2,7 @@
 
 use super::environment::interval;
 use afbc_files::read::{FileError, Table};
-use afbc_plant::{Deviations, Dropouts, Misreading, Sensing, SensorFault};
+use afbc_plant::{Deviations, MeasurementDropouts, Sensing, SensorFault, SensorFaultKind};
 use afbc_types::{Axis, Range};
 
 /// Accepted noise and bias, if given as one number for all coordinates.
@@ -39,11 +39,11 @@ fn spread(table: &mut Table<'_>, all: &Range) -> Result<Deviations, FileError> {
     Ok(spread)
 }
 
-fn dropouts(mut table: Table<'_>) -> Result<Dropouts, FileError> {
-    let mut dropouts = Dropouts::DEFAULT;
+fn dropouts(mut table: Table<'_>) -> Result<MeasurementDropouts, FileError> {
+    let mut dropouts = MeasurementDropouts::DEFAULT;
     table.declared(&mut dropouts)?;
-    table.require(&Dropouts::RATE.range)?;
-    table.require(&Dropouts::MEAN.range)?;
+    table.require(&MeasurementDropouts::RATE.range)?;
+    table.require(&MeasurementDropouts::MEAN.range)?;
     table.finish()?;
     Ok(dropouts)
 }
@@ -59,9 +59,9 @@ fn fault(mut table: Table<'_>) -> Result<SensorFault, FileError> {
         Some(Axis::Roll | Axis::Pitch | Axis::Yaw) => TURN,
         _ => OFFSET,
     };
-    let frozen = table.boolean("frozen")?.unwrap_or(false).then_some(Misreading::Frozen);
-    let factor = table.number(&FACTOR)?.map(Misreading::Factor);
-    let offset_by = table.number(&offset)?.map(Misreading::Offset);
+    let frozen = table.boolean("frozen")?.unwrap_or(false).then_some(SensorFaultKind::Frozen);
+    let factor = table.number(&FACTOR)?.map(SensorFaultKind::Factor);
+    let offset_by = table.number(&offset)?.map(SensorFaultKind::Offset);
     let [start_s, end_s] = interval(&mut table)?;
     table.finish()?;
     let mut misreadings = [factor, offset_by, frozen].into_iter().flatten();
@@ -70,8 +70,8 @@ fn fault(mut table: Table<'_>) -> Result<SensorFault, FileError> {
         let known = format!("it takes one of factor, {} and frozen = true, and no more", offset.name);
         table.clash(FACTOR.name, &[], known)?;
     }
-    let misreading = first.unwrap_or(Misreading::Frozen);
-    if axis.is_none() && misreading != Misreading::Frozen {
+    let misreading = first.unwrap_or(SensorFaultKind::Frozen);
+    if axis.is_none() && misreading != SensorFaultKind::Frozen {
         table.clash("axis", &[], "missing; name the axis; only a frozen state may be the whole one")?;
     }
     Ok(SensorFault { axis, misreading, start_s, end_s })

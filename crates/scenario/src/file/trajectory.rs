@@ -38,7 +38,7 @@ const SPEED_MAX: Range = Range::new("speed_max_m_s", 0.01, 100.0);
 const ACCELERATION_MAX: Range = Range::new("acceleration_max_m_s2", 0.01, 100.0);
 
 #[derive(Clone, Copy)]
-enum Kind {
+enum TrajectoryKind {
     Paper,
     Hover,
     Step,
@@ -50,53 +50,53 @@ enum Kind {
     File,
 }
 
-impl Kind {
-    const ALL: [Kind; 9] = [
-        Kind::Paper,
-        Kind::Hover,
-        Kind::Step,
-        Kind::Circle,
-        Kind::Lemniscate,
-        Kind::Lissajous,
-        Kind::Waypoints,
-        Kind::MinimumSnap,
-        Kind::File,
+impl TrajectoryKind {
+    const ALL: [TrajectoryKind; 9] = [
+        TrajectoryKind::Paper,
+        TrajectoryKind::Hover,
+        TrajectoryKind::Step,
+        TrajectoryKind::Circle,
+        TrajectoryKind::Lemniscate,
+        TrajectoryKind::Lissajous,
+        TrajectoryKind::Waypoints,
+        TrajectoryKind::MinimumSnap,
+        TrajectoryKind::File,
     ];
 
     const fn name(self) -> &'static str {
         match self {
-            Kind::Paper => "paper",
-            Kind::Hover => "hover",
-            Kind::Step => "step",
-            Kind::Circle => "circle",
-            Kind::Lemniscate => "lemniscate",
-            Kind::Lissajous => "lissajous",
-            Kind::Waypoints => "waypoints",
-            Kind::MinimumSnap => "minimum-snap",
-            Kind::File => "file",
+            TrajectoryKind::Paper => "paper",
+            TrajectoryKind::Hover => "hover",
+            TrajectoryKind::Step => "step",
+            TrajectoryKind::Circle => "circle",
+            TrajectoryKind::Lemniscate => "lemniscate",
+            TrajectoryKind::Lissajous => "lissajous",
+            TrajectoryKind::Waypoints => "waypoints",
+            TrajectoryKind::MinimumSnap => "minimum-snap",
+            TrajectoryKind::File => "file",
         }
     }
 }
 
 pub(super) fn read(mut table: Table<'_>) -> Result<Trajectory, FileError> {
-    let trajectory = match table.need_choice("kind", &Kind::ALL, Kind::name)? {
-        Kind::Paper => Trajectory::Paper,
-        Kind::Hover => {
+    let trajectory = match table.need_choice("kind", &TrajectoryKind::ALL, TrajectoryKind::name)? {
+        TrajectoryKind::Paper => Trajectory::Paper,
+        TrajectoryKind::Hover => {
             Trajectory::Hover { position_m: table.need_vector("position_m", &POSITION)?, yaw_rad: yaw(&mut table)? }
         }
-        Kind::Step => Trajectory::Step {
+        TrajectoryKind::Step => Trajectory::Step {
             from_m: table.need_vector("from_m", &POSITION)?,
             to_m: table.need_vector("to_m", &POSITION)?,
             at_s: table.need_number(&STEP_TIME)?,
             yaw_rad: yaw(&mut table)?,
             turn_rad: table.number(&TURN)?.unwrap_or(0.0),
         },
-        Kind::Circle => circle(&mut table)?,
-        Kind::Lemniscate => lemniscate(&mut table)?,
-        Kind::Lissajous => lissajous(&mut table)?,
-        Kind::Waypoints => waypoints(&mut table)?,
-        Kind::MinimumSnap => through_places(&mut table)?,
-        Kind::File => path::read(&mut table)?,
+        TrajectoryKind::Circle => circle(&mut table)?,
+        TrajectoryKind::Lemniscate => lemniscate(&mut table)?,
+        TrajectoryKind::Lissajous => lissajous(&mut table)?,
+        TrajectoryKind::Waypoints => waypoints(&mut table)?,
+        TrajectoryKind::MinimumSnap => through_places(&mut table)?,
+        TrajectoryKind::File => path::read(&mut table)?,
     };
     table.finish()?;
     Ok(trajectory)

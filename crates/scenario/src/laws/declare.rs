@@ -129,14 +129,14 @@ macro_rules! laws {
 
         impl afbc_types::Declared for Law {
             /// Visits each gain; the gains of a law in the cascade are in a group for each axis.
-            fn visit<E>(&self, visit: &mut impl afbc_types::Visit<E>) -> Result<(), E> {
+            fn visit<E>(&self, visit: &mut impl afbc_types::Visitor<E>) -> Result<(), E> {
                 match self {
                     $( Law::$Law(gains) => gains.visit(visit), )*
                     Law::Own(gains) => gains.visit(visit),
                 }
             }
 
-            fn visit_mut<E>(&mut self, visit: &mut impl afbc_types::VisitMut<E>) -> Result<(), E> {
+            fn visit_mut<E>(&mut self, visit: &mut impl afbc_types::VisitorMut<E>) -> Result<(), E> {
                 match self {
                     $( Law::$Law(gains) => gains.visit_mut(visit), )*
                     Law::Own(gains) => gains.visit_mut(visit),

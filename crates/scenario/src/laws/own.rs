@@ -2,8 +2,8 @@
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_types::{
-    Airframe, Declaration, Declared, Inputs, OutOfRange, Parameters, Range, Setpoint, State, Value, ValueMut, Visit,
-    VisitMut,
+    Airframe, Declaration, Declared, DeclaredValue, DeclaredValueMut, Inputs, OutOfRange, Parameters, Range, Setpoint,
+    State, Visitor, VisitorMut,
 };
 use core::cell::RefCell;
 use core::fmt;
@@ -65,14 +65,14 @@ impl OwnGain {
     }
 }
 
-type Maker = dyn Fn(&OwnVehicle) -> Box<dyn OwnController> + Send + Sync;
+type LawFactory = dyn Fn(&OwnVehicle) -> Box<dyn OwnController> + Send + Sync;
 
 /// A user's law before it is [registered](Self::register).
 pub struct OwnLaw {
     name: &'static str,
     title: &'static str,
     gains: Vec<OwnGain>,
-    make: RwLock<Arc<Maker>>,
+    make: RwLock<Arc<LawFactory>>,
 }
 
 /// All registered laws.
@@ -238,14 +238,14 @@ impl Serialize for OwnGains {
 }
 
 impl Declared for OwnGains {
-    fn visit<E>(&self, visit: &mut impl Visit<E>) -> Result<(), E> {
+    fn visit<E>(&self, visit: &mut impl Visitor<E>) -> Result<(), E> {
         let mut gains = self.kind.0.gains.iter().zip(&self.values);
-        gains.try_for_each(|(gain, value)| visit(&gain.declaration, Value::Single(slice::from_ref(value))))
+        gains.try_for_each(|(gain, value)| visit(&gain.declaration, DeclaredValue::Single(slice::from_ref(value))))
     }
 
-    fn visit_mut<E>(&mut self, visit: &mut impl VisitMut<E>) -> Result<(), E> {
+    fn visit_mut<E>(&mut self, visit: &mut impl VisitorMut<E>) -> Result<(), E> {
         let mut gains = self.kind.0.gains.iter().zip(&mut self.values);
-        gains.try_for_each(|(gain, value)| visit(&gain.declaration, ValueMut::Single(slice::from_mut(value))))
+        gains.try_for_each(|(gain, value)| visit(&gain.declaration, DeclaredValueMut::Single(slice::from_mut(value))))
     }
 
     fn together(&self) -> Result<(), OutOfRange> {

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 pub const COEFFICIENTS: usize = 8;
 
 /// Coefficients of c0 + c1 s + ... + c7 s^7, where s is the time since the piece's start \[s\].
-pub type Coefficients = [f64; COEFFICIENTS];
+pub type PolynomialCoefficients = [f64; COEFFICIENTS];
 
 /// A piece of a reference: x, y, z \[m\] and yaw \[rad\] as polynomials.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -17,11 +17,11 @@ pub struct PolynomialPiece {
     /// Length \[s\].
     pub duration_s: f64,
     /// Coefficients of x, y, z and yaw.
-    pub coefficients: [Coefficients; 4],
+    pub coefficients: [PolynomialCoefficients; 4],
 }
 
 /// Returns value and four derivatives of a polynomial at `s`, by Horner's rule.
-pub fn derivatives(coefficients: &Coefficients, s: f64) -> [f64; 5] {
+pub fn derivatives(coefficients: &PolynomialCoefficients, s: f64) -> [f64; 5] {
     let [mut value, mut first, mut second, mut third, mut fourth] = [0.0; 5];
     for coefficient in coefficients.iter().rev() {
         fourth = fourth * s + third;
@@ -122,7 +122,7 @@ pub fn through(knots: &[Knot]) -> Vec<PolynomialPiece> {
 }
 
 /// Returns the quintic polynomial from value and two derivatives at 0 to value and two derivatives at `t`.
-fn quintic([p0, v0, a0]: [f64; 3], [p1, v1, a1]: [f64; 3], t: f64) -> Coefficients {
+fn quintic([p0, v0, a0]: [f64; 3], [p1, v1, a1]: [f64; 3], t: f64) -> PolynomialCoefficients {
     let (d, v, a) = (p1 - p0 - v0 * t - 0.5 * a0 * t * t, v1 - v0 - a0 * t, a1 - a0);
     let (t2, t3) = (t * t, t * t * t);
     [

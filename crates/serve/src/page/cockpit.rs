@@ -12,7 +12,7 @@ use crate::{Server, Then, TimeFlow, TimeRate};
 use afbc_comms::services::modes::custom;
 use afbc_flight_core::Mode;
 use afbc_guidance::FlightMode;
-use afbc_mavlink::{Command, Datum, Height, MavSeverity, Place, Plan};
+use afbc_mavlink::{Datum, GlobalPosition, Height, MavSeverity, MissionType, VehicleCommand};
 use nalgebra::{Vector2, Vector3};
 use serde_json::json;
 use std::collections::VecDeque;
@@ -149,20 +149,20 @@ impl Cockpit {
                 return PageReply { messages: self.values(server).into_iter().collect(), then: Then::Nothing };
             }
             PageCommand::Line { text } => return line(server, &text),
-            PageCommand::Arm {} => station.command(server, Command::Arm),
-            PageCommand::Disarm {} => station.command(server, Command::Disarm),
-            PageCommand::Kill {} => station.command(server, Command::Kill),
-            PageCommand::Engage {} => station.command(server, Command::Engage),
-            PageCommand::Land {} => station.command(server, Command::Land),
-            PageCommand::Return {} => station.command(server, Command::Return),
-            PageCommand::Hold {} => station.command(server, Command::SelectMode(custom(FlightMode::Hold))),
-            PageCommand::StartMission {} => station.command_armed(server, Command::StartMission(0, None)),
+            PageCommand::Arm {} => station.command(server, VehicleCommand::Arm),
+            PageCommand::Disarm {} => station.command(server, VehicleCommand::Disarm),
+            PageCommand::Kill {} => station.command(server, VehicleCommand::Kill),
+            PageCommand::Engage {} => station.command(server, VehicleCommand::Engage),
+            PageCommand::Land {} => station.command(server, VehicleCommand::Land),
+            PageCommand::Return {} => station.command(server, VehicleCommand::Return),
+            PageCommand::Hold {} => station.command(server, VehicleCommand::SelectMode(custom(FlightMode::Hold))),
+            PageCommand::StartMission {} => station.command_armed(server, VehicleCommand::StartMission(0, None)),
             PageCommand::TakeOff { height_m } => {
                 if !(0.3..=500.0).contains(&height_m) {
                     return PageReply::refused("the height must be 0.3 to 500 m");
                 }
                 let height = Height { metres: height_m, above: Datum::Here };
-                station.command_armed(server, Command::TakeOff(height));
+                station.command_armed(server, VehicleCommand::TakeOff(height));
             }
             PageCommand::GoTo { position_m } => return self.go_to(server, Vector3::from(position_m)),
             PageCommand::Plan { waypoints_m, fence_m } => return self.plan(server, &waypoints_m, &fence_m),
@@ -184,14 +184,14 @@ impl Cockpit {
         let origin = server.vehicles().first().and_then(|vehicle| vehicle.origin());
         // DO_REPOSITION needs a place on the earth. Without one, targets in the local frame lead the vehicle.
         let Some(origin) = origin else {
-            self.station.lead(server, local_m, Command::SelectMode(custom(FlightMode::Offboard)));
+            self.station.lead(server, local_m, VehicleCommand::SelectMode(custom(FlightMode::Offboard)));
             return PageReply::default();
         };
         let there = origin.global(&local_m);
         let [latitude_e7, longitude_e7] = there.e7();
         let height = Height { metres: there.altitude_m as f32, above: Datum::Sea };
-        let place = Place { latitude_e7, longitude_e7, height };
-        let go = Command::Reposition { place, yaw_rad: f32::NAN, speed_m_s: None, changes_mode: true };
+        let place = GlobalPosition { latitude_e7, longitude_e7, height };
+        let go = VehicleCommand::Reposition { place, yaw_rad: f32::NAN, speed_m_s: None, changes_mode: true };
         self.station.command(server, go);
         PageReply::default()
     }
@@ -213,8 +213,8 @@ impl Cockpit {
             None => return PageReply::refused("a fence needs a satellite receiver: fly outdoors"),
         };
         // The fence comes first: the vehicle checks the mission against it.
-        let mut plans = vec![(Plan::FENCE, fence), (Plan::MISSION, mission_items(&places_m))];
-        plans.retain(|(plan, _)| origin.is_some() || *plan == Plan::MISSION);
+        let mut plans = vec![(MissionType::FENCE, fence), (MissionType::MISSION, mission_items(&places_m))];
+        plans.retain(|(plan, _)| origin.is_some() || *plan == MissionType::MISSION);
         self.station.upload(server, plans);
         PageReply::default()
     }

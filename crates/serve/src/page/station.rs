@@ -3,7 +3,8 @@
 use crate::Server;
 use afbc_ground::{Client, Patience, UploadEnd};
 use afbc_mavlink::{
-    Address, Answer, Command, Downlink, ExternalTarget, MavCmd, MavSeverity, MissionItem, Plan, PositionTarget, Uplink,
+    Address, CommandResult, Downlink, ExternalTarget, MavCmd, MavSeverity, MissionItem, MissionType, PositionTarget,
+    Uplink, VehicleCommand,
 };
 use nalgebra::Vector3;
 
@@ -32,7 +33,7 @@ const NAMES: [(u16, &str); 8] = [
     (MavCmd::MAV_CMD_DO_SET_MODE as u16, "mode"),
     (MavCmd::MAV_CMD_DO_REPOSITION as u16, "go to"),
     (MavCmd::MAV_CMD_MISSION_START as u16, "start mission"),
-    (Command::Engage.id(), "engage"),
+    (VehicleCommand::Engage.id(), "engage"),
 ];
 
 /// The ground station of the web page.
@@ -40,7 +41,7 @@ pub(crate) struct PageStation {
     client: Client,
     now_ms: u64,
     /// Command to give once the vehicle is armed, and the time at which to give up \[ms\].
-    once_armed: Option<(Command, u64)>,
+    once_armed: Option<(VehicleCommand, u64)>,
     /// Target for a vehicle that does not know its place on the earth, local frame \[m\].
     target_m: Option<Vector3<f32>>,
     heard: Vec<Downlink>,
@@ -77,7 +78,7 @@ impl PageStation {
     }
 
     /// Sends a command.
-    pub(crate) fn command(&mut self, server: &mut Server, command: Command) {
+    pub(crate) fn command(&mut self, server: &mut Server, command: VehicleCommand) {
         // A new command cancels what was to follow the last one.
         (self.once_armed, self.target_m) = (None, None);
         self.client.command(command, Patience::ONCE);
@@ -85,14 +86,14 @@ impl PageStation {
     }
 
     /// Arms the vehicle if it is not armed, then sends a command.
-    pub(crate) fn command_armed(&mut self, server: &mut Server, command: Command) {
+    pub(crate) fn command_armed(&mut self, server: &mut Server, command: VehicleCommand) {
         let armed = server.vehicles().get(VEHICLE).and_then(|it| it.report()).is_some_and(|it| it.mode.armed());
-        self.command(server, if armed { command } else { Command::Arm });
+        self.command(server, if armed { command } else { VehicleCommand::Arm });
         self.once_armed = (!armed).then_some((command, self.now_ms + PATIENCE_MS));
     }
 
     /// Leads the vehicle to a place of its local frame \[m\] in offboard mode.
-    pub(crate) fn lead(&mut self, server: &mut Server, place_m: Vector3<f32>, offboard: Command) {
+    pub(crate) fn lead(&mut self, server: &mut Server, place_m: Vector3<f32>, offboard: VehicleCommand) {
         self.target_m = Some(place_m);
         // Send the target first: the vehicle refuses offboard mode without a fresh target.
         self.say_target();
@@ -114,7 +115,11 @@ impl PageStation {
     }
 
     /// Uploads plans, in this order.
-    pub(crate) fn upload(&mut self, server: &mut Server, plans: impl IntoIterator<Item = (Plan, Vec<MissionItem>)>) {
+    pub(crate) fn upload(
+        &mut self,
+        server: &mut Server,
+        plans: impl IntoIterator<Item = (MissionType, Vec<MissionItem>)>,
+    ) {
         self.client.upload(plans, Patience::ONCE);
         self.send(server);
     }
@@ -140,10 +145,10 @@ impl PageStation {
         for message in std::mem::take(&mut self.heard) {
             match message {
                 Downlink::Text { severity, text } => say(severity, text.to_str().unwrap_or_default().into()),
-                Downlink::Answer { command, answer, .. } if answer != Answer::Accepted => {
+                Downlink::CommandAck { command, answer, .. } if answer != CommandResult::Accepted => {
                     let known = NAMES.iter().find(|(number, _)| *number == command);
                     let name = known.map_or_else(|| format!("command {command}"), |(_, name)| (*name).into());
-                    let severity = if answer == Answer::InProgress { INFO } else { REFUSED };
+                    let severity = if answer == CommandResult::InProgress { INFO } else { REFUSED };
                     say(severity, format!("{name}: {}", in_words(answer)));
                 }
                 Downlink::Parameter(_) => self.parameter_changes = self.parameter_changes.wrapping_add(1),
@@ -172,13 +177,13 @@ impl PageStation {
     }
 }
 
-fn in_words(answer: Answer) -> &'static str {
+fn in_words(answer: CommandResult) -> &'static str {
     match answer {
-        Answer::Accepted => "done",
-        Answer::Denied => "a number is out of range",
-        Answer::Unsupported => "not supported",
-        Answer::Failed => "failed",
-        Answer::InProgress => "in progress",
+        CommandResult::Accepted => "done",
+        CommandResult::Denied => "a number is out of range",
+        CommandResult::Unsupported => "not supported",
+        CommandResult::Failed => "failed",
+        CommandResult::InProgress => "in progress",
         _ => "refused",
     }
 }

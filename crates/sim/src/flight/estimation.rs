@@ -1,8 +1,8 @@
 //! The vehicle's own estimate in a simulation, made by the [front end](EstimatorFrontEnd) that flies on board, and its
 //! errors.
 
-use super::sensing::{CARRIED_S, Sensing, carried};
-use afbc_estimator::{Aid, Estimate, Estimator, ImuCalibration, OutputFilter};
+use super::sensing::{CARRIED_S, VehicleInstruments, carried};
+use afbc_estimator::{AidSource, Estimate, Estimator, ImuCalibration, OutputFilter};
 use afbc_flight_core::{Inbox, Refusal};
 use afbc_onboard::{Aged, EstimatorFrontEnd};
 use afbc_plant::Truth;
@@ -19,13 +19,13 @@ const WAITS_S: u32 = 5;
 /// A vehicle starts in the air if its feet are higher than this \[m\].
 const CLEAR_M: f64 = 0.1;
 
-/// Steps between two evaluations of [`Estimated::nees`], which takes as long as the estimator.
+/// Steps between two evaluations of [`EstimateErrors::nees`], which takes as long as the estimator.
 const NEES_EVERY: u64 = 10;
 
 /// Errors of an estimate: truth minus estimate at the same time. Rotations and their standard deviations are about the
 /// axes of the earth frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Estimated {
+pub struct EstimateErrors {
     /// Error of the position \[m\].
     pub position_error_m: Vector3<f32>,
     /// Standard deviation of the position, as the estimator states it \[m\].
@@ -51,7 +51,7 @@ pub struct Estimated {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Innovation {
     /// Kind of measurement.
-    pub aid: Aid,
+    pub aid: AidSource,
     /// Normalised innovation squared, summed over the measurement's scalars. Its average equals their number if
     /// measurement and estimate are consistent.
     pub nis: f32,
@@ -64,7 +64,7 @@ pub struct Innovation {
 /// Instruments and estimator of a simulated vehicle.
 #[derive(Clone)]
 pub(super) struct SimulatedEstimator {
-    sensing: Sensing,
+    sensing: VehicleInstruments,
     front_end: EstimatorFrontEnd,
     /// Inbox with the front end's output of this step.
     inbox: Inbox,
@@ -74,12 +74,12 @@ pub(super) struct SimulatedEstimator {
     settling: u64,
     /// Time of the last look \[s\], if there was one, and its result.
     last_s: Option<f64>,
-    seen: Look,
+    seen: EstimatorView,
 }
 
 /// The estimator's output for the pilot.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Look {
+pub(super) struct EstimatorView {
     /// The state, if it is valid.
     pub(super) state: Option<State>,
     /// State of a vehicle whose attitude is valid, but not its position or velocity.
@@ -88,7 +88,7 @@ pub(super) struct Look {
     pub(super) missing: Option<Refusal>,
     /// A tracker's pose, after the IMU has failed.
     pub(super) pose: Option<Aged<Pose>>,
-    pub(super) estimated: Estimated,
+    pub(super) estimated: EstimateErrors,
 }
 
 impl SimulatedEstimator {
@@ -117,7 +117,7 @@ impl SimulatedEstimator {
 
     /// Creates an unsettled estimator that will rest for `waits_s` longer than [`REST_S`].
     fn at_rest(scenario: &Scenario, step_s: f64, waits_s: f64) -> Result<Option<Box<Self>>, OutOfRange> {
-        let Some(sensing) = Sensing::new(scenario, step_s)? else { return Ok(None) };
+        let Some(sensing) = VehicleInstruments::new(scenario, step_s)? else { return Ok(None) };
         let settings = scenario.estimation(step_s);
         let filter = OutputFilter::of(&scenario.vehicle.to_f32(), scenario.rotors.len());
         let calibration = ImuCalibration::new(&scenario.mounting().to_f32());
@@ -130,7 +130,7 @@ impl SimulatedEstimator {
             steps: 0,
             settling: ((REST_S + waits_s + CARRIED_S) / step_s).round() as u64,
             last_s: None,
-            seen: Look::default(),
+            seen: EstimatorView::default(),
         })))
     }
 
@@ -148,7 +148,7 @@ impl SimulatedEstimator {
     }
 
     /// Returns the estimate for the pilot. While the vehicle is held, the result stays the same.
-    pub(super) fn look(&mut self, truth: &Truth) -> &Look {
+    pub(super) fn look(&mut self, truth: &Truth) -> &EstimatorView {
         if self.last_s != Some(truth.time_s) {
             self.seen = self.see(truth);
             self.last_s = Some(truth.time_s);
@@ -156,7 +156,7 @@ impl SimulatedEstimator {
         &self.seen
     }
 
-    fn see(&mut self, truth: &Truth) -> Look {
+    fn see(&mut self, truth: &Truth) -> EstimatorView {
         // Read before the step: a count that grows during the step shows the measurement that was judged.
         let judged = self.judged();
         let estimate = self.step(truth);
@@ -168,7 +168,7 @@ impl SimulatedEstimator {
         };
         let errors = errors(&estimate, truth).cast::<f32>();
         let part = |i: usize| Vector3::from(errors.fixed_rows::<3>(i));
-        let estimated = Estimated {
+        let estimated = EstimateErrors {
             attitude_error_rad: part(0),
             attitude_sigma_rad: estimate.sigmas.attitude_rad,
             velocity_error_m_s: part(3),
@@ -184,18 +184,20 @@ impl SimulatedEstimator {
         let pose = inbox.pose().map(|pose| Aged { value: pose.value, age_us: pose.age_us(now_us) });
         let state = inbox.state().map(|state| state.value);
         let position_lost = inbox.position_lost().map(|state| state.value);
-        Look { state, position_lost, missing: inbox.missing(), pose, estimated }
+        EstimatorView { state, position_lost, missing: inbox.missing(), pose, estimated }
     }
 
     /// Returns the number of fused and of rejected measurements for each aid.
-    fn judged(&self) -> [(u32, u32); Aid::ALL.len()] {
-        Aid::ALL.map(|aid| self.front_end.memory().aids().of(aid)).map(|record| (record.accepted, record.rejected))
+    fn judged(&self) -> [(u32, u32); AidSource::ALL.len()] {
+        AidSource::ALL
+            .map(|aid| self.front_end.memory().aids().of(aid))
+            .map(|record| (record.accepted, record.rejected))
     }
 
     /// Returns the measurement that was fused or rejected since the counts `before`. The filter judges one measurement
     /// per step; of several, the first is returned.
-    fn innovation(&self, before: &[(u32, u32); Aid::ALL.len()]) -> Option<Innovation> {
-        let (aid, (accepted, _)) = Aid::ALL.into_iter().zip(before).find(|(aid, (accepted, rejected))| {
+    fn innovation(&self, before: &[(u32, u32); AidSource::ALL.len()]) -> Option<Innovation> {
+        let (aid, (accepted, _)) = AidSource::ALL.into_iter().zip(before).find(|(aid, (accepted, rejected))| {
             let record = self.front_end.memory().aids().of(*aid);
             (record.accepted, record.rejected) != (*accepted, *rejected)
         })?;

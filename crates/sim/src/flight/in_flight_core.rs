@@ -1,8 +1,8 @@
 //! Flies a controller inside the flight core, as on board, but without board and link.
 
-use super::pilot::Pilot;
+use super::pilot::FlightSoftware;
 use super::sample::{Sample, estimates};
-use super::world::{View, World};
+use super::world::{World, WorldView};
 use afbc_control::{Action, FlightController, Mixer};
 use afbc_flight_core::motor::Response;
 use afbc_flight_core::rate::{PERIOD_US, WINDOW_US};
@@ -37,7 +37,7 @@ impl<C: FlightController<N>, const N: usize> InFlightCore<C, N> {
     }
 
     /// Runs one tick with the inputs that `view` shows.
-    fn tick(&mut self, view: &View, setpoint: Setpoint) -> Action<N> {
+    fn tick(&mut self, view: &WorldView, setpoint: Setpoint) -> Action<N> {
         self.now_us += PERIOD_US;
         let at_us = self.now_us;
         let stamped = |value| Stamped { value, at_us };
@@ -60,7 +60,7 @@ impl<C: FlightController<N>, const N: usize> InFlightCore<C, N> {
     }
 
     /// Powers up and arms a vehicle that is held in the state of `view`.
-    fn arm(&mut self, view: &View, setpoint: Setpoint) {
+    fn arm(&mut self, view: &WorldView, setpoint: Setpoint) {
         for _ in 0..TICKS_HELD {
             let _ = self.tick(view, setpoint);
         }
@@ -69,7 +69,7 @@ impl<C: FlightController<N>, const N: usize> InFlightCore<C, N> {
     }
 }
 
-impl<C: FlightController<N>, const N: usize> Pilot for InFlightCore<C, N> {
+impl<C: FlightController<N>, const N: usize> FlightSoftware for InFlightCore<C, N> {
     type Error = Infallible;
 
     /// Runs one tick. At the first state, the vehicle is held until the flight core has armed.
@@ -79,7 +79,7 @@ impl<C: FlightController<N>, const N: usize> Pilot for InFlightCore<C, N> {
         let state = view.state.filter(State::is_plausible);
         if is_held && state.is_some() {
             // The vehicle is held, so its state stays true in every tick of arming.
-            self.arm(&View { new: true, pose: None, ..view }, setpoint);
+            self.arm(&WorldView { new: true, pose: None, ..view }, setpoint);
         }
         let mut action = if self.now_us > 0 { self.tick(&view, setpoint) } else { Action::default() };
         action.health.state_rejected = state.is_none();

@@ -1,6 +1,6 @@
 //! Flies a law without the flight core.
 
-use super::pilot::Pilot;
+use super::pilot::FlightSoftware;
 use super::sample::{Sample, estimates};
 use super::world::World;
 use afbc_control::{FlightController, Validated};
@@ -19,7 +19,7 @@ impl<C: FlightController<N>, const N: usize> LawOnly<C, N> {
     }
 }
 
-impl<C: FlightController<N>, const N: usize> Pilot for LawOnly<C, N> {
+impl<C: FlightController<N>, const N: usize> FlightSoftware for LawOnly<C, N> {
     type Error = Infallible;
 
     // Always inlined: copying a sample into and out of calls takes a fifth of the loop's time.

@@ -1,7 +1,7 @@
 //! The simulation loop.
 
-use super::loss::Watch;
-use super::pilot::Pilot;
+use super::loss::LossDetector;
+use super::pilot::FlightSoftware;
 use super::sample::Sample;
 use super::world::World;
 use core::ops::ControlFlow;
@@ -31,14 +31,14 @@ pub struct FlightEnd {
 /// Returns the pilot's error.
 // Always inlined, so that each flight has a single loop that includes its pilot's step.
 #[inline(always)]
-pub fn lockstep<P: Pilot>(
+pub fn lockstep<P: FlightSoftware>(
     world: &mut World,
     pilot: &mut P,
     duration_s: f64,
     mut observe: impl FnMut(&Sample) -> ControlFlow<()>,
 ) -> Result<FlightEnd, P::Error> {
     let steps = (duration_s / world.dt_s()).round() as u64;
-    let mut watch = Watch::new(world.faulty_from_s());
+    let mut watch = LossDetector::new(world.faulty_from_s());
     for step in 0..=steps {
         let sample = pilot.step(world)?;
         // Observed before the loss is judged, so that a log includes the step in which the vehicle was lost.

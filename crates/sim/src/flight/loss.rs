@@ -20,7 +20,7 @@ pub const CLEAR_M: f64 = 0.1;
 
 /// Record of a flight, for judging whether the vehicle is lost.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Watch {
+pub(super) struct LossDetector {
     /// Time of the scenario's first fault that may ground the vehicle \[s\].
     faulty_from_s: f64,
     /// True if the flight core has brought the vehicle down after a fault.
@@ -42,10 +42,10 @@ struct Grounded {
     lowest_m: f64,
 }
 
-impl Watch {
+impl LossDetector {
     /// Starts the record of a flight without faults before `faulty_from_s`.
     pub(super) fn new(faulty_from_s: f64) -> Self {
-        Watch {
+        LossDetector {
             faulty_from_s,
             excused: false,
             started: false,

@@ -4,7 +4,7 @@ use super::sample::Sample;
 use super::world::World;
 
 /// Commands the rotors once per step.
-pub trait Pilot {
+pub trait FlightSoftware {
     /// Error of a pilot that cannot go on.
     type Error;
 

@@ -1,6 +1,6 @@
 //! Record of one step of a flight.
 
-use super::estimation::Estimated;
+use super::estimation::EstimateErrors;
 use afbc::AdaptiveEstimate;
 use afbc_control::{Action, Trace};
 use afbc_flight_core::Mode;
@@ -20,7 +20,7 @@ pub struct Sample {
     /// Measurement by the sensors; none if the sensors are perfect.
     pub measurement: Option<StateMeasurement>,
     /// Errors of the vehicle's own estimate; none without instruments.
-    pub estimated: Option<Estimated>,
+    pub estimated: Option<EstimateErrors>,
     /// State of rotors, air and ground after the previous step; none for an ideal plant.
     pub telemetry: Option<EffectsState>,
     /// Reference at this time.

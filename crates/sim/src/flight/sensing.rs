@@ -3,7 +3,7 @@
 use super::sensor_model;
 use afbc_estimator::{Measurement, Stamped};
 use afbc_onboard::{AIDS_MAX, Aged, Readings};
-use afbc_plant::{InstrumentSuite, Instruments, Truth};
+use afbc_plant::{InstrumentSuite, SimulatedInstruments, Truth};
 use afbc_scenario::{Outage, Scenario};
 use afbc_types::OutOfRange;
 use nalgebra::Vector3;
@@ -17,8 +17,8 @@ pub const CARRIED_S: f64 = 1.0;
 
 /// Instruments of a vehicle, and the measurements that no tick has taken yet.
 #[derive(Clone)]
-pub(super) struct Sensing {
-    instruments: Instruments,
+pub(super) struct VehicleInstruments {
+    instruments: SimulatedInstruments,
     /// The instruments' noise and rates as the vehicle's software is told.
     told: InstrumentSuite,
     outages: Vec<Outage>,
@@ -27,14 +27,14 @@ pub(super) struct Sensing {
     waiting: VecDeque<Stamped<Measurement>>,
 }
 
-impl Sensing {
+impl VehicleInstruments {
     /// Creates the instruments of `scenario`; none if the scenario has no IMU.
     ///
     /// # Errors
     /// Returns the first setting that is out of range.
     pub(super) fn new(scenario: &Scenario, step_s: f64) -> Result<Option<Self>, OutOfRange> {
         let instruments = scenario.instruments(step_s)?.filter(|_| scenario.instruments.imu.is_some());
-        Ok(instruments.map(|instruments| Sensing {
+        Ok(instruments.map(|instruments| VehicleInstruments {
             instruments,
             told: scenario.told(),
             outages: scenario.outages.clone(),
@@ -43,7 +43,7 @@ impl Sensing {
         }))
     }
 
-    pub(super) fn instruments_mut(&mut self) -> &mut Instruments {
+    pub(super) fn instruments_mut(&mut self) -> &mut SimulatedInstruments {
         &mut self.instruments
     }
 
@@ -54,7 +54,7 @@ impl Sensing {
 
     /// Reads the instruments in `truth` for the tick at that time. `at_us` converts to the vehicle's clock.
     pub(super) fn read(&mut self, truth: &Truth, at_us: impl Fn(f64) -> u64) -> &Readings {
-        let Sensing { instruments, told, outages, readings, waiting } = self;
+        let VehicleInstruments { instruments, told, outages, readings, waiting } = self;
         let read = instruments.measure(truth);
         // The tracker is on the ground: its measurements are lost while the link is out.
         let heard = !outages.iter().any(|outage| (outage.start_s..outage.end_s).contains(&truth.time_s));
@@ -117,21 +117,21 @@ fn steps(step_s: f64) -> u64 {
 
 /// Sensors of a vehicle that runs its own estimator.
 #[derive(Clone)]
-pub(super) struct Wired {
-    sensing: Sensing,
+pub(super) struct WiredInstruments {
+    sensing: VehicleInstruments,
     step_s: f64,
     /// Number of looks so far.
     looks: u64,
 }
 
-impl Wired {
+impl WiredInstruments {
     /// Creates the sensors of `scenario`; none if the scenario has no IMU.
     ///
     /// # Errors
     /// Returns the first setting that is out of range.
     pub(super) fn new(scenario: &Scenario, step_s: f64) -> Result<Option<Box<Self>>, OutOfRange> {
-        let wired = |sensing| Box::new(Wired { sensing, step_s, looks: 0 });
-        Ok(Sensing::new(scenario, step_s)?.map(wired))
+        let wired = |sensing| Box::new(WiredInstruments { sensing, step_s, looks: 0 });
+        Ok(VehicleInstruments::new(scenario, step_s)?.map(wired))
     }
 
     /// Returns the sensors of a vehicle that does not stand still before t = 0.
@@ -140,11 +140,11 @@ impl Wired {
         self
     }
 
-    pub(super) fn instruments(&self) -> &Instruments {
+    pub(super) fn instruments(&self) -> &SimulatedInstruments {
         &self.sensing.instruments
     }
 
-    pub(super) fn instruments_mut(&mut self) -> &mut Instruments {
+    pub(super) fn instruments_mut(&mut self) -> &mut SimulatedInstruments {
         self.sensing.instruments_mut()
     }
 

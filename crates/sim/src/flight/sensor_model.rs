@@ -3,7 +3,9 @@
 //! are not included.
 
 use afbc_estimator::{Measurement, Stamped};
-use afbc_plant::instruments::{Barometer, FieldFix, GnssFix, HeightFix, Magnetometer, TrackerFix, TrackerModel};
+use afbc_plant::instruments::{
+    BarometerModel, BarometerReading, GnssFix, MagnetometerModel, MagnetometerReading, TrackerFix, TrackerModel,
+};
 
 /// Assumed speed that turns a tracker's timestamp noise into a position error \[m/s\].
 const STAMPED_M_S: f64 = 1.0;
@@ -57,14 +59,22 @@ pub(super) fn gnss(fix: &GnssFix, at_us: impl Fn(f64) -> u64) -> Stamped<Measure
 }
 
 /// Returns a barometer's height as a measurement.
-pub(super) fn height(fix: &HeightFix, barometer: &Barometer, at_us: impl Fn(f64) -> u64) -> Stamped<Measurement> {
+pub(super) fn height(
+    fix: &BarometerReading,
+    barometer: &BarometerModel,
+    at_us: impl Fn(f64) -> u64,
+) -> Stamped<Measurement> {
     let sigma_m = sigma(&[barometer.noise_m, step(barometer.lsb_m)]);
     timed(Measurement::Height { height_m: fix.height_m as f32, sigma_m }, fix.true_at_s, at_us)
 }
 
 /// Returns a magnetic field as a measurement with its noise. The estimator's settings cover hard iron, soft iron and
 /// the motors' fields.
-pub(super) fn field(fix: &FieldFix, part: &Magnetometer, at_us: impl Fn(f64) -> u64) -> Stamped<Measurement> {
+pub(super) fn field(
+    fix: &MagnetometerReading,
+    part: &MagnetometerModel,
+    at_us: impl Fn(f64) -> u64,
+) -> Stamped<Measurement> {
     let sigma = sigma(&[part.noise_ut, step(part.lsb_ut)]);
     timed(Measurement::MagneticField { field: fix.field_ut.cast(), sigma }, fix.true_at_s, at_us)
 }

@@ -1,15 +1,16 @@
 //! The plant with its disturbances and sensors.
 
-use super::estimation::{Estimated, Look, SimulatedEstimator};
+use super::estimation::{EstimateErrors, EstimatorView, SimulatedEstimator};
 use super::sample::Sample;
-use super::sensing::Wired;
+use super::sensing::WiredInstruments;
 use afbc::AdaptiveEstimate;
 use afbc_control::{Action, Trace};
 use afbc_flight_core::Refusal;
 use afbc_onboard::{Aged, Readings};
 use afbc_plant::instruments::ImuBias;
 use afbc_plant::{
-    EffectsState, InstrumentSuite, Instruments, Motion, Plant, SensorFaults, StateMeasurement, StateSensor, Truth,
+    EffectsState, InstrumentSuite, Motion, Plant, SensorFaults, SimulatedInstruments, StateMeasurement, StateSensor,
+    Truth,
 };
 use afbc_scenario::trajectory::{Reference, Trajectory};
 use afbc_scenario::{Outage, Scenario};
@@ -23,7 +24,7 @@ pub struct World {
     /// Estimator of a vehicle with an IMU; without one, the vehicle flies on `sensors`.
     estimator: Option<Box<SimulatedEstimator>>,
     /// Sensors for a vehicle that runs its own estimator outside this world.
-    wired: Option<Box<Wired>>,
+    wired: Option<Box<WiredInstruments>>,
     sensors: Option<StateSensor>,
     faults: SensorFaults,
     outages: Vec<Outage>,
@@ -34,7 +35,7 @@ pub struct World {
 
 /// The visible part of the world at one time.
 #[derive(Clone, Copy, Debug)]
-pub struct View {
+pub struct WorldView {
     /// Time \[s\].
     pub time_s: f64,
     /// True motion.
@@ -42,7 +43,7 @@ pub struct View {
     /// Measurement by the sensors; none if the sensors are perfect.
     pub measurement: Option<StateMeasurement>,
     /// Errors of the vehicle's own estimate; none without instruments.
-    pub estimated: Option<Estimated>,
+    pub estimated: Option<EstimateErrors>,
     /// State of rotors, air and ground after the previous step; none for an ideal plant.
     pub telemetry: Option<EffectsState>,
     /// Reference at this time.
@@ -85,7 +86,7 @@ impl World {
     /// # Errors
     /// Returns the first setting of plant or sensors that is out of range.
     pub fn wired(scenario: &Scenario, dt_s: f64) -> Result<Self, OutOfRange> {
-        let wired = Wired::new(scenario, dt_s)?;
+        let wired = WiredInstruments::new(scenario, dt_s)?;
         Ok(World {
             wired,
             // Without instruments, since the world would otherwise run a second estimator.
@@ -100,7 +101,7 @@ impl World {
     /// The same as for [`World::wired`].
     pub fn released(scenario: &Scenario, dt_s: f64) -> Result<Self, OutOfRange> {
         let world = World::wired(scenario, dt_s)?;
-        Ok(World { wired: world.wired.map(Wired::at_once), ..world })
+        Ok(World { wired: world.wired.map(WiredInstruments::at_once), ..world })
     }
 
     /// Returns the plant.
@@ -114,8 +115,8 @@ impl World {
     }
 
     /// Returns the instruments of a [wired](Self::wired) world for making them fail.
-    pub fn instruments_mut(&mut self) -> Option<&mut Instruments> {
-        self.wired.as_deref_mut().map(Wired::instruments_mut)
+    pub fn instruments_mut(&mut self) -> Option<&mut SimulatedInstruments> {
+        self.wired.as_deref_mut().map(WiredInstruments::instruments_mut)
     }
 
     /// Returns the true IMU biases in a [wired](Self::wired) world.
@@ -125,12 +126,12 @@ impl World {
 
     /// Returns the instruments' last readings in a [wired](Self::wired) world.
     pub fn readings(&self) -> Option<&Readings> {
-        self.wired.as_deref().map(Wired::readings)
+        self.wired.as_deref().map(WiredInstruments::readings)
     }
 
     /// Returns true if the vehicle of a [wired](Self::wired) world still stands before t = 0.
     pub fn stands(&self) -> bool {
-        self.wired.as_deref().is_some_and(Wired::stands)
+        self.wired.as_deref().is_some_and(WiredInstruments::stands)
     }
 
     /// Returns the time from which the vehicle may lack measurements \[s\].
@@ -146,7 +147,7 @@ impl World {
     /// Measures without moving the vehicle.
     // Always inlined: copying a view into and out of calls takes a fifth of the loop's time.
     #[inline(always)]
-    pub fn look(&mut self) -> View {
+    pub fn look(&mut self) -> WorldView {
         let time_s = self.plant.time_s();
         let motion = self.plant.motion();
         if let Some(wired) = &mut self.wired {
@@ -171,7 +172,7 @@ impl World {
         let telemetry = self.plant.telemetry();
         let new = measurement.is_none_or(|measurement| measurement.new);
         let state = state.filter(|_| !lost);
-        View {
+        WorldView {
             time_s,
             motion,
             measurement,
@@ -201,7 +202,7 @@ impl World {
     }
 }
 
-impl View {
+impl WorldView {
     /// Returns the sample with this view and a pilot's output.
     #[inline(always)]
     pub fn sample<const N: usize>(
@@ -210,7 +211,7 @@ impl View {
         trace: Trace,
         estimates: Option<PerAxis<AdaptiveEstimate>>,
     ) -> Sample {
-        let View { time_s, motion, measurement, estimated, telemetry, reference, .. } = self;
+        let WorldView { time_s, motion, measurement, estimated, telemetry, reference, .. } = self;
         let action = action.padded();
         Sample { time_s, motion, measurement, estimated, telemetry, reference, mode: None, action, trace, estimates }
     }
@@ -219,10 +220,10 @@ impl View {
 /// Returns the view through the vehicle's own estimator.
 // Not inlined, so that the step of an ideal flight stays short.
 #[inline(never)]
-fn estimated(estimator: &mut SimulatedEstimator, plant: &Plant, motion: Motion, reference: Reference) -> View {
+fn estimated(estimator: &mut SimulatedEstimator, plant: &Plant, motion: Motion, reference: Reference) -> WorldView {
     let (time_s, telemetry) = (plant.time_s(), plant.telemetry());
-    let Look { state, position_lost, missing, pose, estimated } = *estimator.look(&plant.truth());
-    View {
+    let EstimatorView { state, position_lost, missing, pose, estimated } = *estimator.look(&plant.truth());
+    WorldView {
         time_s,
         motion,
         measurement: None,

@@ -1,6 +1,6 @@
 //! Reads a GNSS receiver on a UART.
 
-use afbc_drivers::FixReading;
+use afbc_drivers::GnssReading;
 use afbc_drivers::ublox::{ReceiverAction, UbxCommand, UbxReceiver};
 use embassy_futures::select::{Either, select};
 use embassy_stm32::usart::BufferedUart;
@@ -19,7 +19,7 @@ const BYTE_BITS: u64 = 10;
 
 /// Receives fixes forever, at the receiver's baud rate, which is found by trying. Passes on each fix with the time of
 /// its measurement \[us\], and none for an epoch without a fix.
-pub async fn run(mut uart: BufferedUart<'static>, mut take: impl FnMut(u64, Option<FixReading>)) {
+pub async fn run(mut uart: BufferedUart<'static>, mut take: impl FnMut(u64, Option<GnssReading>)) {
     let mut receiver = UbxReceiver::new();
     // At least half of the UART's ring, since the UART also wakes this task at half its ring.
     let mut bytes = [0; 512];

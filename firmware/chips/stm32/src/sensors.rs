@@ -1,7 +1,7 @@
 //! Buses and timing of sensors.
 
 use afbc_drivers::alignment::CW270_FLIP;
-use afbc_drivers::data_ready::{DataReady, Edge};
+use afbc_drivers::data_ready::{DataReady, DataReadyPin};
 use afbc_drivers::{Driver, PartFault, PartTiming, Registers, SensorPart};
 use afbc_types::Stamped;
 use core::marker::PhantomData;
@@ -241,7 +241,7 @@ impl InterruptPin {
     }
 }
 
-impl Edge for InterruptPin {
+impl DataReadyPin for InterruptPin {
     async fn next(&mut self) -> u64 {
         self.input.wait_for_rising_edge().await;
         let now_us = Instant::now().as_micros();
@@ -255,7 +255,7 @@ impl Edge for InterruptPin {
 pub type Interrupted<E = InterruptPin> = DataReady<E, Polled>;
 
 /// Makes the timing of a part with this interrupt pin.
-pub fn interrupted<E: Edge>(pin: E) -> Interrupted<E> {
+pub fn interrupted<E: DataReadyPin>(pin: E) -> Interrupted<E> {
     DataReady::new(pin, Polled, PERIOD_US)
 }
 

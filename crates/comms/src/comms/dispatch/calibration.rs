@@ -6,7 +6,7 @@ use crate::services::commands::BUSY;
 use crate::services::texts::Words;
 use afbc_calibration::RawSample;
 use afbc_flight_core::Refusal;
-use afbc_mavlink::{Address, Answer, CalibrationRequest, MavSeverity, ParameterRequest};
+use afbc_mavlink::{Address, CalibrationRequest, CommandResult, MavSeverity, ParameterRequest};
 use afbc_onboard::parameters::{Kind, ParameterTable};
 
 /// Beginnings of the texts that tell stations the state of a calibration.
@@ -17,27 +17,27 @@ const CANCELLED: &str = "[cal] calibration cancelled";
 
 impl Comms {
     /// Answers MAV_CMD_PREFLIGHT_CALIBRATION.
-    pub(super) fn ask_calibration(&mut self, what: CalibrationRequest) -> Answer {
+    pub(super) fn ask_calibration(&mut self, what: CalibrationRequest) -> CommandResult {
         let info = MavSeverity::MAV_SEVERITY_INFO;
         if !self.calibrates {
-            return Answer::Unsupported;
+            return CommandResult::Unsupported;
         }
         if what == CalibrationRequest::Cancel {
             if self.calibration.active.take().is_some() {
                 self.texts.put(info, CANCELLED);
             }
-            return Answer::Accepted;
+            return CommandResult::Accepted;
         }
         if self.status.mode.armed() {
-            return Answer::Refused(Refusal::AlreadyArmed as i32);
+            return CommandResult::Refused(Refusal::AlreadyArmed as i32);
         }
         if self.calibration.active.is_some() {
-            return Answer::Refused(BUSY);
+            return CommandResult::Refused(BUSY);
         }
         self.calibration.number = self.calibration.number.wrapping_add(1);
         self.calibration.active = Some(what);
         self.texts.say(info, &Words::of(STARTED).and(name(what)));
-        Answer::Accepted
+        CommandResult::Accepted
     }
 
     /// Advances the calibration that a station has asked for.

@@ -9,7 +9,7 @@ use crate::services::texts::{Words, reason};
 use crate::services::{control, modes, sensors};
 use afbc_flight_core::{Refusal, Request};
 use afbc_guidance::{FlightMode, ORBIT_RADIUS_M, OrbitHeading, Order, OrderRefusal};
-use afbc_mavlink::{Address, Answer, Command, Height, Interval, MavSeverity, Place};
+use afbc_mavlink::{Address, CommandResult, GlobalPosition, Height, MavSeverity, MessageInterval, VehicleCommand};
 use afbc_onboard::{ControlInputs, give};
 use nalgebra::Vector3;
 
@@ -23,66 +23,73 @@ impl Comms {
     }
 
     /// Carries out a command or passes it on. The command is answered once, to `from`.
-    pub(super) fn command(&mut self, command: Command, from: Address, inputs: &mut ControlInputs) {
+    pub(super) fn command(&mut self, command: VehicleCommand, from: Address, inputs: &mut ControlInputs) {
         let id = command.id();
         // A command that cannot be answered is not carried out, except a command to stop the motors.
-        if command != Command::Kill && !self.commands.has_room() {
-            return self.commands.answer(id, Answer::Refused(BUSY), from);
+        if command != VehicleCommand::Kill && !self.commands.has_room() {
+            return self.commands.answer(id, CommandResult::Refused(BUSY), from);
         }
         if control::is_needed_for(command) && !self.may(from, inputs) {
-            return self.commands.answer(id, Answer::Refused(NOT_IN_CONTROL), from);
+            return self.commands.answer(id, CommandResult::Refused(NOT_IN_CONTROL), from);
         }
         let answer = match command {
-            Command::Arm => match self.against_arming() {
+            VehicleCommand::Arm => match self.against_arming() {
                 Some((text, reason)) => {
                     self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, text);
-                    Answer::Refused(reason)
+                    CommandResult::Refused(reason)
                 }
                 None => return self.ask(Request::Arm, id, from, inputs),
             },
-            Command::SelfTest if !self.calibrates => Answer::Unsupported,
-            Command::SelfTest if self.status.mode.armed() => Answer::Refused(Refusal::AlreadyArmed as i32),
-            Command::SelfTest if self.calibration.active.is_some() => Answer::Refused(CALIBRATES),
-            Command::SelfTest => {
-                self.tests = true;
-                Answer::Accepted
+            VehicleCommand::SelfTest if !self.calibrates => CommandResult::Unsupported,
+            VehicleCommand::SelfTest if self.status.mode.armed() => {
+                CommandResult::Refused(Refusal::AlreadyArmed as i32)
             }
-            Command::Disarm => return self.ask(Request::Disarm, id, from, inputs),
-            Command::Kill => return self.ask(Request::Kill, id, from, inputs),
-            Command::Engage => return self.ask(Request::Engage, id, from, inputs),
-            Command::Denied(_) => Answer::Denied,
-            Command::Other(_) => Answer::Unsupported,
-            Command::SetInterval { message, interval_us } => {
+            VehicleCommand::SelfTest if self.calibration.active.is_some() => CommandResult::Refused(CALIBRATES),
+            VehicleCommand::SelfTest => {
+                self.tests = true;
+                CommandResult::Accepted
+            }
+            VehicleCommand::Disarm => return self.ask(Request::Disarm, id, from, inputs),
+            VehicleCommand::Kill => return self.ask(Request::Kill, id, from, inputs),
+            VehicleCommand::Engage => return self.ask(Request::Engage, id, from, inputs),
+            VehicleCommand::Denied(_) => CommandResult::Denied,
+            VehicleCommand::Other(_) => CommandResult::Unsupported,
+            VehicleCommand::SetInterval { message, interval_us } => {
                 if self.streams.set(message, interval_us, self.now_us) {
-                    Answer::Accepted
+                    CommandResult::Accepted
                 } else {
-                    Answer::Unsupported
+                    CommandResult::Unsupported
                 }
             }
-            Command::GetInterval(_) if self.replies.is_full() => Answer::Refused(BUSY),
-            Command::GetInterval(message) => {
-                self.reply(Reply::Interval(Interval { message, interval_us: self.streams.interval_us(message) }));
-                Answer::Accepted
+            VehicleCommand::GetInterval(_) if self.replies.is_full() => CommandResult::Refused(BUSY),
+            VehicleCommand::GetInterval(message) => {
+                self.reply(Reply::Interval(MessageInterval {
+                    message,
+                    interval_us: self.streams.interval_us(message),
+                }));
+                CommandResult::Accepted
             }
-            Command::RequestMessage { message, index } => self.request(message, index),
-            Command::RequestProtocol => self.request(id::PROTOCOL_VERSION, 0),
-            Command::RequestCapabilities => self.request(id::AUTOPILOT_VERSION, 0),
-            Command::Reboot(into) if !self.reboots.contains(&into) => Answer::Unsupported,
-            Command::Reboot(_) if self.status.mode.armed() => Answer::Refused(Refusal::AlreadyArmed as i32),
-            Command::Reboot(into) => {
+            VehicleCommand::RequestMessage { message, index } => self.request(message, index),
+            VehicleCommand::RequestProtocol => self.request(id::PROTOCOL_VERSION, 0),
+            VehicleCommand::RequestCapabilities => self.request(id::AUTOPILOT_VERSION, 0),
+            VehicleCommand::Reboot(into) if !self.reboots.contains(&into) => CommandResult::Unsupported,
+            VehicleCommand::Reboot(_) if self.status.mode.armed() => {
+                CommandResult::Refused(Refusal::AlreadyArmed as i32)
+            }
+            VehicleCommand::Reboot(into) => {
                 self.reboot = Some(into);
-                Answer::Accepted
+                CommandResult::Accepted
             }
-            Command::Storage(storage) => self.storage(storage),
-            Command::Calibrate(what) => self.ask_calibration(what),
-            Command::CheckArming => {
+            VehicleCommand::Storage(storage) => self.storage(storage),
+            VehicleCommand::Calibrate(what) => self.ask_calibration(what),
+            VehicleCommand::CheckArming => {
                 self.check_arming(from);
-                Answer::Accepted
+                CommandResult::Accepted
             }
-            Command::SetCurrent(number, resets) => {
+            VehicleCommand::SetCurrent(number, resets) => {
                 let items = self.missions.items().len();
                 if usize::from(number.unwrap_or(0)) >= items {
-                    Answer::Refused(OrderRefusal::NoMission as i32)
+                    CommandResult::Refused(OrderRefusal::NoMission as i32)
                 } else {
                     if resets {
                         self.missions.restart();
@@ -90,20 +97,20 @@ impl Comms {
                     }
                     match number {
                         Some(number) => return self.order(Order::Resume(number), Some(id), from, inputs),
-                        None => Answer::Accepted,
+                        None => CommandResult::Accepted,
                     }
                 }
             }
             _ => match self.order_of(command) {
                 Ok(Order::Select(FlightMode::Mission)) if !self.is_mission_flown() => {
-                    Answer::Refused(OrderRefusal::OutOfRange as i32)
+                    CommandResult::Refused(OrderRefusal::OutOfRange as i32)
                 }
                 Ok(order) if !self.fence_allows(&order) => {
                     self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, reason(OrderRefusal::OutsideFence));
-                    Answer::Refused(OrderRefusal::OutsideFence as i32)
+                    CommandResult::Refused(OrderRefusal::OutsideFence as i32)
                 }
                 Ok(order) => {
-                    if let Command::Home(_) = command {
+                    if let VehicleCommand::Home(_) = command {
                         // MAVLink requires HOME_POSITION after each request, even if home has not changed.
                         self.streams.request(Requested { message: id::HOME_POSITION, index: 0 });
                     }
@@ -112,7 +119,7 @@ impl Comms {
                         let or_here = |to: f32, here: f32| if to.is_nan() { here } else { to };
                         self.orbit_m = Some((centre_m.zip_map(&here_m, or_here), radius_m));
                     }
-                    if let Command::StartMission(first, last) = command {
+                    if let VehicleCommand::StartMission(first, last) = command {
                         if self.missions.set_last(last) {
                             // The last item may have another `is_last` now, so the guidance must be given it again.
                             self.given = self.given.map(|(wanted, upload)| (wanted, upload.wrapping_sub(1)));
@@ -143,20 +150,22 @@ impl Comms {
     }
 
     /// Returns the guidance's order for a command, or the command's answer if there is none.
-    fn order_of(&self, command: Command) -> Result<Order, Answer> {
+    fn order_of(&self, command: VehicleCommand) -> Result<Order, CommandResult> {
         Ok(match command {
-            Command::TakeOff(height) => Order::TakeOff(self.take_off_height(height)?),
-            Command::Land => Order::Select(FlightMode::Land),
-            Command::Return => Order::Select(FlightMode::Return),
-            Command::SelectMode(custom) => Order::Select(modes::of_custom(custom).ok_or(Answer::Denied)?),
-            Command::SelectStandardMode(mode) => Order::Select(modes::of_standard(mode).ok_or(Answer::Denied)?),
-            Command::Reposition { changes_mode: false, .. } if self.status.guided.mode != FlightMode::Hold => {
-                return Err(Answer::Denied);
+            VehicleCommand::TakeOff(height) => Order::TakeOff(self.take_off_height(height)?),
+            VehicleCommand::Land => Order::Select(FlightMode::Land),
+            VehicleCommand::Return => Order::Select(FlightMode::Return),
+            VehicleCommand::SelectMode(custom) => Order::Select(modes::of_custom(custom).ok_or(CommandResult::Denied)?),
+            VehicleCommand::SelectStandardMode(mode) => {
+                Order::Select(modes::of_standard(mode).ok_or(CommandResult::Denied)?)
             }
-            Command::Reposition { place, yaw_rad, speed_m_s, .. } => {
+            VehicleCommand::Reposition { changes_mode: false, .. } if self.status.guided.mode != FlightMode::Hold => {
+                return Err(CommandResult::Denied);
+            }
+            VehicleCommand::Reposition { place, yaw_rad, speed_m_s, .. } => {
                 Order::GoTo { position_m: self.local(&place)?, yaw_rad, speed_m_s }
             }
-            Command::Orbit { place, radius_m, speed_m_s, angle_deg, heading } => {
+            VehicleCommand::Orbit { place, radius_m, speed_m_s, angle_deg, heading } => {
                 let heading = match heading {
                     0 => OrbitHeading::Centre,
                     3 => OrbitHeading::Along,
@@ -166,16 +175,16 @@ impl Comms {
                 let radius_m = if radius_m.is_nan() { -ORBIT_RADIUS_M } else { -radius_m };
                 Order::Orbit { centre_m: self.local(&place)?, radius_m, speed_m_s, angle_deg, heading }
             }
-            Command::Speed(speed_m_s) => Order::Speed(speed_m_s),
-            Command::Home(place) => Order::Home(place.map(|place| self.local(&place)).transpose()?),
-            Command::StartMission(first, last) => {
+            VehicleCommand::Speed(speed_m_s) => Order::Speed(speed_m_s),
+            VehicleCommand::Home(place) => Order::Home(place.map(|place| self.local(&place)).transpose()?),
+            VehicleCommand::StartMission(first, last) => {
                 if usize::from(last.unwrap_or(first)) >= self.missions.items().len() {
-                    return Err(Answer::Refused(OrderRefusal::NoMission as i32));
+                    return Err(CommandResult::Refused(OrderRefusal::NoMission as i32));
                 }
                 Order::Select(FlightMode::Mission)
             }
             // No other command is for the guidance.
-            _ => return Err(Answer::Unsupported),
+            _ => return Err(CommandResult::Unsupported),
         })
     }
 
@@ -187,27 +196,28 @@ impl Comms {
     }
 
     /// Returns a take-off height relative to the vehicle's present height \[m\].
-    fn take_off_height(&self, height: Height) -> Result<Option<f32>, Answer> {
+    fn take_off_height(&self, height: Height) -> Result<Option<f32>, CommandResult> {
         if height.metres.is_nan() {
             return Ok(None);
         }
-        let place = Place { latitude_e7: Place::AS_IT_IS, longitude_e7: Place::AS_IT_IS, height };
+        let place =
+            GlobalPosition { latitude_e7: GlobalPosition::AS_IT_IS, longitude_e7: GlobalPosition::AS_IT_IS, height };
         let here_m = self.here().z;
         Ok(Some(self.local(&place)?.z - here_m))
     }
 
     /// Converts a place to the local frame.
-    pub(super) fn local(&self, place: &Place) -> Result<Vector3<f32>, Answer> {
+    pub(super) fn local(&self, place: &GlobalPosition) -> Result<Vector3<f32>, CommandResult> {
         use afbc_mavlink::Datum;
         let home_m = self.status.guided.home_m.map_or(0.0, |home| home.z);
         match &self.status.aux.origin {
             Some(origin) => Ok(resolve(origin, place, home_m, self.here().z)),
             // A height relative to home or to the vehicle needs no origin.
-            None if place.latitude_e7 == Place::AS_IT_IS && place.height.above != Datum::Sea => {
+            None if place.latitude_e7 == GlobalPosition::AS_IT_IS && place.height.above != Datum::Sea => {
                 let above_m = if place.height.above == Datum::Home { home_m } else { self.here().z };
                 Ok(Vector3::new(f32::NAN, f32::NAN, place.height.metres + above_m))
             }
-            None => Err(Answer::Refused(NO_ORIGIN)),
+            None => Err(CommandResult::Refused(NO_ORIGIN)),
         }
     }
 
@@ -216,7 +226,7 @@ impl Comms {
     }
 
     /// Queues a requested message for sending.
-    fn request(&mut self, message: u32, index: u32) -> Answer {
+    fn request(&mut self, message: u32, index: u32) -> CommandResult {
         let known = match message {
             id::HEARTBEAT | id::DEBUG_FLOAT_ARRAY | id::MISSION_CURRENT => true,
             id::HIGHRES_IMU => self.calibrates,
@@ -228,12 +238,12 @@ impl Comms {
         };
         let has_index = [id::AVAILABLE_MODES, id::ESC_INFO, id::ESC_STATUS].contains(&message);
         match (Streams::knows(message), known) {
-            (false, _) => Answer::Unsupported,
-            _ if index != 0 && !has_index => Answer::Denied,
-            (_, false) if message == id::AVAILABLE_MODES => Answer::Denied,
-            (_, false) => Answer::Refused(NOT_KNOWN),
-            _ if self.streams.request(Requested { message, index }) => Answer::Accepted,
-            _ => Answer::Refused(BUSY),
+            (false, _) => CommandResult::Unsupported,
+            _ if index != 0 && !has_index => CommandResult::Denied,
+            (_, false) if message == id::AVAILABLE_MODES => CommandResult::Denied,
+            (_, false) => CommandResult::Refused(NOT_KNOWN),
+            _ if self.streams.request(Requested { message, index }) => CommandResult::Accepted,
+            _ => CommandResult::Refused(BUSY),
         }
     }
 

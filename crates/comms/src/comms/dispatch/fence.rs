@@ -5,7 +5,7 @@ use crate::services::fence::{FenceMotion, contains, holds, holds_circle, is_clea
 use crate::services::mission::Surroundings;
 use afbc_control::math::sqrt;
 use afbc_guidance::fence::StopPath;
-use afbc_guidance::{FlightMode, Item, Leg, Order};
+use afbc_guidance::{FlightMode, Item, Order, RequestedItem};
 use nalgebra::{Vector2, Vector3};
 
 /// Time between two searches for the nearest rally point \[us\].
@@ -92,7 +92,7 @@ impl Comms {
 
     /// Returns a mission item. If its place is outside the fence, the place is made invalid, so that the guidance
     /// refuses it.
-    pub(super) fn fenced(&self, mut leg: Leg) -> Leg {
+    pub(super) fn fenced(&self, mut leg: RequestedItem) -> RequestedItem {
         let items = self.missions.fence();
         let Some(chart) = self.status.aux.origin.filter(|_| !items.is_empty()).map(|origin| origin.chart()) else {
             return leg;

@@ -4,7 +4,7 @@ use super::{Comms, ParameterTask, Reply};
 use crate::services::commands::BUSY;
 use crate::services::texts::Words;
 use afbc_flight_core::Refusal;
-use afbc_mavlink::{Address, Answer, MavSeverity, ParameterRequest, Storage};
+use afbc_mavlink::{Address, CommandResult, MavSeverity, ParameterRequest, Storage};
 use afbc_onboard::ControlInputs;
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 
@@ -21,12 +21,14 @@ impl Comms {
 
     /// Answers MAV_CMD_PREFLIGHT_STORAGE. Loading and saving do nothing, since each change is stored and adopted at
     /// once.
-    pub(super) fn storage(&mut self, storage: Storage) -> Answer {
+    pub(super) fn storage(&mut self, storage: Storage) -> CommandResult {
         match storage {
-            Storage::Load | Storage::Save => Answer::Accepted,
-            Storage::Reset if self.status.mode.armed() => Answer::Refused(Refusal::AlreadyArmed as i32),
-            Storage::Reset if self.parameter_tasks.push_back(ParameterTask::Restore).is_err() => Answer::Refused(BUSY),
-            Storage::Reset => Answer::Accepted,
+            Storage::Load | Storage::Save => CommandResult::Accepted,
+            Storage::Reset if self.status.mode.armed() => CommandResult::Refused(Refusal::AlreadyArmed as i32),
+            Storage::Reset if self.parameter_tasks.push_back(ParameterTask::Restore).is_err() => {
+                CommandResult::Refused(BUSY)
+            }
+            Storage::Reset => CommandResult::Accepted,
         }
     }
 

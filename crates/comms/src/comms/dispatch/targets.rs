@@ -3,7 +3,7 @@
 use super::Comms;
 use afbc_flight_core::Stamped;
 use afbc_guidance::{AttitudeTarget, MotionTarget};
-use afbc_mavlink::{Address, Axes, ExternalTarget, PositionTarget};
+use afbc_mavlink::{Address, ExternalTarget, PositionTarget, TargetFrame};
 use afbc_onboard::ControlInputs;
 use afbc_rc::SILENT_US;
 use afbc_types::Setpoint;
@@ -30,7 +30,7 @@ impl Comms {
                 let Some(target) = self.in_local_frame(&target) else { return };
                 afbc_guidance::OffboardTarget::Motion(target)
             }
-            ExternalTarget::Place(place, target) => {
+            ExternalTarget::GlobalPosition(place, target) => {
                 let Ok(position_m) = self.local(&place) else { return };
                 afbc_guidance::OffboardTarget::Motion(MotionTarget { position_m, ..motion(&target, false) })
             }
@@ -64,14 +64,14 @@ impl Comms {
     /// Converts a target to the guidance's type. Returns none if the target needs an unknown position.
     fn in_local_frame(&self, target: &PositionTarget) -> Option<MotionTarget> {
         Some(match target.axes {
-            Axes::Local => motion(target, false),
-            Axes::Offset => {
+            TargetFrame::Local => motion(target, false),
+            TargetFrame::Offset => {
                 let here = self.status.is_located().then(|| self.here())?;
                 MotionTarget { position_m: here + target.position_m, ..motion(target, false) }
             }
             // A target in the body frame has either a position or a velocity: the decoder accepts no other.
-            Axes::Body => motion(target, target.position_m.iter().all(|number| number.is_nan())),
-            Axes::BodyOffset => motion(target, true),
+            TargetFrame::Body => motion(target, target.position_m.iter().all(|number| number.is_nan())),
+            TargetFrame::BodyOffset => motion(target, true),
         })
     }
 }

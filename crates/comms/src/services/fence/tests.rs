@@ -6,8 +6,8 @@ use super::*;
 use crate::services::mission::{Missions, Surroundings};
 use crate::services::origin::{EarthOrigin, Global};
 use crate::services::texts::Words;
-use afbc_guidance::Limits;
-use afbc_mavlink::{Address, Mission, Plan};
+use afbc_guidance::MotionLimits;
+use afbc_mavlink::{Address, MissionMessage, MissionType};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use std::vec;
@@ -46,15 +46,15 @@ fn around(here: Option<[f32; 2]>) -> Surroundings {
 
 /// Uploads a fence. Returns the result and the text.
 fn upload(missions: &mut Missions, items: &[MissionItem], around: &Surroundings) -> (MissionResult, Option<Words>) {
-    let mut heard = missions.hear(Mission::Count(items.len() as u16, Plan::FENCE), A, true, 0, around);
+    let mut heard = missions.hear(MissionMessage::Count(items.len() as u16, MissionType::FENCE), A, true, 0, around);
     while let Some((message, to)) = missions.next_message() {
         assert_eq!(to, A);
         match message {
-            Mission::Request(number, Plan::FENCE) => {
+            MissionMessage::Request(number, MissionType::FENCE) => {
                 let item = items[usize::from(number)];
-                heard = missions.hear(Mission::Item(item, Plan::FENCE), A, true, 0, around);
+                heard = missions.hear(MissionMessage::Item(item, MissionType::FENCE), A, true, 0, around);
             }
-            Mission::Ack(result, Plan::FENCE) => {
+            MissionMessage::Ack(result, MissionType::FENCE) => {
                 assert_eq!(heard.fence, result == MissionResult::ACCEPTED);
                 return (result, heard.text);
             }
@@ -133,22 +133,23 @@ proptest! {
         for number in 0..mission {
             let waypoint = MissionItem { number, command: 16, frame: 6, x, y, ..MissionItem::default() };
             if number == 0 {
-                missions.hear(Mission::Count(mission, Plan::MISSION), A, true, 0, &around(None));
+                missions.hear(MissionMessage::Count(mission, MissionType::MISSION), A, true, 0, &around(None));
             }
-            missions.hear(Mission::Item(waypoint, Plan::MISSION), A, true, 0, &around(None));
+            missions.hear(MissionMessage::Item(waypoint, MissionType::MISSION), A, true, 0, &around(None));
         }
         while missions.next_message().is_some() {}
         for _ in 0..2 {
             prop_assert_eq!(upload(&mut missions, &items, &around(None)), (MissionResult::ACCEPTED, None));
             prop_assert_eq!(missions.items().len(), usize::from(mission));
-            missions.hear(Mission::List(Plan::FENCE), A, false, 0, &around(None));
-            prop_assert_eq!(missions.next_message(), Some((Mission::Count(items.len() as u16, Plan::FENCE), A)));
+            missions.hear(MissionMessage::List(MissionType::FENCE), A, false, 0, &around(None));
+            let count = MissionMessage::Count(items.len() as u16, MissionType::FENCE);
+            prop_assert_eq!(missions.next_message(), Some((count, A)));
             for item in &items {
-                missions.hear(Mission::Request(item.number, Plan::FENCE), A, false, 0, &around(None));
-                prop_assert_eq!(missions.next_message(), Some((Mission::Item(*item, Plan::FENCE), A)));
+                missions.hear(MissionMessage::Request(item.number, MissionType::FENCE), A, false, 0, &around(None));
+                prop_assert_eq!(missions.next_message(), Some((MissionMessage::Item(*item, MissionType::FENCE), A)));
             }
         }
-        let heard = missions.hear(Mission::Clear(Plan::FENCE), A, true, 0, &around(None));
+        let heard = missions.hear(MissionMessage::Clear(MissionType::FENCE), A, true, 0, &around(None));
         prop_assert!(heard.fence && missions.fence().is_empty());
         prop_assert_eq!(missions.items().len(), usize::from(mission));
     }
@@ -164,13 +165,13 @@ proptest! {
         }));
         let truth = inside(&items, [x.into(), y.into()]);
         prop_assert_eq!(contains(&items, &chart, here_m), truth);
-        let stop = StopPath::of_vehicle(&Limits::DEFAULT.braking(), here_m, Vector2::zeros(), Vector2::zeros());
+        let stop = StopPath::of_vehicle(&MotionLimits::DEFAULT.braking(), here_m, Vector2::zeros(), Vector2::zeros());
         let motion = FenceMotion { here_m, speed_m_s: 0.0, stops: [stop; 2] };
         let mut watch = FenceWatch::default();
         for _ in 0..items.len() {
             watch.look(&items, &chart, &motion);
         }
-        prop_assert_eq!(watch.view(), FenceView { leaves: !truth, outside: !truth });
+        prop_assert_eq!(watch.view(), FenceStatus { leaves: !truth, outside: !truth });
         // The same fence is refused if the vehicle is outside.
         let refused = check(&items, Some(&chart), Some(here_m)).err().map(|(_, invalid)| invalid.reason);
         prop_assert_eq!(refused, (!truth).then_some("the vehicle is outside"));
@@ -224,7 +225,7 @@ proptest! {
         // Nor does any fence of such items cause a panic.
         let chart = origin().chart();
         let _ = contains(&items, &chart, Vector2::zeros());
-        let (braking, none) = (Limits::DEFAULT.braking(), Vector2::zeros());
+        let (braking, none) = (MotionLimits::DEFAULT.braking(), Vector2::zeros());
         let stop = StopPath::of_vehicle(&braking, none, none, none);
         let motion = FenceMotion { here_m: Vector2::zeros(), speed_m_s: 0.0, stops: [stop; 2] };
         let mut watch = FenceWatch::default();

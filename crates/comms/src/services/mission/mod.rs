@@ -14,8 +14,8 @@ use crate::services::fence;
 use crate::services::items::{FAR, check_jumps, check_rally, stop_m};
 use crate::services::origin::EarthOrigin;
 use crate::services::texts::Words;
-use afbc_guidance::{Item, Leg, Net, OrderRefusal};
-use afbc_mavlink::{Address, Mission, MissionCurrent, MissionItem, MissionResult, Plan};
+use afbc_guidance::{FailsafeSettings, Item, OrderRefusal, RequestedItem};
+use afbc_mavlink::{Address, MissionCurrent, MissionItem, MissionMessage, MissionResult, MissionType};
 use heapless::Deque;
 use jumps::Jumps;
 use nalgebra::{Vector2, Vector3};
@@ -49,8 +49,8 @@ pub struct Missions {
     jumps: Jumps,
     upload: Option<Upload>,
     /// Station, plan and last item of the last upload, in case its acknowledgement is lost.
-    done: Option<(Address, Plan, u16)>,
-    out: Deque<(Mission, Address), OUT_MAX>,
+    done: Option<(Address, MissionType, u16)>,
+    out: Deque<(MissionMessage, Address), OUT_MAX>,
 }
 
 /// Results of a station's message, besides answers.
@@ -68,7 +68,7 @@ impl Missions {
     /// Handles a message of `from`. `in_control` is true if that station is in control.
     pub fn hear(
         &mut self,
-        message: Mission,
+        message: MissionMessage,
         from: Address,
         in_control: bool,
         now_us: u64,
@@ -80,30 +80,31 @@ impl Missions {
             return heard;
         }
         match message {
-            Mission::List(plan) => self.say(Mission::Count(self.count(plan), plan), from),
-            Mission::Request(number, plan) => match self.item(number, plan) {
-                Some(item) => self.say(Mission::Item(item, plan), from),
+            MissionMessage::List(plan) => self.say(MissionMessage::Count(self.count(plan), plan), from),
+            MissionMessage::Request(number, plan) => match self.item(number, plan) {
+                Some(item) => self.say(MissionMessage::Item(item, plan), from),
                 None => self.acknowledge(MissionResult::INVALID_SEQUENCE, plan, from),
             },
-            Mission::Count(_, plan) | Mission::Clear(plan) if !in_control => {
+            MissionMessage::Count(_, plan) | MissionMessage::Clear(plan) if !in_control => {
                 self.acknowledge(MissionResult::DENIED, plan, from);
             }
-            Mission::Count(count, plan) => (heard.text, heard.fence) = self.begin(count, plan, from, now_us),
-            Mission::Item(item, plan) => (heard.text, heard.fence) = self.take(item, plan, from, now_us, around),
+            MissionMessage::Count(count, plan) => (heard.text, heard.fence) = self.begin(count, plan, from, now_us),
+            MissionMessage::Item(item, plan) => (heard.text, heard.fence) = self.take(item, plan, from, now_us, around),
             // Partial lists are refused; hardly any station uses them.
-            Mission::Part(_, plan) => self.acknowledge(MissionResult::UNSUPPORTED, plan, from),
-            Mission::Clear(plan) => {
-                for each in [Plan::MISSION, Plan::FENCE, Plan::RALLY] {
-                    if plan == each || plan == Plan::ALL {
+            MissionMessage::PartialList(_, plan) => self.acknowledge(MissionResult::UNSUPPORTED, plan, from),
+            MissionMessage::Clear(plan) => {
+                for each in [MissionType::MISSION, MissionType::FENCE, MissionType::RALLY] {
+                    if plan == each || plan == MissionType::ALL {
                         self.clear(each);
-                        heard.fence |= each == Plan::FENCE;
+                        heard.fence |= each == MissionType::FENCE;
                     }
                 }
-                let known = [Plan::MISSION, Plan::FENCE, Plan::RALLY, Plan::ALL].contains(&plan);
+                let known =
+                    [MissionType::MISSION, MissionType::FENCE, MissionType::RALLY, MissionType::ALL].contains(&plan);
                 let result = if known { MissionResult::ACCEPTED } else { MissionResult::UNSUPPORTED };
                 self.acknowledge(result, plan, from);
             }
-            Mission::SetCurrent(number) if in_control => {
+            MissionMessage::SetCurrent(number) if in_control => {
                 if usize::from(number) < self.items().len() {
                     heard.resume = Some(number);
                 } else {
@@ -111,8 +112,13 @@ impl Missions {
                 }
             }
             // The station aborts its upload.
-            Mission::Ack(..) if self.upload.as_ref().is_some_and(|upload| upload.from == from) => self.upload = None,
-            Mission::SetCurrent(_) | Mission::Ack(..) | Mission::Current(_) | Mission::Reached(_) => (),
+            MissionMessage::Ack(..) if self.upload.as_ref().is_some_and(|upload| upload.from == from) => {
+                self.upload = None
+            }
+            MissionMessage::SetCurrent(_)
+            | MissionMessage::Ack(..)
+            | MissionMessage::Current(_)
+            | MissionMessage::Reached(_) => (),
         }
         heard
     }
@@ -124,7 +130,7 @@ impl Missions {
         match upload.remind(now_us) {
             upload::Reminder::None => None,
             upload::Reminder::Ask(number) => {
-                self.say(Mission::Request(number, plan), from);
+                self.say(MissionMessage::Request(number, plan), from);
                 None
             }
             upload::Reminder::GiveUp => {
@@ -136,12 +142,12 @@ impl Missions {
     }
 
     /// Returns the next message to be sent, with its receiver.
-    pub fn next_message(&mut self) -> Option<(Mission, Address)> {
+    pub fn next_message(&mut self) -> Option<(MissionMessage, Address)> {
         self.out.pop_front()
     }
 
     /// Returns a mission item for the guidance, in the local frame.
-    pub fn leg(&self, number: u16, origin: Option<&EarthOrigin>, home_m: f32) -> Option<Leg> {
+    pub fn leg(&self, number: u16, origin: Option<&EarthOrigin>, home_m: f32) -> Option<RequestedItem> {
         let items = self.items();
         let of_station = items.get(usize::from(number))?;
         let mut item = to_guidance(of_station, origin, home_m)?;
@@ -150,12 +156,12 @@ impl Missions {
             *target = self.jumps.next(of_station, *target);
             is_last &= usize::from(*target) == items.len();
         }
-        Some(Leg { number, upload: self.number, item, is_last })
+        Some(RequestedItem { number, upload: self.number, item, is_last })
     }
 
     /// Notes that the guidance has completed an item.
     pub fn reached(&mut self, number: u16) {
-        if let Some(item) = self.plans.of(Plan::MISSION).get(usize::from(number)) {
+        if let Some(item) = self.plans.of(MissionType::MISSION).get(usize::from(number)) {
             self.jumps.made(item);
         }
     }
@@ -174,22 +180,22 @@ impl Missions {
     pub fn problem(&self, around: &Surroundings) -> Option<Words> {
         let (number, invalid) = check_places(self.items(), self.fence(), around).err()?;
         let command = self.items().get(usize::from(number)).map_or(0, |item| item.command);
-        Some(invalid.text(name(Plan::MISSION), number, command))
+        Some(invalid.text(name(MissionType::MISSION), number, command))
     }
 
     /// Returns the items of the mission.
     pub fn items(&self) -> &[MissionItem] {
-        self.plans.of(Plan::MISSION)
+        self.plans.of(MissionType::MISSION)
     }
 
     /// Returns the items of the geofence.
     pub fn fence(&self) -> &[MissionItem] {
-        self.plans.of(Plan::FENCE)
+        self.plans.of(MissionType::FENCE)
     }
 
     /// Returns the rally points.
     pub fn rally(&self) -> &[MissionItem] {
-        self.plans.of(Plan::RALLY)
+        self.plans.of(MissionType::RALLY)
     }
 
     /// Returns the number of the mission's upload.
@@ -211,17 +217,17 @@ impl Missions {
         MissionCurrent { number: item.unwrap_or(0), total, state, mode: if flies { 1 } else { 2 } }
     }
 
-    fn count(&self, plan: Plan) -> u16 {
+    fn count(&self, plan: MissionType) -> u16 {
         self.plans.of(plan).len() as u16
     }
 
-    fn item(&self, number: u16, plan: Plan) -> Option<MissionItem> {
+    fn item(&self, number: u16, plan: MissionType) -> Option<MissionItem> {
         self.plans.of(plan).get(usize::from(number)).copied()
     }
 
     /// Begins an upload. Returns a text, and true if the fence has changed.
-    fn begin(&mut self, count: u16, plan: Plan, from: Address, now_us: u64) -> (Option<Words>, bool) {
-        let known = [Plan::MISSION, Plan::FENCE, Plan::RALLY].contains(&plan);
+    fn begin(&mut self, count: u16, plan: MissionType, from: Address, now_us: u64) -> (Option<Words>, bool) {
+        let known = [MissionType::MISSION, MissionType::FENCE, MissionType::RALLY].contains(&plan);
         let room = self.plans.room(plan);
         let result = match count {
             _ if !known => MissionResult::UNSUPPORTED,
@@ -233,13 +239,13 @@ impl Missions {
             _ if usize::from(count) > room => MissionResult::NO_SPACE,
             _ => {
                 (self.upload, self.done) = (Some(Upload::new(plan, count, from, now_us)), None);
-                self.say(Mission::Request(0, plan), from);
+                self.say(MissionMessage::Request(0, plan), from);
                 return (None, false);
             }
         };
         self.acknowledge(result, plan, from);
         let text = Words::of(name(plan)).and(" refused: room for ").number(room as u32).and(" items");
-        let cleared = result == MissionResult::ACCEPTED && plan == Plan::FENCE;
+        let cleared = result == MissionResult::ACCEPTED && plan == MissionType::FENCE;
         ((result == MissionResult::NO_SPACE).then_some(text), cleared)
     }
 
@@ -247,7 +253,7 @@ impl Missions {
     fn take(
         &mut self,
         item: MissionItem,
-        plan: Plan,
+        plan: MissionType,
         from: Address,
         now_us: u64,
         around: &Surroundings,
@@ -265,24 +271,24 @@ impl Missions {
             return (None, false);
         }
         let mut checked = match plan {
-            Plan::FENCE => fence::check_item(&item),
-            Plan::RALLY => check_rally(&item, around.origin.as_ref()),
+            MissionType::FENCE => fence::check_item(&item),
+            MissionType::RALLY => check_rally(&item, around.origin.as_ref()),
             _ => check(&item),
         }
         .map_err(|invalid| (item.number, invalid));
         let next = if checked.is_ok() { upload.put(item, now_us) } else { None };
         if let Some(number) = next {
-            self.say(Mission::Request(number, plan), from);
+            self.say(MissionMessage::Request(number, plan), from);
             return (None, false);
         }
         if checked.is_ok() {
             checked = match plan {
-                Plan::FENCE => {
+                MissionType::FENCE => {
                     let chart = around.origin.map(|origin| origin.chart());
                     fence::check(&upload.items, chart.as_ref(), around.here_m)
                 }
-                Plan::MISSION => check_jumps(&upload.items)
-                    .and_then(|()| check_places(&upload.items, self.plans.of(Plan::FENCE), around)),
+                MissionType::MISSION => check_jumps(&upload.items)
+                    .and_then(|()| check_places(&upload.items, self.plans.of(MissionType::FENCE), around)),
                 _ => Ok(()),
             };
         }
@@ -294,19 +300,19 @@ impl Missions {
         // The items are replaced in place: a copy would need much stack.
         let fits = self.plans.replace(plan, &upload.items);
         self.upload = None;
-        if plan == Plan::MISSION && fits {
+        if plan == MissionType::MISSION && fits {
             self.renew();
         }
         self.done = fits.then_some((from, plan, item.number));
         self.acknowledge(if fits { MissionResult::ACCEPTED } else { MissionResult::NO_SPACE }, plan, from);
-        (None, fits && plan == Plan::FENCE)
+        (None, fits && plan == MissionType::FENCE)
     }
 
     /// Removes the items of a plan, and ends any upload.
-    fn clear(&mut self, plan: Plan) {
+    fn clear(&mut self, plan: MissionType) {
         self.plans.replace(plan, &[]);
         (self.upload, self.done) = (None, None);
-        if plan == Plan::MISSION {
+        if plan == MissionType::MISSION {
             self.renew();
         }
     }
@@ -318,11 +324,11 @@ impl Missions {
         self.jumps.clear();
     }
 
-    fn acknowledge(&mut self, result: MissionResult, plan: Plan, to: Address) {
-        self.say(Mission::Ack(result, plan), to);
+    fn acknowledge(&mut self, result: MissionResult, plan: MissionType, to: Address) {
+        self.say(MissionMessage::Ack(result, plan), to);
     }
 
-    fn say(&mut self, message: Mission, to: Address) {
+    fn say(&mut self, message: MissionMessage, to: Address) {
         self.out.push_back((message, to)).ok();
     }
 }
@@ -331,7 +337,8 @@ impl Missions {
 /// known.
 fn check_places(items: &[MissionItem], fence: &[MissionItem], around: &Surroundings) -> Result<(), (u16, Invalid)> {
     let [fence_radius_m, fence_height_m] = around.cylinder_m;
-    let (net, home_m) = (Net { fence_radius_m, fence_height_m, ..Net::DEFAULT }, around.home_m);
+    let (net, home_m) =
+        (FailsafeSettings { fence_radius_m, fence_height_m, ..FailsafeSettings::DEFAULT }, around.home_m);
     let chart = around.origin.filter(|_| !fence.is_empty()).map(|origin| origin.chart());
     let flown = |item: &MissionItem| {
         let flown = to_guidance(item, around.origin.as_ref(), home_m.map_or(0.0, |home_m| home_m.z));
@@ -347,10 +354,10 @@ fn check_places(items: &[MissionItem], fence: &[MissionItem], around: &Surroundi
 }
 
 /// Returns the name of a plan.
-fn name(plan: Plan) -> &'static str {
+fn name(plan: MissionType) -> &'static str {
     match plan {
-        Plan::FENCE => "fence",
-        Plan::RALLY => "rally",
+        MissionType::FENCE => "fence",
+        MissionType::RALLY => "rally",
         _ => "mission",
     }
 }

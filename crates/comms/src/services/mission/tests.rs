@@ -17,7 +17,7 @@ use std::vec::Vec as List;
 
 const A: Address = Address { system: 255, component: 190 };
 const B: Address = Address { system: 245, component: 190 };
-const PLAN: Plan = Plan::MISSION;
+const PLAN: MissionType = MissionType::MISSION;
 const NOWHERE: Surroundings = Surroundings { origin: None, here_m: None, home_m: None, cylinder_m: [0.0; 2] };
 
 fn waypoint(number: u16) -> MissionItem {
@@ -34,16 +34,16 @@ fn waypoint(number: u16) -> MissionItem {
     }
 }
 
-fn said(missions: &mut Missions) -> List<(Mission, Address)> {
+fn said(missions: &mut Missions) -> List<(MissionMessage, Address)> {
     core::iter::from_fn(|| missions.next_message()).collect()
 }
 
 /// Uploads items without loss. Returns the last messages.
-fn upload(missions: &mut Missions, items: &[MissionItem]) -> List<(Mission, Address)> {
-    missions.hear(Mission::Count(items.len() as u16, PLAN), A, true, 0, &NOWHERE);
+fn upload(missions: &mut Missions, items: &[MissionItem]) -> List<(MissionMessage, Address)> {
+    missions.hear(MissionMessage::Count(items.len() as u16, PLAN), A, true, 0, &NOWHERE);
     for item in items {
-        assert_eq!(said(missions), [(Mission::Request(item.number, PLAN), A)]);
-        missions.hear(Mission::Item(*item, PLAN), A, true, 0, &NOWHERE);
+        assert_eq!(said(missions), [(MissionMessage::Request(item.number, PLAN), A)]);
+        missions.hear(MissionMessage::Item(*item, PLAN), A, true, 0, &NOWHERE);
     }
     said(missions)
 }
@@ -52,17 +52,17 @@ fn upload(missions: &mut Missions, items: &[MissionItem]) -> List<(Mission, Addr
 fn what_was_uploaded_can_be_downloaded() {
     let mut missions = Missions::default();
     let items: List<_> = (0..ITEMS_MAX as u16).map(waypoint).collect();
-    assert_eq!(upload(&mut missions, &items), [(Mission::Ack(MissionResult::ACCEPTED, PLAN), A)]);
-    missions.hear(Mission::List(PLAN), B, false, 0, &NOWHERE);
-    assert_eq!(said(&mut missions), [(Mission::Count(64, PLAN), B)]);
+    assert_eq!(upload(&mut missions, &items), [(MissionMessage::Ack(MissionResult::ACCEPTED, PLAN), A)]);
+    missions.hear(MissionMessage::List(PLAN), B, false, 0, &NOWHERE);
+    assert_eq!(said(&mut missions), [(MissionMessage::Count(64, PLAN), B)]);
     for item in &items {
-        missions.hear(Mission::Request(item.number, PLAN), B, false, 0, &NOWHERE);
+        missions.hear(MissionMessage::Request(item.number, PLAN), B, false, 0, &NOWHERE);
         let reported = said(&mut missions);
         // An omitted heading is NaN, which is not equal to itself, so texts are compared.
-        assert_eq!(std::format!("{reported:?}"), std::format!("{:?}", [(Mission::Item(*item, PLAN), B)]));
+        assert_eq!(std::format!("{reported:?}"), std::format!("{:?}", [(MissionMessage::Item(*item, PLAN), B)]));
     }
-    missions.hear(Mission::Request(64, PLAN), B, false, 0, &NOWHERE);
-    assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::INVALID_SEQUENCE, PLAN), B)]);
+    missions.hear(MissionMessage::Request(64, PLAN), B, false, 0, &NOWHERE);
+    assert_eq!(said(&mut missions), [(MissionMessage::Ack(MissionResult::INVALID_SEQUENCE, PLAN), B)]);
 }
 
 /// Rally points are stored in addition to the mission. Invalid ones are refused.
@@ -71,23 +71,26 @@ fn rally_points_are_kept() {
     let mut missions = Missions::default();
     upload(&mut missions, &[waypoint(0)]);
     let point = |number| MissionItem { command: 5100, frame: 3, parameters: [0.0; 4], ..waypoint(number) };
-    let plan = Plan::RALLY;
+    let plan = MissionType::RALLY;
     for bad in [waypoint(1), MissionItem { frame: 1, ..point(1) }, MissionItem { x: i32::MAX, ..point(1) }] {
-        missions.hear(Mission::Count(2, plan), A, true, 0, &NOWHERE);
-        missions.hear(Mission::Item(point(0), plan), A, true, 0, &NOWHERE);
-        let heard = missions.hear(Mission::Item(bad, plan), A, true, 0, &NOWHERE);
+        missions.hear(MissionMessage::Count(2, plan), A, true, 0, &NOWHERE);
+        missions.hear(MissionMessage::Item(point(0), plan), A, true, 0, &NOWHERE);
+        let heard = missions.hear(MissionMessage::Item(bad, plan), A, true, 0, &NOWHERE);
         assert!(heard.text.is_some_and(|text| std::format!("{text:?}").contains("rally item 1: ")));
-        assert!(matches!(said(&mut missions).last(), Some((Mission::Ack(result, Plan::RALLY), A)) if result.0 != 0));
+        assert!(matches!(
+            said(&mut missions).last(),
+            Some((MissionMessage::Ack(result, MissionType::RALLY), A)) if result.0 != 0
+        ));
     }
-    missions.hear(Mission::Count(2, plan), A, true, 0, &NOWHERE);
-    missions.hear(Mission::Item(point(0), plan), A, true, 0, &NOWHERE);
-    missions.hear(Mission::Item(point(1), plan), A, true, 0, &NOWHERE);
-    assert_eq!(said(&mut missions).last(), Some(&(Mission::Ack(MissionResult::ACCEPTED, plan), A)));
-    missions.hear(Mission::List(plan), B, false, 0, &NOWHERE);
-    missions.hear(Mission::Request(1, plan), B, false, 0, &NOWHERE);
-    assert_eq!(said(&mut missions), [(Mission::Count(2, plan), B), (Mission::Item(point(1), plan), B)]);
+    missions.hear(MissionMessage::Count(2, plan), A, true, 0, &NOWHERE);
+    missions.hear(MissionMessage::Item(point(0), plan), A, true, 0, &NOWHERE);
+    missions.hear(MissionMessage::Item(point(1), plan), A, true, 0, &NOWHERE);
+    assert_eq!(said(&mut missions).last(), Some(&(MissionMessage::Ack(MissionResult::ACCEPTED, plan), A)));
+    missions.hear(MissionMessage::List(plan), B, false, 0, &NOWHERE);
+    missions.hear(MissionMessage::Request(1, plan), B, false, 0, &NOWHERE);
+    assert_eq!(said(&mut missions), [(MissionMessage::Count(2, plan), B), (MissionMessage::Item(point(1), plan), B)]);
     assert_eq!(missions.items().len(), 1);
-    missions.hear(Mission::Clear(plan), A, true, 0, &NOWHERE);
+    missions.hear(MissionMessage::Clear(plan), A, true, 0, &NOWHERE);
     assert_eq!((missions.count(plan), missions.items().len()), (0, 1));
 }
 
@@ -96,12 +99,12 @@ fn rally_points_are_kept() {
 fn a_broken_upload_changes_nothing() {
     let mut missions = Missions::default();
     upload(&mut missions, &[waypoint(0), waypoint(1)]);
-    missions.hear(Mission::Count(3, PLAN), A, true, 0, &NOWHERE);
-    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0, &NOWHERE);
+    missions.hear(MissionMessage::Count(3, PLAN), A, true, 0, &NOWHERE);
+    missions.hear(MissionMessage::Item(waypoint(0), PLAN), A, true, 0, &NOWHERE);
     let bad = MissionItem { command: 205, ..waypoint(1) };
-    let heard = missions.hear(Mission::Item(bad, PLAN), A, true, 0, &NOWHERE);
+    let heard = missions.hear(MissionMessage::Item(bad, PLAN), A, true, 0, &NOWHERE);
     assert_eq!(heard.text, Some(Words::of("mission item 1: DO_MOUNT_CONTROL unsupported")));
-    assert_eq!(said(&mut missions).last(), Some(&(Mission::Ack(MissionResult::UNSUPPORTED, PLAN), A)));
+    assert_eq!(said(&mut missions).last(), Some(&(MissionMessage::Ack(MissionResult::UNSUPPORTED, PLAN), A)));
     assert_eq!(missions.items().len(), 2);
     assert_eq!(missions.number, 1);
 }
@@ -109,7 +112,7 @@ fn a_broken_upload_changes_nothing() {
 #[test]
 fn lost_messages_are_repeated_and_a_silent_station_is_given_up() {
     let mut missions = Missions::default();
-    missions.hear(Mission::Count(2, PLAN), A, true, 0, &NOWHERE);
+    missions.hear(MissionMessage::Count(2, PLAN), A, true, 0, &NOWHERE);
     said(&mut missions);
     let mut asked = 0;
     for now_us in (0..10 * PATIENCE_US).step_by(1000) {
@@ -117,8 +120,10 @@ fn lost_messages_are_repeated_and_a_silent_station_is_given_up() {
         for (message, to) in said(&mut missions) {
             assert_eq!(to, A);
             match message {
-                Mission::Request(0, PLAN) => asked += 1,
-                other => assert_eq!((other, text.is_some()), (Mission::Ack(MissionResult::CANCELLED, PLAN), true)),
+                MissionMessage::Request(0, PLAN) => asked += 1,
+                other => {
+                    assert_eq!((other, text.is_some()), (MissionMessage::Ack(MissionResult::CANCELLED, PLAN), true))
+                }
             }
         }
     }
@@ -126,33 +131,33 @@ fn lost_messages_are_repeated_and_a_silent_station_is_given_up() {
     assert!(missions.upload.is_none());
     // A further upload works, and its last item may be repeated.
     upload(&mut missions, &[waypoint(0)]);
-    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0, &NOWHERE);
-    assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::ACCEPTED, PLAN), A)]);
+    missions.hear(MissionMessage::Item(waypoint(0), PLAN), A, true, 0, &NOWHERE);
+    assert_eq!(said(&mut missions), [(MissionMessage::Ack(MissionResult::ACCEPTED, PLAN), A)]);
 }
 
 #[test]
 fn only_the_station_in_control_changes_it() {
     let mut missions = Missions::default();
     upload(&mut missions, &[waypoint(0)]);
-    missions.hear(Mission::Count(1, PLAN), B, false, 0, &NOWHERE);
-    missions.hear(Mission::Clear(Plan::ALL), B, false, 0, &NOWHERE);
-    assert_eq!(missions.hear(Mission::SetCurrent(0), B, false, 0, &NOWHERE), Heard::default());
-    let denied = |plan| (Mission::Ack(MissionResult::DENIED, plan), B);
-    assert_eq!(said(&mut missions), [denied(PLAN), denied(Plan::ALL)]);
+    missions.hear(MissionMessage::Count(1, PLAN), B, false, 0, &NOWHERE);
+    missions.hear(MissionMessage::Clear(MissionType::ALL), B, false, 0, &NOWHERE);
+    assert_eq!(missions.hear(MissionMessage::SetCurrent(0), B, false, 0, &NOWHERE), Heard::default());
+    let denied = |plan| (MissionMessage::Ack(MissionResult::DENIED, plan), B);
+    assert_eq!(said(&mut missions), [denied(PLAN), denied(MissionType::ALL)]);
     // Nor can another station add items to the upload.
-    missions.hear(Mission::Count(2, PLAN), A, true, 0, &NOWHERE);
+    missions.hear(MissionMessage::Count(2, PLAN), A, true, 0, &NOWHERE);
     said(&mut missions);
-    missions.hear(Mission::Item(waypoint(0), PLAN), B, false, 0, &NOWHERE);
-    assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::INVALID_SEQUENCE, PLAN), B)]);
+    missions.hear(MissionMessage::Item(waypoint(0), PLAN), B, false, 0, &NOWHERE);
+    assert_eq!(said(&mut missions), [(MissionMessage::Ack(MissionResult::INVALID_SEQUENCE, PLAN), B)]);
     assert_eq!(missions.upload.as_ref().map(Upload::wanted), Some(0));
 }
 
 #[test]
 fn too_many_items_are_refused() {
     let mut missions = Missions::default();
-    let heard = missions.hear(Mission::Count(65, PLAN), A, true, 0, &NOWHERE);
+    let heard = missions.hear(MissionMessage::Count(65, PLAN), A, true, 0, &NOWHERE);
     assert_eq!(heard.text, Some(Words::of("mission refused: room for 64 items")));
-    assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::NO_SPACE, PLAN), A)]);
+    assert_eq!(said(&mut missions), [(MissionMessage::Ack(MissionResult::NO_SPACE, PLAN), A)]);
 }
 
 #[test]
@@ -419,11 +424,11 @@ fn a_mission_outside_the_fence_is_refused() {
         [(16, 100, false), (16, 2600, false), (16, 2650, true), (17, 2650, true), (21, 2650, true), (195, 2650, false)]
     {
         let mut missions = Missions::default();
-        missions.hear(Mission::Count(1, Plan::FENCE), A, true, 0, &around);
-        missions.hear(Mission::Item(circle, Plan::FENCE), A, true, 0, &around);
-        missions.hear(Mission::Count(1, PLAN), A, true, 0, &around);
+        missions.hear(MissionMessage::Count(1, MissionType::FENCE), A, true, 0, &around);
+        missions.hear(MissionMessage::Item(circle, MissionType::FENCE), A, true, 0, &around);
+        missions.hear(MissionMessage::Count(1, PLAN), A, true, 0, &around);
         let item = MissionItem { command, x: x + north, y, parameters: [0.0; 4], ..waypoint(0) };
-        let heard = missions.hear(Mission::Item(item, PLAN), A, true, 0, &around);
+        let heard = missions.hear(MissionMessage::Item(item, PLAN), A, true, 0, &around);
         let text = outside.then(|| Words::of("mission item 0: outside the geofence"));
         assert_eq!((heard.text, missions.items().len()), (text, usize::from(!outside)), "{command} {north}");
     }
@@ -457,42 +462,45 @@ fn the_state_of_a_mission_is_reported() {
 /// Each message is answered for each type of plan, with and without control.
 #[test]
 fn every_message_is_answered_by_what_it_is_about() {
-    for plan in [0, 1, 2, 3, 99, 255].map(Plan) {
+    for plan in [0, 1, 2, 3, 99, 255].map(MissionType) {
         let mut missions = Missions::default();
         upload(&mut missions, &[waypoint(0), waypoint(1)]);
         let mut ask = |message, may| {
             let heard = missions.hear(message, A, may, 0, &NOWHERE);
             (said(&mut missions), heard, missions.items().len())
         };
-        let ack = |result| std::vec![(Mission::Ack(result, plan), A)];
-        let is_mission = plan == Plan::MISSION;
-        let (reported, heard, _) = ask(Mission::List(plan), false);
+        let ack = |result| std::vec![(MissionMessage::Ack(result, plan), A)];
+        let is_mission = plan == MissionType::MISSION;
+        let (reported, heard, _) = ask(MissionMessage::List(plan), false);
         assert_eq!(
             (reported, heard),
-            (std::vec![(Mission::Count(if is_mission { 2 } else { 0 }, plan), A)], Heard::default())
+            (std::vec![(MissionMessage::Count(if is_mission { 2 } else { 0 }, plan), A)], Heard::default())
         );
-        let (reported, ..) = ask(Mission::Request(1, plan), false);
-        let is_item =
-            matches!(reported[..], [(Mission::Item(MissionItem { number: 1, .. }, reported), A)] if reported == plan);
+        let (reported, ..) = ask(MissionMessage::Request(1, plan), false);
+        let is_item = matches!(
+            reported[..],
+            [(MissionMessage::Item(MissionItem { number: 1, .. }, reported), A)] if reported == plan
+        );
         assert!(
             is_item == is_mission && (is_mission || reported == ack(MissionResult::INVALID_SEQUENCE)),
             "{reported:?}"
         );
         assert_eq!(
-            ask(Mission::Part(afbc_mavlink::Part { writes: true, numbers: [0, 1] }, plan), true).0,
+            ask(MissionMessage::PartialList(afbc_mavlink::MissionRange { writes: true, numbers: [0, 1] }, plan), true)
+                .0,
             ack(MissionResult::UNSUPPORTED)
         );
-        for message in [Mission::Count(1, plan), Mission::Count(0, plan), Mission::Clear(plan)] {
+        for message in [MissionMessage::Count(1, plan), MissionMessage::Count(0, plan), MissionMessage::Clear(plan)] {
             assert_eq!(ask(message, false), (ack(MissionResult::DENIED), Heard::default(), 2));
         }
-        let known = plan.0 <= 2 || plan == Plan::ALL;
-        let (reported, _, left) = ask(Mission::Clear(plan), true);
+        let known = plan.0 <= 2 || plan == MissionType::ALL;
+        let (reported, _, left) = ask(MissionMessage::Clear(plan), true);
         assert_eq!(reported, ack(if known { MissionResult::ACCEPTED } else { MissionResult::UNSUPPORTED }));
-        assert_eq!(left, if is_mission || plan == Plan::ALL { 0 } else { 2 });
-        let (reported, ..) = ask(Mission::Count(0, plan), true);
+        assert_eq!(left, if is_mission || plan == MissionType::ALL { 0 } else { 2 });
+        let (reported, ..) = ask(MissionMessage::Count(0, plan), true);
         assert_eq!(reported, ack(if plan.0 <= 2 { MissionResult::ACCEPTED } else { MissionResult::UNSUPPORTED }));
-        let (reported, ..) = ask(Mission::Count(ITEMS_MAX as u16, plan), true);
-        assert_eq!(reported == [(Mission::Request(0, plan), A)], is_mission, "{reported:?}");
+        let (reported, ..) = ask(MissionMessage::Count(ITEMS_MAX as u16, plan), true);
+        assert_eq!(reported == [(MissionMessage::Request(0, plan), A)], is_mission, "{reported:?}");
     }
 }
 
@@ -507,7 +515,7 @@ fn an_item_is_chosen_that_there_is() {
         (1, false, None, None),
     ] {
         assert_eq!(
-            missions.hear(Mission::SetCurrent(number), A, may, 0, &NOWHERE),
+            missions.hear(MissionMessage::SetCurrent(number), A, may, 0, &NOWHERE),
             Heard { text, resume, fence: false }
         );
     }
@@ -517,24 +525,24 @@ fn an_item_is_chosen_that_there_is() {
 #[test]
 fn an_upload_is_its_stations_own() {
     let mut missions = Missions::default();
-    missions.hear(Mission::Count(2, PLAN), A, true, 0, &NOWHERE);
+    missions.hear(MissionMessage::Count(2, PLAN), A, true, 0, &NOWHERE);
     said(&mut missions);
-    missions.hear(Mission::Count(1, PLAN), B, true, 0, &NOWHERE);
-    assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::DENIED, PLAN), B)]);
-    missions.hear(Mission::Ack(MissionResult::CANCELLED, PLAN), B, true, 0, &NOWHERE);
+    missions.hear(MissionMessage::Count(1, PLAN), B, true, 0, &NOWHERE);
+    assert_eq!(said(&mut missions), [(MissionMessage::Ack(MissionResult::DENIED, PLAN), B)]);
+    missions.hear(MissionMessage::Ack(MissionResult::CANCELLED, PLAN), B, true, 0, &NOWHERE);
     assert!(missions.upload.is_some());
     // Items that are early, repeated or of another plan are not accepted.
     for item in [waypoint(1), waypoint(5)] {
-        missions.hear(Mission::Item(item, PLAN), A, true, 0, &NOWHERE);
+        missions.hear(MissionMessage::Item(item, PLAN), A, true, 0, &NOWHERE);
         assert_eq!(said(&mut missions), []);
     }
-    missions.hear(Mission::Item(waypoint(0), Plan::FENCE), A, true, 0, &NOWHERE);
-    assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::INVALID_SEQUENCE, Plan::FENCE), A)]);
-    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0, &NOWHERE);
-    assert_eq!(said(&mut missions), [(Mission::Request(1, PLAN), A)]);
-    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0, &NOWHERE);
+    missions.hear(MissionMessage::Item(waypoint(0), MissionType::FENCE), A, true, 0, &NOWHERE);
+    assert_eq!(said(&mut missions), [(MissionMessage::Ack(MissionResult::INVALID_SEQUENCE, MissionType::FENCE), A)]);
+    missions.hear(MissionMessage::Item(waypoint(0), PLAN), A, true, 0, &NOWHERE);
+    assert_eq!(said(&mut missions), [(MissionMessage::Request(1, PLAN), A)]);
+    missions.hear(MissionMessage::Item(waypoint(0), PLAN), A, true, 0, &NOWHERE);
     assert_eq!(said(&mut missions), []);
-    missions.hear(Mission::Ack(MissionResult::CANCELLED, PLAN), A, true, 0, &NOWHERE);
+    missions.hear(MissionMessage::Ack(MissionResult::CANCELLED, PLAN), A, true, 0, &NOWHERE);
     assert!(missions.upload.is_none());
     // The station may start again, and only the last item may be repeated.
     upload(&mut missions, &[waypoint(0), waypoint(1)]);
@@ -542,10 +550,10 @@ fn an_upload_is_its_stations_own() {
         (waypoint(1), A, PLAN, MissionResult::ACCEPTED),
         (waypoint(0), A, PLAN, MissionResult::INVALID_SEQUENCE),
         (waypoint(1), B, PLAN, MissionResult::INVALID_SEQUENCE),
-        (waypoint(1), A, Plan::RALLY, MissionResult::INVALID_SEQUENCE),
+        (waypoint(1), A, MissionType::RALLY, MissionResult::INVALID_SEQUENCE),
     ] {
-        missions.hear(Mission::Item(item, plan), from, true, 0, &NOWHERE);
-        assert_eq!(said(&mut missions), [(Mission::Ack(result, plan), from)]);
+        missions.hear(MissionMessage::Item(item, plan), from, true, 0, &NOWHERE);
+        assert_eq!(said(&mut missions), [(MissionMessage::Ack(result, plan), from)]);
     }
 }
 
@@ -556,10 +564,11 @@ fn what_is_not_used_is_named() {
     let cases =
         [([0.0, 0.0, 5.0, 0.0], "parameter 3 must be 0", 8), ([0.0, 0.0, 0.0, 4000.0], "heading is out of range", 9)];
     for (parameters, reason, result) in cases {
-        missions.hear(Mission::Count(1, PLAN), A, true, 0, &NOWHERE);
-        let heard = missions.hear(Mission::Item(MissionItem { parameters, ..waypoint(0) }, PLAN), A, true, 0, &NOWHERE);
+        missions.hear(MissionMessage::Count(1, PLAN), A, true, 0, &NOWHERE);
+        let heard =
+            missions.hear(MissionMessage::Item(MissionItem { parameters, ..waypoint(0) }, PLAN), A, true, 0, &NOWHERE);
         assert_eq!(heard.text, Some(Words::of("mission item 0: ").and(reason)));
-        assert_eq!(said(&mut missions).last(), Some(&(Mission::Ack(MissionResult(result), PLAN), A)));
+        assert_eq!(said(&mut missions).last(), Some(&(MissionMessage::Ack(MissionResult(result), PLAN), A)));
     }
 }
 
@@ -567,8 +576,8 @@ fn what_is_not_used_is_named() {
 #[test]
 fn nothing_is_cleared_without_an_answer() {
     let mut missions = Missions::default();
-    (0..OUT_MAX).for_each(|_| drop(missions.hear(Mission::List(PLAN), A, true, 0, &NOWHERE)));
-    for message in [Mission::Clear(PLAN), Mission::Count(0, PLAN)] {
+    (0..OUT_MAX).for_each(|_| drop(missions.hear(MissionMessage::List(PLAN), A, true, 0, &NOWHERE)));
+    for message in [MissionMessage::Clear(PLAN), MissionMessage::Count(0, PLAN)] {
         assert_eq!(missions.hear(message, A, true, 0, &NOWHERE), Heard::default());
     }
     assert_eq!((missions.number, said(&mut missions).len()), (0, OUT_MAX));

@@ -1,7 +1,7 @@
 //! An upload in progress.
 
 use crate::services::items::ITEMS_MAX;
-use afbc_mavlink::{Address, MissionItem, Plan};
+use afbc_mavlink::{Address, MissionItem, MissionType};
 use heapless::Vec;
 
 /// Time after which an item is requested again \[us\].
@@ -11,7 +11,7 @@ pub(super) const TRIES: u8 = 6;
 
 #[derive(Clone, Debug)]
 pub(super) struct Upload {
-    pub(super) plan: Plan,
+    pub(super) plan: MissionType,
     pub(super) from: Address,
     pub(super) items: Vec<MissionItem, ITEMS_MAX>,
     count: u16,
@@ -29,7 +29,7 @@ pub(super) enum Reminder {
 
 impl Upload {
     /// Creates an upload of `count` items. The caller requests the first one now.
-    pub(super) fn new(plan: Plan, count: u16, from: Address, now_us: u64) -> Self {
+    pub(super) fn new(plan: MissionType, count: u16, from: Address, now_us: u64) -> Self {
         Upload { plan, from, items: Vec::new(), count, asked_us: now_us, tries: 1 }
     }
 

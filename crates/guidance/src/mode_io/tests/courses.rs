@@ -63,7 +63,7 @@ fn a_landing_is_where_it_stops() {
 /// flies home, heading there, and descends over home.
 #[test]
 fn a_return_climbs_flies_and_descends() {
-    let Flying { near_home_m, return_height_m, .. } = flying();
+    let FlightModeSettings { near_home_m, return_height_m, .. } = flying();
     let home = Stage::at(here()).home_m;
     let safe = home.z + return_height_m;
     let climbs = |place: Vector3<f32>, ceiling_m: f32| {

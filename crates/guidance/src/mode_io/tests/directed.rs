@@ -81,7 +81,7 @@ proptest! {
 /// Rotors too weak to lift the weight give their largest thrust.
 #[test]
 fn weak_rotors_give_what_they_can() {
-    let weak = Lift { most_m_s2: 8.0, ..LIFT };
+    let weak = AvailableThrust { most_m_s2: 8.0, ..LIFT };
     for throttle in [0.0, 1.0] {
         let all = Sticks { throttle, ..Sticks::default() };
         let output = Stage::at(here()).see(|inputs| sticks::fly(FlightMode::Stabilised, &all, inputs, &weak));
@@ -120,13 +120,13 @@ fn targets_are_plausible_within_their_largest_values() {
             9 => target.yaw_rad = value,
             _ => target.yaw_rate_rad_s = value,
         }
-        targets::is_plausible(&OffboardTarget::Motion(target))
+        offboard::is_plausible(&OffboardTarget::Motion(target))
     };
     for (index, most) in [1e5, 1e5, 1e5, 1e3, 1e3, 1e3, 1e2, 1e2, 1e2, 1e3, 1e2].into_iter().enumerate() {
         assert!(with(index, f32::NAN) && with(index, most) && with(index, -most), "{index}");
         assert!(!with(index, most * 1.01) && !with(index, -most * 1.01) && !with(index, f32::INFINITY), "{index}");
     }
-    let attitude = |target: AttitudeTarget| targets::is_plausible(&OffboardTarget::Attitude(target));
+    let attitude = |target: AttitudeTarget| offboard::is_plausible(&OffboardTarget::Attitude(target));
     for (thrust, plausible) in [(0.0, true), (1.0, true), (-0.01, false), (1.01, false), (f32::NAN, false)] {
         assert_eq!(attitude(level(thrust)), plausible, "{thrust}");
     }
@@ -140,7 +140,7 @@ fn targets_are_plausible_within_their_largest_values() {
     }
 }
 
-fn aimed(stage: &Stage, targets: &mut Targets, target: MotionTarget, at_us: u64) -> (ModeOutput, LimiterTarget) {
+fn aimed(stage: &Stage, targets: &mut OffboardMemory, target: MotionTarget, at_us: u64) -> (ModeOutput, LimiterTarget) {
     let stamped = Stamped { value: OffboardTarget::Motion(target), at_us };
     let output = stage.see(|inputs| targets.fly(&stamped, inputs, &LIFT));
     (output, limited(&output))
@@ -160,7 +160,7 @@ fn a_local_target_is_aimed_at_as_it_is() {
     };
     for (speed_m_s, expected) in [(f32::INFINITY, 9.0), (5.0, 5.0)] {
         let stage = Stage { speed_m_s, ..Stage::at(here()) };
-        let (_, aim) = aimed(&stage, &mut Targets::default(), target, 77);
+        let (_, aim) = aimed(&stage, &mut OffboardMemory::default(), target, 77);
         assert!(same(&aim.position_m, &target.position_m) && same(&aim.velocity_m_s, &target.velocity_m_s));
         assert_eq!((aim.acceleration_m_s2, aim.yaw_rad, aim.yaw_rate_rad_s), (v(0.4, 0.5, 0.6), 0.7, 0.8));
         assert_eq!((aim.sent_us, aim.speed_m_s, aim.up_m_s, aim.down_m_s), (Some(77), expected, 3.0, 2.0));
@@ -179,7 +179,7 @@ fn a_target_of_the_vehicles_frame_is_turned_and_fixed() {
         ..motion()
     };
     let heading = Rotation3::from_axis_angle(&Vector3::z_axis(), 1.1);
-    let (mut targets, stage) = (Targets::default(), Stage::at(here()).apart(Vector3::new(0.5, 0.5, 0.5)));
+    let (mut targets, stage) = (OffboardMemory::default(), Stage::at(here()).apart(Vector3::new(0.5, 0.5, 0.5)));
     let (_, aim) = aimed(&stage, &mut targets, target, 10);
     let near = |a: Vector3<f32>, b: Vector3<f32>| (a - b).norm() < 2e-3;
     assert!(near(aim.position_m, here() + heading * target.position_m), "{aim:?}");
@@ -200,7 +200,7 @@ fn a_target_of_the_vehicles_frame_is_turned_and_fixed() {
 #[test]
 fn targets_above_or_upwards_lift() {
     let stage = Stage { airborne: false, ..Stage::at(here()) };
-    let lifts = |target: MotionTarget| aimed(&stage, &mut Targets::default(), target, 1).0.lifts;
+    let lifts = |target: MotionTarget| aimed(&stage, &mut OffboardMemory::default(), target, 1).0.lifts;
     let above = |up: f32| MotionTarget { position_m: Vector3::new(f32::NAN, f32::NAN, 8.0 + up), ..motion() };
     assert!(lifts(above(0.11)) && !lifts(above(0.09)) && !lifts(above(-5.0)));
     let climbs = |up: f32| MotionTarget { velocity_m_s: Vector3::new(0.0, 0.0, up), ..motion() };
@@ -231,7 +231,7 @@ proptest! {
         let target = AttitudeTarget { attitude, yaw_rate_rad_s: rate.unwrap_or(f32::NAN), thrust };
         let stamped = Stamped { value: OffboardTarget::Attitude(target), at_us: 1 };
         let stage = Stage::at(here());
-        let output = stage.see(|inputs| Targets::default().fly(&stamped, inputs, &LIFT));
+        let output = stage.see(|inputs| OffboardMemory::default().fly(&stamped, inputs, &LIFT));
         let Shaping::Direct(setpoint) = output.shaping else { panic!("{output:?}") };
         let expected = attitude * Vector3::z() * (25.0 * thrust) - Vector3::z() * 9.81;
         prop_assert!((setpoint.acceleration_m_s2 - expected).norm() < 1e-3, "{setpoint:?}, not {expected:?}");

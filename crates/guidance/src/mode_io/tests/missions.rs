@@ -2,8 +2,8 @@
 
 use super::*;
 
-fn leg(number: u16, item: Item) -> Leg {
-    Leg { number, upload: 1, item, is_last: false }
+fn leg(number: u16, item: Item) -> RequestedItem {
+    RequestedItem { number, upload: 1, item, is_last: false }
 }
 
 fn waypoint(position_m: Vector3<f32>) -> Item {
@@ -11,15 +11,15 @@ fn waypoint(position_m: Vector3<f32>) -> Item {
 }
 
 /// A fence of 1 km around home.
-const NET: Net = Net { fence_radius_m: 1e3, ..Net::DEFAULT };
+const NET: FailsafeSettings = FailsafeSettings { fence_radius_m: 1e3, ..FailsafeSettings::DEFAULT };
 
-fn progress(mission: &mut Mission, stage: &Stage, leg: &Leg) -> mission::Progress {
+fn progress(mission: &mut MissionMemory, stage: &Stage, leg: &RequestedItem) -> mission::MissionOutput {
     stage.see(|inputs| mission.fly(Some(leg), inputs, &NET))
 }
 
 /// Returns a mission that requests this item.
-fn wanting(number: u16) -> Mission {
-    let mut mission = Mission::default();
+fn wanting(number: u16) -> MissionMemory {
+    let mut mission = MissionMemory::default();
     mission.resume(number);
     mission
 }
@@ -54,7 +54,7 @@ fn waypoints_are_reached_within_their_distance() {
         assert_eq!((aim.position_m, aim.speed_m_s), (place, 4.0));
         // The last item ends the mission, and the first is requested again.
         let mut mission = wanting(3);
-        let last = Leg { is_last: true, ..leg(3, item(within_m, fly_through, 0.0)) };
+        let last = RequestedItem { is_last: true, ..leg(3, item(within_m, fly_through, 0.0)) };
         assert_eq!(progress(&mut mission, &stage, &last).output.done, reached, "{case:?}");
         assert_eq!(mission.wanted, if reached { 0 } else { 3 }, "{case:?}");
     }
@@ -172,15 +172,15 @@ fn a_speed_counts_until_the_mission_is_another() {
     let step = progress(&mut mission, &stands, &leg(0, Item::Speed(2.5)));
     assert_eq!((step.reached, mission.wanted, limited(&step.output).position_m), (Some(0), 1, here()));
     let far = waypoint(here() + along(0, 50.0));
-    let speed = |mission: &mut Mission, ordered: f32, leg: &Leg| {
+    let speed = |mission: &mut MissionMemory, ordered: f32, leg: &RequestedItem| {
         limited(&progress(mission, &Stage { speed_m_s: ordered, ..stands }, leg).output).speed_m_s
     };
     assert_eq!(speed(&mut mission, f32::INFINITY, &leg(1, far)), 2.5);
     assert_eq!(speed(&mut mission, 2.0, &leg(1, far)), 2.0);
-    let other = Leg { upload: 2, ..leg(1, far) };
+    let other = RequestedItem { upload: 2, ..leg(1, far) };
     let waits = progress(&mut mission, &stands, &other);
     assert_eq!((mission.wanted, waits.reached, waits.output.done), (0, None, false), "not the item that is wanted");
-    assert_eq!(speed(&mut mission, f32::INFINITY, &Leg { upload: 2, ..leg(0, far) }), 4.0);
+    assert_eq!(speed(&mut mission, f32::INFINITY, &RequestedItem { upload: 2, ..leg(0, far) }), 4.0);
 }
 
 /// Without the requested item the vehicle holds its place. Without a mission, the mode is done.
@@ -190,7 +190,7 @@ fn without_its_item_a_mission_waits_or_is_over() {
     let waits = progress(&mut mission, &Stage::at(here()), &leg(3, waypoint(Vector3::zeros())));
     assert_eq!((waits.output.done, waits.reached, waits.refused, waits.then), (false, None, false, None));
     assert_eq!(limited(&waits.output).position_m, here());
-    let over = Stage::at(here()).see(|inputs| mission.fly(None, inputs, &Net::DEFAULT));
+    let over = Stage::at(here()).see(|inputs| mission.fly(None, inputs, &FailsafeSettings::DEFAULT));
     assert!(over.output.done && over.reached.is_none());
 }
 
@@ -240,12 +240,12 @@ fn items_that_cannot_be_flown_are_refused() {
     // Without a fence, places are limited by the range of setpoints only.
     for (y_m, flown) in [(8.9e4, Ok(())), (9.1e4, Err(OrderRefusal::OutOfRange))] {
         let far = waypoint(v(1.0, y_m, 3.0), 0.0, 0.0, 0.0);
-        assert_eq!(far.check(&Net::DEFAULT, Some(&here())), flown);
+        assert_eq!(far.check(&FailsafeSettings::DEFAULT, Some(&here())), flown);
         assert_eq!(far.check(&NET, Some(&here())), flown.and(Err(OrderRefusal::OutsideFence)));
         assert_eq!(far.check(&NET, None), flown, "nobody knows where the cylinder is");
     }
     // A take-off is over home: only its height can be outside.
-    let low = Net { fence_height_m: 4.0, ..NET };
+    let low = FailsafeSettings { fence_height_m: 4.0, ..NET };
     for (height_m, refused) in [(4.4, false), (4.6, true)] {
         let take_off = Item::TakeOff { height_m };
         assert_eq!(take_off.check(&low, Some(&v(2e3, 0.0, 0.5))).is_err(), refused, "{height_m}");

@@ -7,28 +7,34 @@ mod directed;
 mod missions;
 
 use super::*;
+use crate::available_thrust::AvailableThrust;
 use crate::course::{Hold, Land, Return, Takeoff};
-use crate::lift::Lift;
-use crate::mission::Mission;
+use crate::failsafe::FailsafeSettings;
+use crate::mission::MissionMemory;
 use crate::mode::FlightMode;
-use crate::net::Net;
-use crate::order::{AttitudeTarget, Item, Leg, MotionTarget, OffboardTarget, OrderRefusal, Sticks};
-use crate::targets::{self, Targets};
+use crate::offboard::{self, OffboardMemory};
+use crate::order::{AttitudeTarget, Item, MotionTarget, OffboardTarget, OrderRefusal, RequestedItem, Sticks};
 use crate::{mission, sticks};
 use afbc_flight_core::Stamped;
 use nalgebra::{Rotation3, UnitQuaternion};
 use proptest::prelude::*;
 
 const NAN: Vector3<f32> = Vector3::new(f32::NAN, f32::NAN, f32::NAN);
-const LIFT: Lift = Lift { most_m_s2: 25.0, gravity_m_s2: 9.81, given_m_s2: None };
+const LIFT: AvailableThrust = AvailableThrust { most_m_s2: 25.0, gravity_m_s2: 9.81, given_m_s2: None };
 
 /// Limits and speeds that all differ from one another.
-fn limits() -> Limits {
-    Limits { speed_m_s: 9.0, up_m_s: 3.0, down_m_s: 2.0, yaw_rate_rad_s: 1.5, ..Limits::DEFAULT }
+fn limits() -> MotionLimits {
+    MotionLimits { speed_m_s: 9.0, up_m_s: 3.0, down_m_s: 2.0, yaw_rate_rad_s: 1.5, ..MotionLimits::DEFAULT }
 }
 
-fn flying() -> Flying {
-    Flying { cruise_m_s: 4.0, takeoff_m_s: 1.2, stick_tilt_rad: 0.6, within_m: 0.7, ..Flying::DEFAULT }
+fn flying() -> FlightModeSettings {
+    FlightModeSettings {
+        cruise_m_s: 4.0,
+        takeoff_m_s: 1.2,
+        stick_tilt_rad: 0.6,
+        within_m: 0.7,
+        ..FlightModeSettings::DEFAULT
+    }
 }
 
 /// Inputs of a mode: a vehicle and its setpoint in the air.
@@ -110,7 +116,7 @@ fn the_usual_speed_is_the_cruise_or_what_was_ordered() {
 /// between.
 #[test]
 fn it_descends_the_slower_the_lower() {
-    let Flying { land_m_s, land_slow_m, .. } = flying();
+    let FlightModeSettings { land_m_s, land_slow_m, .. } = flying();
     let sinks = |above_m: f32| {
         let place = Vector3::new(10.0, -5.0, 0.5 + above_m);
         let aim = Stage::at(place).see(|inputs| inputs.down(Vector3::new(3.0, 4.0, 99.0)));

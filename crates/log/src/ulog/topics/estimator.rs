@@ -2,11 +2,11 @@
 
 use crate::ulog::layout::message;
 use crate::ulog::moment::{Moment, flip, flip_turn};
-use afbc_estimator::{Aid, Estimate, Measurement};
+use afbc_estimator::{AidSource, Estimate, Measurement};
 
 const NUMBERS: usize = Measurement::NUMBERS;
 /// Number of kinds of aiding measurements.
-const AIDS: usize = Aid::ALL.len();
+const AIDS: usize = AidSource::ALL.len();
 /// Number of the estimator's states, and the sizes of the state and variance arrays in PX4's message.
 const STATES: usize = 16;
 const PX4_STATES: usize = 24;
@@ -116,7 +116,7 @@ impl EstimatorFigures {
     /// Returns none without an inertial sensor.
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
         let (estimate, aids) = (moment.details.estimate?, &moment.details.aids);
-        let records = Aid::ALL.map(|aid| *aids.of(aid));
+        let records = AidSource::ALL.map(|aid| *aids.of(aid));
         Some(EstimatorFigures {
             timestamp: moment.now_us(),
             nis: records.map(|record| record.nis),

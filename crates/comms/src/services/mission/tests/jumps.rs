@@ -55,10 +55,10 @@ fn jumps_without_an_end_are_refused() {
     ];
     for (items, number, reason) in cases {
         let mut missions = Missions::default();
-        missions.hear(Mission::Count(items.len() as u16, PLAN), A, true, 0, &NOWHERE);
+        missions.hear(MissionMessage::Count(items.len() as u16, PLAN), A, true, 0, &NOWHERE);
         let take = |item: &MissionItem| {
             said(&mut missions);
-            missions.hear(Mission::Item(*item, PLAN), A, true, 0, &NOWHERE)
+            missions.hear(MissionMessage::Item(*item, PLAN), A, true, 0, &NOWHERE)
         };
         let heard = items.iter().map(take).last();
         let text = Words::of("mission item ").number((*number).into()).and(": ").and(reason);
@@ -72,6 +72,10 @@ fn jumps_without_an_end_are_refused() {
         &[jump(0, 2, 1.0), waypoint(1), jump(2, 0, -1.0)],
     ] {
         let mut missions = Missions::default();
-        assert_eq!(upload(&mut missions, items), [(Mission::Ack(MissionResult::ACCEPTED, PLAN), A)], "{items:?}");
+        assert_eq!(
+            upload(&mut missions, items),
+            [(MissionMessage::Ack(MissionResult::ACCEPTED, PLAN), A)],
+            "{items:?}"
+        );
     }
 }

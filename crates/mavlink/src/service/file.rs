@@ -1,8 +1,8 @@
 //! Requests of FILE_TRANSFER_PROTOCOL (MAVLink FTP) and their refusal.
 
 use crate::address::Address;
-use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
-use crate::wire::{Layout, Unused};
+use crate::message::{FrameFault, MessageFormat, PAYLOAD_MAX};
+use crate::wire::{MessageLayout, Unused};
 use mavlink::MessageData;
 use mavlink::dialects::common::FILE_TRANSFER_PROTOCOL_DATA;
 
@@ -62,7 +62,8 @@ pub(super) const ID: u32 = FILE_TRANSFER_PROTOCOL_DATA::ID;
 
 /// Fields: network, receiver, sequence number; session, opcode, data size, requested opcode, "burst complete", padding;
 /// offset; data.
-const FILE: Layout<FILE_TRANSFER_PROTOCOL_DATA, (u8, Address, u16, [u8; 6], u32, u8, Unused<238>)> = Layout::NEW;
+const FILE: MessageLayout<FILE_TRANSFER_PROTOCOL_DATA, (u8, Address, u16, [u8; 6], u32, u8, Unused<238>)> =
+    MessageLayout::NEW;
 
 pub(super) fn format() -> MessageFormat {
     FILE.format()
@@ -70,10 +71,10 @@ pub(super) fn format() -> MessageFormat {
 
 impl FileOperation {
     /// Reads a request. Responses are refused, since they are not to be answered.
-    pub(super) fn read(payload: &[u8]) -> Result<(Self, Address), Fault> {
+    pub(super) fn read(payload: &[u8]) -> Result<(Self, Address), FrameFault> {
         let (_, to, sequence, [session, operation, ..], offset, ..) = FILE.read(payload);
         if operation >= Self::ANSWERS {
-            return Err(Fault::Unsupported);
+            return Err(FrameFault::Unsupported);
         }
         Ok((FileOperation { sequence, session, operation, offset }, to))
     }
@@ -86,10 +87,10 @@ impl FileOperation {
 }
 
 impl FileRefusal {
-    pub(super) fn read(payload: &[u8]) -> Result<(Self, Address), Fault> {
+    pub(super) fn read(payload: &[u8]) -> Result<(Self, Address), FrameFault> {
         let (_, to, sequence, [session, kind, _, operation, ..], offset, error, _) = FILE.read(payload);
         if kind != NAK {
-            return Err(Fault::Unsupported);
+            return Err(FrameFault::Unsupported);
         }
         Ok((FileRefusal { sequence, session, operation, offset, error: FtpError(error) }, to))
     }

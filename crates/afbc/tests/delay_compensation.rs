@@ -1,6 +1,6 @@
 //! The shift of predictable inputs compensates the lag that the filters leave, tested through the filters themselves.
 
-use afbc::ahead::Ahead;
+use afbc::delay_compensation::DelayCompensation;
 use afbc_control::{Smoother, Smoothing};
 use afbc_types::Inputs;
 use nalgebra::{Vector2, Vector3};
@@ -14,9 +14,9 @@ const FILTERS: Smoothing =
 /// the lead leaves.
 #[test]
 fn a_ramp_arrives_in_time() {
-    let ahead = Ahead::new(LAG_S, &FILTERS, 50.0, DT_S);
+    let ahead = DelayCompensation::new(LAG_S, &FILTERS, 50.0, DT_S);
     let smoother = Smoother::new(&FILTERS, DT_S).unwrap();
-    let arrives = |ahead: Option<&Ahead>| {
+    let arrives = |ahead: Option<&DelayCompensation>| {
         let (mut late, mut smoothed, mut rotors) = (None, None, Inputs::default());
         let slope = 20.0;
         let mut off = Vector3::zeros();
@@ -51,13 +51,13 @@ fn a_ramp_arrives_in_time() {
 /// A lead larger than the lag is not reversed. Without filters the whole rotor lag is left.
 #[test]
 fn lags_are_not_negative() {
-    let led = Ahead::new(0.01, &Smoothing { lead_s: 0.3, ..FILTERS }, 50.0, DT_S);
+    let led = DelayCompensation::new(0.01, &Smoothing { lead_s: 0.3, ..FILTERS }, 50.0, DT_S);
     assert_eq!(led.thrust_s, 0.0);
     let mut late = None;
     led.advance(&mut late, &Vector2::zeros());
     let more = led.advance(&mut late, &Vector2::repeat(1.0));
     assert_eq!(more, Vector2::zeros());
-    let bare = Ahead::new(LAG_S, &Smoothing { smooth_lift_rad_s: 0.0, ..FILTERS }, 50.0, DT_S);
+    let bare = DelayCompensation::new(LAG_S, &Smoothing { smooth_lift_rad_s: 0.0, ..FILTERS }, 50.0, DT_S);
     assert_eq!(bare.thrust_s, LAG_S);
 }
 
@@ -65,6 +65,6 @@ fn lags_are_not_negative() {
 #[test]
 fn the_first_is_no_change() {
     let mut late = None;
-    let more = Ahead::new(LAG_S, &FILTERS, 50.0, DT_S).advance(&mut late, &Vector2::repeat(7.0));
+    let more = DelayCompensation::new(LAG_S, &FILTERS, 50.0, DT_S).advance(&mut late, &Vector2::repeat(7.0));
     assert_eq!(more, Vector2::zeros());
 }

@@ -10,8 +10,8 @@ fn vector(most: f32) -> impl Strategy<Value = Vector3<f32>> {
     (-most..most, -most..most, -most..most).prop_map(|(x, y, z)| Vector3::new(x, y, z))
 }
 
-fn lift(most: f32) -> Lift {
-    Lift { most_m_s2: most, gravity_m_s2: G, given_m_s2: None }
+fn lift(most: f32) -> AvailableThrust {
+    AvailableThrust { most_m_s2: most, gravity_m_s2: G, given_m_s2: None }
 }
 
 proptest! {
@@ -55,7 +55,7 @@ proptest! {
         acceleration in vector(15.0), climb in -6.0..6.0f32, up in 0.5..4.0f32, down in 0.5..4.0f32,
         most in 1.0..30.0f32,
     ) {
-        let limits = Limits { up_m_s: up, down_m_s: down, ..Limits::DEFAULT };
+        let limits = MotionLimits { up_m_s: up, down_m_s: down, ..MotionLimits::DEFAULT };
         let state = State { velocity_m_s: Vector3::new(1.0, 2.0, climb), ..State::default() };
         let setpoint = Setpoint { acceleration_m_s2: acceleration, yaw_rad: 0.4, ..Setpoint::default() };
         let found = lift(most).limited(&setpoint, &state, &limits);
@@ -81,14 +81,14 @@ proptest! {
         ),
         dt_s in prop_oneof![Just(1e-3f32), 0.005..0.09f32, Just(0.2f32)],
     ) {
-        let mut trim = Trim::default();
+        let mut trim = AccelerationTrim::default();
         let (mut expected, mut sideways, mut upwards) = (None, nalgebra::Vector2::<f64>::zeros(), 0.0_f64);
         let (dt, mut errors) = (f64::from(dt_s), 0.0);
         for (acceleration_m_s2, roll, pitch, yaw, given_m_s2) in steps {
             let attitude_rad = Vector3::new(roll, pitch, yaw);
             let state = State { attitude_rad, ..State::default() };
             let setpoint = Setpoint { acceleration_m_s2, yaw_rad: 0.4, ..Setpoint::default() };
-            let found = trim.advance(&Lift { given_m_s2, ..lift(20.0) }, &state, &setpoint, dt_s);
+            let found = trim.advance(&AvailableThrust { given_m_s2, ..lift(20.0) }, &state, &setpoint, dt_s);
 
             let thrust = acceleration_m_s2.map(f64::from) + Vector3::z() * f64::from(G);
             let vertical = thrust.z.max(0.2 * f64::from(G));
@@ -115,6 +115,6 @@ proptest! {
 
 #[test]
 fn rotors_are_exhausted_near_their_most() {
-    let gives = |given_m_s2| Lift { given_m_s2, ..lift(20.0) }.is_exhausted();
+    let gives = |given_m_s2| AvailableThrust { given_m_s2, ..lift(20.0) }.is_exhausted();
     assert!(gives(Some(18.1)) && !gives(Some(17.9)) && !gives(Some(0.0)) && !gives(None));
 }

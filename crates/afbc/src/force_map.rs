@@ -12,7 +12,7 @@
 //! manipulators*, Automatica 25(4), 1989; used so by O'Connell et al., *Neural-Fly*, Science Robotics 7(66), 2022. The
 //! part that learns from e_2 stays in the fuzzy systems over the errors; here the observer would undo it.
 
-use crate::fuzzy::{Basis, Firing, Membership};
+use crate::fuzzy::{FiringStrengths, FuzzyBasis, Membership};
 use afbc_control::math;
 use afbc_types::OutOfRange;
 use nalgebra::Matrix3;
@@ -22,42 +22,42 @@ pub const THETA_MAX_M_S2: f32 = 10.0;
 /// Width of the Gaussians divided by their distance.
 const WIDTH: f32 = 0.6;
 
-/// Memory with its constants. The learnt parameters are in [`Remembered`].
+/// Memory with its constants. The learnt parameters are in [`ForceMapWeights`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Memory {
-    basis: Basis,
+pub struct ForceMap {
+    basis: FuzzyBasis,
     /// gamma times the time step.
     share: f32,
 }
 
 /// Learnt parameters Theta of x and y \[m/s2\].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Remembered {
+pub struct ForceMapWeights {
     /// Theta.
     pub theta: [Matrix3<f32>; 2],
 }
 
-impl Memory {
+impl ForceMap {
     /// Creates the memory with the rate `gamma_1_s` (valid), the step `dt_s` and outer rules at `speed_m_s` along each
     /// axis. `None` if gamma is 0.
     ///
     /// # Errors
     /// Returns an error if the speed is out of range.
     pub fn new(gamma_1_s: f32, speed_m_s: f32, dt_s: f32) -> Result<Option<Self>, OutOfRange> {
-        let basis = Basis::new(Membership { centre: speed_m_s, width: WIDTH * speed_m_s })?;
-        Ok((gamma_1_s > 0.0).then_some(Memory { basis, share: gamma_1_s * dt_s }))
+        let basis = FuzzyBasis::new(Membership { centre: speed_m_s, width: WIDTH * speed_m_s })?;
+        Ok((gamma_1_s > 0.0).then_some(ForceMap { basis, share: gamma_1_s * dt_s }))
     }
 
     /// Returns the weights of the rules at a velocity \[m/s\].
     #[inline]
     pub fn weights(&self, velocity_m_s: [f32; 2]) -> Matrix3<f32> {
-        let Firing { first, second, share } = self.basis.fire(velocity_m_s);
+        let FiringStrengths { first, second, share } = self.basis.fire(velocity_m_s);
         first * (second * share).transpose()
     }
 
     /// Learns f_hat \[m/s2\] at these weights.
     #[inline]
-    pub fn learn(&self, remembered: &mut Remembered, weights: &Matrix3<f32>, f_hat_m_s2: [f32; 2]) {
+    pub fn learn(&self, remembered: &mut ForceMapWeights, weights: &Matrix3<f32>, f_hat_m_s2: [f32; 2]) {
         for (theta, f_hat) in remembered.theta.iter_mut().zip(f_hat_m_s2) {
             *theta = (*theta + weights * (self.share * f_hat)).map(math::settled);
             // If the norm is within the bound, so is every element: one comparison is enough.
@@ -69,7 +69,7 @@ impl Memory {
     }
 }
 
-impl Remembered {
+impl ForceMapWeights {
     /// Returns Theta' w of x and y \[m/s2\].
     #[inline]
     pub fn recall(&self, weights: &Matrix3<f32>) -> [f32; 2] {

@@ -22,16 +22,16 @@ pub struct Height {
 
 /// A position on the earth. Coordinates that are not given mean "unchanged".
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
-    /// Latitude \[1e-7 deg\]; [`Place::AS_IT_IS`] if not given.
+pub struct GlobalPosition {
+    /// Latitude \[1e-7 deg\]; [`GlobalPositionInt::AS_IT_IS`] if not given.
     pub latitude_e7: i32,
-    /// Longitude \[1e-7 deg\]; [`Place::AS_IT_IS`] if not given.
+    /// Longitude \[1e-7 deg\]; [`GlobalPositionInt::AS_IT_IS`] if not given.
     pub longitude_e7: i32,
     /// Height.
     pub height: Height,
 }
 
-impl Place {
+impl GlobalPosition {
     /// Value of a coordinate that is not given.
     pub const AS_IT_IS: i32 = i32::MAX;
 
@@ -65,5 +65,5 @@ pub(crate) const fn frame(datum: Datum) -> u8 {
 /// Converts degrees to units of 1e-7 degrees. NaN becomes "not given"; other invalid angles stay invalid.
 pub(crate) fn e7(degrees: f32) -> i32 {
     // Clamped to beyond any angle, but below the value for "not given".
-    if degrees.is_nan() { Place::AS_IT_IS } else { (f64::from(degrees) * 1e7).clamp(-2e9, 2e9) as i32 }
+    if degrees.is_nan() { GlobalPosition::AS_IT_IS } else { (f64::from(degrees) * 1e7).clamp(-2e9, 2e9) as i32 }
 }

@@ -17,9 +17,9 @@ use afbc_control::command_filter::{CommandFilter, Filtered};
 use afbc_types::{OutOfRange, Setpoint};
 use nalgebra::Vector3;
 
-/// The filter. Everything that changes in flight is in [`Followed`].
+/// The filter. Everything that changes in flight is in [`JumpMemory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Forward {
+pub struct JumpFilter {
     filter: CommandFilter,
     dt_s: f32,
     inverse_dt_1_s: f32,
@@ -27,34 +27,34 @@ pub struct Forward {
 
 /// Memory of the absorbed jumps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Followed {
+pub struct JumpMemory {
     /// d and dd/dt of x and y \[m/s2, m/s3\].
-    late: [Filtered; 2],
+    offsets: [Filtered; 2],
     /// Jerk expected of the next setpoint \[m/s3\].
     expected: [f32; 2],
 }
 
-impl Forward {
+impl JumpFilter {
     /// Creates the filter with this bandwidth \[rad/s\], advanced every `dt_s` seconds.
     ///
     /// # Errors
     /// Returns an error if the bandwidth is out of range.
     pub fn new(bandwidth_rad_s: f32, dt_s: f32) -> Result<Self, OutOfRange> {
         let filter = CommandFilter::new(bandwidth_rad_s, dt_s)?;
-        Ok(Forward { filter, dt_s, inverse_dt_1_s: 1.0 / dt_s })
+        Ok(JumpFilter { filter, dt_s, inverse_dt_1_s: 1.0 / dt_s })
     }
 
     /// Returns the jerk and snap to follow \[m/s3, m/s4\], unchanged along z, and advances the filter by one step. The
     /// first step sees no jump.
     #[inline(always)]
-    pub fn advance(&self, followed: &mut Option<Followed>, setpoint: &Setpoint) -> [Vector3<f32>; 2] {
+    pub fn advance(&self, followed: &mut Option<JumpMemory>, setpoint: &Setpoint) -> [Vector3<f32>; 2] {
         let (mut jerk, mut snap) = (setpoint.jerk_m_s3, setpoint.snap_m_s4);
-        let Followed { late: [x, y], expected: [expected_x, expected_y] } =
-            followed.unwrap_or(Followed { expected: [jerk.x, jerk.y], ..Followed::default() });
+        let JumpMemory { offsets: [x, y], expected: [expected_x, expected_y] } =
+            followed.unwrap_or(JumpMemory { expected: [jerk.x, jerk.y], ..JumpMemory::default() });
         let next = [jerk.x + self.dt_s * snap.x, jerk.y + self.dt_s * snap.y];
         let x = self.along(&x, expected_x, [&mut jerk.x, &mut snap.x]);
         let y = self.along(&y, expected_y, [&mut jerk.y, &mut snap.y]);
-        *followed = Some(Followed { late: [x, y], expected: next });
+        *followed = Some(JumpMemory { offsets: [x, y], expected: next });
         [jerk, snap]
     }
 

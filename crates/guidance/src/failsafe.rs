@@ -1,13 +1,13 @@
-//! The safety net: detects the causes of failsafes and selects the action.
+//! The failsafe checks: they detect the causes of failsafes and select the action.
 //!
 //! The strongest action of all present causes is taken. Among causes with the same action, the first in the order of
-//! [`Cause::ALL`] is reported.
+//! [`FailsafeCause::ALL`] is reported.
 
 use crate::actions::{BatteryAction, FenceAction, SensorsAction, StationAction, SticksAction, TargetsAction};
-use crate::battery::{BatteryReading, Cells};
-use crate::fence::FenceView;
+use crate::battery::{BatteryCells, BatteryReading};
+use crate::fence::FenceStatus;
 use crate::mode::FlightMode;
-use crate::notice::{Cause, Notice, Notices};
+use crate::notice::{FailsafeCause, GuidanceNotice, GuidanceNotices};
 use crate::table::FailsafeAction;
 use afbc_types::{Range, parameters};
 use nalgebra::Vector3;
@@ -16,10 +16,10 @@ use nalgebra::Vector3;
 const FENCE_MARGIN_M: f32 = 1.0;
 
 parameters! {
-    /// Parameters of the safety net.
+    /// Parameters of the failsafes.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-    pub struct Net {
+    pub struct FailsafeSettings {
         /// Largest horizontal distance from home; 0 for none.
         #[parameter(GF_MAX_HOR_DIST, "m", 0.0..=10000.0)]
         pub fence_radius_m: f32 = 0.0,
@@ -75,12 +75,12 @@ parameters! {
         #[choice(COM_LOW_BAT_ACT)]
         pub battery_action: BatteryAction = BatteryAction::ReturnThenLand,
     }
-    together(net) {
+    together(failsafe) {
         let most = |range: Range, most: f32| Range { max: most.into(), ..range };
         // The range of the voltage is a divisor and must not be zero.
-        most(Net::BAT1_V_EMPTY.range, net.full_v - 0.05).check(net.empty_v)?;
-        most(Net::BAT_CRIT_THR.range, net.low).check(net.critical)?;
-        most(Net::BAT_EMERGEN_THR.range, net.critical).check(net.emergency)
+        most(FailsafeSettings::BAT1_V_EMPTY.range, failsafe.full_v - 0.05).check(failsafe.empty_v)?;
+        most(FailsafeSettings::BAT_CRIT_THR.range, failsafe.low).check(failsafe.critical)?;
+        most(FailsafeSettings::BAT_EMERGEN_THR.range, failsafe.critical).check(failsafe.emergency)
     }
 }
 
@@ -106,9 +106,9 @@ impl FailedSensors {
     }
 }
 
-/// Inputs of the safety net in a tick.
+/// Inputs of the failsafe checks in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Findings<'a> {
+pub(crate) struct FailsafeInputs<'a> {
     pub(crate) mode: FlightMode,
     pub(crate) armed: bool,
     pub(crate) descends: bool,
@@ -121,47 +121,47 @@ pub(crate) struct Findings<'a> {
     pub(crate) targets: bool,
     pub(crate) sticks: bool,
     /// State of the uploaded geofence.
-    pub(crate) fence: FenceView,
+    pub(crate) fence: FenceStatus,
     pub(crate) dt_s: f32,
 }
 
-/// Memory of the safety net between ticks.
+/// Memory of the failsafe checks between ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Watch {
+pub(crate) struct FailsafeMemory {
     charge: Option<f32>,
     /// Number of cells found from the voltage; 0 without a battery.
     cells: u8,
     /// Causes present, one bit each.
-    holds: u16,
+    present: u16,
 }
 
-fn bit(cause: Cause) -> u16 {
+fn bit(cause: FailsafeCause) -> u16 {
     1 << cause as u16
 }
 
-impl Watch {
+impl FailsafeMemory {
     /// Returns the filtered charge of the battery, 0 to 1.
     pub(crate) fn charge(&self) -> Option<f32> {
         self.charge
     }
 
     /// True if the battery is monitored.
-    pub(crate) fn is_watched(&self, net: &Net) -> bool {
-        net.cells > 0 || self.charge.is_some()
+    pub(crate) fn is_watched(&self, failsafe: &FailsafeSettings) -> bool {
+        failsafe.cells > 0 || self.charge.is_some()
     }
 
     /// True if the cause is present.
-    pub(crate) fn holds(&self, cause: Cause) -> bool {
-        self.holds & bit(cause) != 0
+    pub(crate) fn is_present(&self, cause: FailsafeCause) -> bool {
+        self.present & bit(cause) != 0
     }
 
     /// Runs all checks. Returns the strongest action, its cause, and the set of new causes.
-    pub(crate) fn look(
+    pub(crate) fn update(
         &mut self,
-        net: &Net,
-        seen: &Findings<'_>,
-        notices: &mut Notices,
-    ) -> (FailsafeAction, Cause, u16) {
+        failsafe: &FailsafeSettings,
+        seen: &FailsafeInputs<'_>,
+        notices: &mut GuidanceNotices,
+    ) -> (FailsafeAction, FailsafeCause, u16) {
         if !seen.armed {
             // The count never falls while a battery is connected: an empty battery of six cells must not count as a
             // full one of five.
@@ -173,90 +173,107 @@ impl Watch {
         }
         // A configured number of cells has precedence, then the monitor's charge, then the number found.
         let number = match seen.battery {
-            _ if net.cells > 0 => net.cells,
+            _ if failsafe.cells > 0 => failsafe.cells,
             Some(BatteryReading { charge: Some(_), .. }) => 0,
             _ => self.cells.into(),
         };
-        let cells = Cells { number, empty_v: net.empty_v, full_v: net.full_v, resistance_ohm: net.resistance_ohm };
+        let cells = BatteryCells {
+            number,
+            empty_v: failsafe.empty_v,
+            full_v: failsafe.full_v,
+            resistance_ohm: failsafe.resistance_ohm,
+        };
         cells.update(&mut self.charge, seen.battery, seen.dt_s);
-        let before = self.holds;
-        self.holds = 0;
-        let mut note = |cause: Cause, holds: bool| self.holds |= if holds { bit(cause) } else { 0 };
-        note(Cause::Descent, seen.armed && seen.descends);
+        let before = self.present;
+        self.present = 0;
+        let mut note = |cause: FailsafeCause, holds: bool| self.present |= if holds { bit(cause) } else { 0 };
+        note(FailsafeCause::Descent, seen.armed && seen.descends);
         // A low battery stays low in flight, even if its voltage recovers.
         let below = |threshold: f32| self.charge.is_some_and(|charge| charge < threshold);
-        let was = |cause: Cause| seen.armed && before & bit(cause) != 0;
-        note(Cause::BatteryEmergency, below(net.emergency) || was(Cause::BatteryEmergency));
-        note(Cause::BatteryCritical, below(net.critical) || was(Cause::BatteryCritical));
-        note(Cause::BatteryLow, below(net.low) || was(Cause::BatteryLow));
-        let FenceView { leaves, outside } = seen.fence;
-        note(Cause::Fence, seen.armed && (leaves || outside || net.is_outside(seen, was(Cause::Fence))));
-        note(Cause::Sensors, seen.sensors.any());
-        let lost = |silent_us: u32| silent_us as f32 * 1e-6 > net.station_lost_s;
-        note(Cause::Station, seen.armed && seen.silent_us.is_some_and(lost));
-        note(Cause::Targets, seen.armed && seen.mode == FlightMode::Offboard && !seen.targets);
-        note(Cause::Sticks, seen.armed && seen.mode.is_manual() && !seen.sticks);
-        let new = self.holds & !before;
-        let over = before & !self.holds;
+        let was = |cause: FailsafeCause| seen.armed && before & bit(cause) != 0;
+        note(FailsafeCause::BatteryEmergency, below(failsafe.emergency) || was(FailsafeCause::BatteryEmergency));
+        note(FailsafeCause::BatteryCritical, below(failsafe.critical) || was(FailsafeCause::BatteryCritical));
+        note(FailsafeCause::BatteryLow, below(failsafe.low) || was(FailsafeCause::BatteryLow));
+        let FenceStatus { leaves, outside } = seen.fence;
+        note(
+            FailsafeCause::Fence,
+            seen.armed && (leaves || outside || failsafe.is_outside(seen, was(FailsafeCause::Fence))),
+        );
+        note(FailsafeCause::Sensors, seen.sensors.any());
+        let lost = |silent_us: u32| silent_us as f32 * 1e-6 > failsafe.station_lost_s;
+        note(FailsafeCause::Station, seen.armed && seen.silent_us.is_some_and(lost));
+        note(FailsafeCause::Targets, seen.armed && seen.mode == FlightMode::Offboard && !seen.targets);
+        note(FailsafeCause::Sticks, seen.armed && seen.mode.is_manual() && !seen.sticks);
+        let new = self.present & !before;
+        let over = before & !self.present;
         if over != 0 && seen.armed {
             // Low batteries do not recover. Targets and sticks are not checked once the mode has changed.
-            for cause in [Cause::Descent, Cause::Fence, Cause::Sensors, Cause::Station] {
+            for cause in [FailsafeCause::Descent, FailsafeCause::Fence, FailsafeCause::Sensors, FailsafeCause::Station]
+            {
                 if over & bit(cause) != 0 {
-                    notices.push(Notice::Over(cause));
+                    notices.push(GuidanceNotice::Over(cause));
                 }
             }
         }
-        if self.holds == 0 {
-            return (FailsafeAction::None, Cause::Descent, 0);
+        if self.present == 0 {
+            return (FailsafeAction::None, FailsafeCause::Descent, 0);
         }
-        let (action, cause) = self.strongest(net, seen.position_m.is_some());
+        let (action, cause) = self.strongest(failsafe, seen.position_m.is_some());
         (if seen.armed { action } else { FailsafeAction::None }, cause, new)
     }
 
     /// Returns the strongest action with its cause. `positioned`: the position is known, so a descent of the flight
     /// core demands nothing, and orders count.
-    fn strongest(&self, net: &Net, positioned: bool) -> (FailsafeAction, Cause) {
-        let counts = |cause: &Cause| self.holds(*cause) && !(positioned && *cause == Cause::Descent);
-        let found = Cause::ALL.into_iter().filter(counts);
-        found.fold((FailsafeAction::None, Cause::Descent), |(strongest, of), cause| {
-            let action = net.action(cause);
+    fn strongest(&self, failsafe: &FailsafeSettings, positioned: bool) -> (FailsafeAction, FailsafeCause) {
+        let counts =
+            |cause: &FailsafeCause| self.is_present(*cause) && !(positioned && *cause == FailsafeCause::Descent);
+        let found = FailsafeCause::ALL.into_iter().filter(counts);
+        found.fold((FailsafeAction::None, FailsafeCause::Descent), |(strongest, of), cause| {
+            let action = failsafe.action(cause);
             if action > strongest { (action, cause) } else { (strongest, of) }
         })
     }
 }
 
 /// True if `cause` is in the set `new`.
-pub(crate) fn is_new(new: u16, cause: Cause) -> bool {
+pub(crate) fn is_new(new: u16, cause: FailsafeCause) -> bool {
     new & bit(cause) != 0
 }
 
 /// Announces the causes in the set `new` that have an action, except `but`.
-pub(crate) fn announce(net: &Net, new: u16, but: Option<Cause>, notices: &mut Notices) {
-    for cause in Cause::ALL {
-        if new & bit(cause) != 0 && Some(cause) != but && net.action(cause) > FailsafeAction::None {
-            notices.push(Notice::Found(cause));
+pub(crate) fn announce(
+    failsafe: &FailsafeSettings,
+    new: u16,
+    but: Option<FailsafeCause>,
+    notices: &mut GuidanceNotices,
+) {
+    for cause in FailsafeCause::ALL {
+        if new & bit(cause) != 0 && Some(cause) != but && failsafe.action(cause) > FailsafeAction::None {
+            notices.push(GuidanceNotice::Found(cause));
         }
     }
 }
 
-impl Net {
+impl FailsafeSettings {
     /// Returns the action configured for a cause.
-    pub fn action(&self, cause: Cause) -> FailsafeAction {
+    pub fn action(&self, cause: FailsafeCause) -> FailsafeAction {
         match cause {
-            Cause::Descent => FailsafeAction::Land,
-            Cause::BatteryLow => FailsafeAction::Warn,
-            Cause::BatteryEmergency if self.battery_action == BatteryAction::ReturnThenLand => FailsafeAction::Land,
-            Cause::BatteryCritical | Cause::BatteryEmergency => self.battery_action.action(),
-            Cause::Fence => self.fence_action.action(),
-            Cause::Sensors => self.sensors_action.action(),
-            Cause::Station => self.station_action.action(),
-            Cause::Targets => self.targets_action.action(),
-            Cause::Sticks => self.sticks_action.action(),
+            FailsafeCause::Descent => FailsafeAction::Land,
+            FailsafeCause::BatteryLow => FailsafeAction::Warn,
+            FailsafeCause::BatteryEmergency if self.battery_action == BatteryAction::ReturnThenLand => {
+                FailsafeAction::Land
+            }
+            FailsafeCause::BatteryCritical | FailsafeCause::BatteryEmergency => self.battery_action.action(),
+            FailsafeCause::Fence => self.fence_action.action(),
+            FailsafeCause::Sensors => self.sensors_action.action(),
+            FailsafeCause::Station => self.station_action.action(),
+            FailsafeCause::Targets => self.targets_action.action(),
+            FailsafeCause::Sticks => self.sticks_action.action(),
         }
     }
 
     /// True if the vehicle is outside the geofence. If it `was`, it must come back inside by a margin.
-    fn is_outside(&self, seen: &Findings<'_>, was: bool) -> bool {
+    fn is_outside(&self, seen: &FailsafeInputs<'_>, was: bool) -> bool {
         // Without a position, keep the last result.
         let (Some(position_m), Some(home_m)) = (seen.position_m, seen.home_m) else { return was };
         let margin = if was { FENCE_MARGIN_M } else { 0.0 };

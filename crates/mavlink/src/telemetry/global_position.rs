@@ -2,7 +2,7 @@
 
 use crate::frames::{flip, flip_turn};
 use crate::message::{MessageFormat, PAYLOAD_MAX};
-use crate::wire::Layout;
+use crate::wire::MessageLayout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA, GPS_RAW_INT_DATA, HOME_POSITION_DATA,
@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 
 /// GLOBAL_POSITION_INT (33).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct GlobalPosition {
+pub struct GlobalPositionInt {
     /// Time since power-up \[ms\].
     pub time_ms: u32,
     /// Latitude and longitude \[1e-7 deg\].
@@ -28,7 +28,7 @@ pub struct GlobalPosition {
 
 /// GPS_RAW_INT (24).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Fix {
+pub struct GpsRawInt {
     /// Time since power-up \[us\].
     pub time_us: u64,
     /// Latitude and longitude \[1e-7 deg\].
@@ -49,7 +49,7 @@ pub struct Fix {
 
 /// HOME_POSITION (242).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Home {
+pub struct HomePosition {
     /// Latitude and longitude \[1e-7 deg\].
     pub place_e7: [i32; 2],
     /// Altitude above the sea \[mm\].
@@ -74,13 +74,14 @@ pub struct GlobalOrigin {
 }
 
 /// Fields: time, latitude, longitude; altitudes above the sea and home; velocity; heading.
-const GLOBAL: Layout<GLOBAL_POSITION_INT_DATA, (u32, [i32; 2], [i32; 2], [i16; 3], u16)> = Layout::NEW;
+const GLOBAL: MessageLayout<GLOBAL_POSITION_INT_DATA, (u32, [i32; 2], [i32; 2], [i16; 3], u16)> = MessageLayout::NEW;
 /// Fields: time, position, altitude; dilutions of precision, speed, course; fix type, satellites; altitude above the
 /// ellipsoid, four uncertainties, yaw.
-const FIX: Layout<GPS_RAW_INT_DATA, (u64, [i32; 2], i32, [u16; 4], [u8; 2], i32, [u32; 4], u16)> = Layout::NEW;
+const FIX: MessageLayout<GPS_RAW_INT_DATA, (u64, [i32; 2], i32, [u16; 4], [u8; 2], i32, [u32; 4], u16)> =
+    MessageLayout::NEW;
 /// Fields: position, altitude; x, y, z; attitude; direction of the approach; time.
-const HOME: Layout<HOME_POSITION_DATA, ([i32; 2], i32, [f32; 3], [f32; 4], [f32; 3], u64)> = Layout::NEW;
-const ORIGIN: Layout<GPS_GLOBAL_ORIGIN_DATA, ([i32; 2], i32, u64)> = Layout::NEW;
+const HOME: MessageLayout<HOME_POSITION_DATA, ([i32; 2], i32, [f32; 3], [f32; 4], [f32; 3], u64)> = MessageLayout::NEW;
+const ORIGIN: MessageLayout<GPS_GLOBAL_ORIGIN_DATA, ([i32; 2], i32, u64)> = MessageLayout::NEW;
 
 pub(super) fn format(id: u32) -> Option<MessageFormat> {
     match id {
@@ -92,10 +93,10 @@ pub(super) fn format(id: u32) -> Option<MessageFormat> {
     }
 }
 
-impl GlobalPosition {
+impl GlobalPositionInt {
     pub(super) fn read(payload: &[u8]) -> Self {
         let (time_ms, place_e7, [altitude_mm, relative_mm], velocity_ned_cm_s, heading_cdeg) = GLOBAL.read(payload);
-        GlobalPosition { time_ms, place_e7, altitude_mm, relative_mm, velocity_ned_cm_s, heading_cdeg }
+        GlobalPositionInt { time_ms, place_e7, altitude_mm, relative_mm, velocity_ned_cm_s, heading_cdeg }
     }
 
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
@@ -104,17 +105,17 @@ impl GlobalPosition {
     }
 }
 
-impl Fix {
+impl GpsRawInt {
     pub(super) fn read(payload: &[u8]) -> Self {
         let (time_us, place_e7, altitude_mm, [_, _, speed_cm_s, course_cdeg], [kind, satellites], _, sigma, _) =
             FIX.read(payload);
         let [horizontal, vertical, _, _] = sigma;
         let sigma_mm = [horizontal, vertical];
-        Fix { time_us, place_e7, altitude_mm, kind, satellites, sigma_mm, speed_cm_s, course_cdeg }
+        GpsRawInt { time_us, place_e7, altitude_mm, kind, satellites, sigma_mm, speed_cm_s, course_cdeg }
     }
 
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
-        let Fix { time_us, place_e7, altitude_mm, kind, satellites, sigma_mm, speed_cm_s, course_cdeg } = *self;
+        let GpsRawInt { time_us, place_e7, altitude_mm, kind, satellites, sigma_mm, speed_cm_s, course_cdeg } = *self;
         // The dilutions of precision are unknown.
         let numbers = [u16::MAX, u16::MAX, speed_cm_s, course_cdeg];
         let [horizontal, vertical] = sigma_mm;
@@ -123,15 +124,15 @@ impl Fix {
     }
 }
 
-impl Home {
+impl HomePosition {
     pub(super) fn read(payload: &[u8]) -> Self {
         let (place_e7, altitude_mm, position, attitude, _, time_us) = HOME.read(payload);
         let (position_m, attitude) = (flip(position.into()), flip_turn(attitude));
-        Home { place_e7, altitude_mm, position_m, attitude, time_us }
+        HomePosition { place_e7, altitude_mm, position_m, attitude, time_us }
     }
 
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
-        let Home { place_e7, altitude_mm, position_m, attitude, time_us } = *self;
+        let HomePosition { place_e7, altitude_mm, position_m, attitude, time_us } = *self;
         let (position, attitude) = (flip(position_m).into(), flip_turn(attitude));
         HOME.write(&(place_e7, altitude_mm, position, attitude, [0.0; 3], time_us), payload)
     }

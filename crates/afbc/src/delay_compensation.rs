@@ -17,7 +17,7 @@ use nalgebra::Vector2;
 
 /// Constants of the shift.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ahead {
+pub struct DelayCompensation {
     /// d of roll and pitch, divided by the delay of the low-pass.
     lead: f32,
     /// Share of the low-pass that is replaced per step.
@@ -26,7 +26,7 @@ pub struct Ahead {
     pub thrust_s: f32,
 }
 
-impl Ahead {
+impl DelayCompensation {
     /// Creates the constants for rotors and filters with these lags and a low-pass of bandwidth `bandwidth_rad_s`,
     /// advanced every `dt_s` seconds.
     pub fn new(lag_s: f32, smoothing: &Smoothing, bandwidth_rad_s: f32, dt_s: f32) -> Self {
@@ -34,7 +34,7 @@ impl Ahead {
         // Without a filter there is no lead, so all of the rotors' lag is left.
         let left = |w: f32| if w > 0.0 { math::max(lag_s + 2.0 / w - lead_s, 0.0) } else { lag_s };
         let share = 1.0 - math::exp(-bandwidth_rad_s * dt_s);
-        Ahead {
+        DelayCompensation {
             // A low-pass is behind a ramp of slope s by s dt / share.
             lead: left(smooth_tilt_rad_s) * share / dt_s,
             share,

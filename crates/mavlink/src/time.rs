@@ -1,14 +1,14 @@
 //! Clocks and round-trip times: TIMESYNC, PING and SYSTEM_TIME, in both directions.
 
 use crate::address::Address;
-use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
-use crate::wire::Layout;
+use crate::message::{FrameFault, MessageFormat, PAYLOAD_MAX};
+use crate::wire::MessageLayout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{PING_DATA, SYSTEM_TIME_DATA, TIMESYNC_DATA};
 
 /// A message about time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Clock {
+pub enum TimeMessage {
     /// TIMESYNC (111).
     Sync {
         /// Time of the answering clock; 0 in a request \[ns\].
@@ -36,11 +36,11 @@ pub enum Clock {
     },
 }
 
-const SYNC: Layout<TIMESYNC_DATA, (i64, i64, Address)> = Layout::NEW;
-const PING: Layout<PING_DATA, (u64, u32, Address)> = Layout::NEW;
-const TIME: Layout<SYSTEM_TIME_DATA, (u64, u32)> = Layout::NEW;
+const SYNC: MessageLayout<TIMESYNC_DATA, (i64, i64, Address)> = MessageLayout::NEW;
+const PING: MessageLayout<PING_DATA, (u64, u32, Address)> = MessageLayout::NEW;
+const TIME: MessageLayout<SYSTEM_TIME_DATA, (u64, u32)> = MessageLayout::NEW;
 
-impl Clock {
+impl TimeMessage {
     pub(crate) fn format(id: u32) -> Option<MessageFormat> {
         Some(match id {
             TIMESYNC_DATA::ID => SYNC.format(),
@@ -50,29 +50,29 @@ impl Clock {
         })
     }
 
-    pub(crate) fn read(id: u32, payload: &[u8]) -> Result<Self, Fault> {
+    pub(crate) fn read(id: u32, payload: &[u8]) -> Result<Self, FrameFault> {
         Ok(match id {
             TIMESYNC_DATA::ID => {
                 let (answered_ns, asked_ns, to) = SYNC.read(payload);
-                Clock::Sync { answered_ns, asked_ns, to }
+                TimeMessage::Sync { answered_ns, asked_ns, to }
             }
             PING_DATA::ID => {
                 let (time_us, number, to) = PING.read(payload);
-                Clock::Ping { time_us, number, to }
+                TimeMessage::Ping { time_us, number, to }
             }
             SYSTEM_TIME_DATA::ID => {
                 let (unix_us, boot_ms) = TIME.read(payload);
-                Clock::Time { unix_us, boot_ms }
+                TimeMessage::Time { unix_us, boot_ms }
             }
-            _ => return Err(Fault::Unknown),
+            _ => return Err(FrameFault::Unknown),
         })
     }
 
     pub(crate) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         match *self {
-            Clock::Sync { answered_ns, asked_ns, to } => SYNC.write(&(answered_ns, asked_ns, to), payload),
-            Clock::Ping { time_us, number, to } => PING.write(&(time_us, number, to), payload),
-            Clock::Time { unix_us, boot_ms } => TIME.write(&(unix_us, boot_ms), payload),
+            TimeMessage::Sync { answered_ns, asked_ns, to } => SYNC.write(&(answered_ns, asked_ns, to), payload),
+            TimeMessage::Ping { time_us, number, to } => PING.write(&(time_us, number, to), payload),
+            TimeMessage::Time { unix_us, boot_ms } => TIME.write(&(unix_us, boot_ms), payload),
         }
     }
 }

@@ -5,10 +5,10 @@
 //! a = R e3 T/m - g e3
 //! ```
 //!
-//! Thus a law needs no input besides the setpoint. The law adds its learnt disturbances, such as wind; a `Trim`
-//! subtracts them.
+//! Thus a law needs no input besides the setpoint. The law adds its learnt disturbances, such as wind; an
+//! `AccelerationTrim` subtracts them.
 
-use crate::settings::Limits;
+use crate::settings::MotionLimits;
 use afbc_control::math::{cos, max, min, sin, sqrt};
 use afbc_types::{Setpoint, State};
 use nalgebra::{Vector2, Vector3};
@@ -29,7 +29,7 @@ const TRIM_M_S2: f32 = 5.0;
 
 /// Thrust that the rotors can give and have given.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lift {
+pub struct AvailableThrust {
     /// Largest thrust of all rotors, divided by the mass \[m/s2\].
     pub most_m_s2: f32,
     /// Acceleration of free fall \[m/s2\].
@@ -38,7 +38,7 @@ pub struct Lift {
     pub given_m_s2: Option<f32>,
 }
 
-impl Lift {
+impl AvailableThrust {
     /// True if the rotors give nearly their largest thrust.
     pub(crate) fn is_exhausted(&self) -> bool {
         self.given_m_s2.is_some_and(|given_m_s2| given_m_s2 > EXHAUSTED_SHARE * self.most_m_s2)
@@ -59,7 +59,7 @@ impl Lift {
 
     /// Returns a setpoint of attitude and thrust, with the thrust changed so that climb and sink rate stay within
     /// `limits`.
-    pub(crate) fn limited(&self, setpoint: &Setpoint, state: &State, limits: &Limits) -> Setpoint {
+    pub(crate) fn limited(&self, setpoint: &Setpoint, state: &State, limits: &MotionLimits) -> Setpoint {
         let [[x, y, z]] = setpoint.acceleration_m_s2.data.0;
         let climb_m_s = state.velocity_m_s.z;
         let least_m_s2 = min((-limits.down_m_s - climb_m_s) / LIMIT_S, self.most_m_s2);
@@ -78,15 +78,21 @@ impl Lift {
 
 /// Correction of the acceleration that makes the flown attitude and thrust match the target.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Trim {
+pub(crate) struct AccelerationTrim {
     /// Tilt that the vehicle should have by now, as tangents; none at first.
     expected: Option<Vector2<f32>>,
     correction_m_s2: Vector3<f32>,
 }
 
-impl Trim {
+impl AccelerationTrim {
     /// Advances by one step, and returns `setpoint` with the correction added.
-    pub(crate) fn advance(&mut self, lift: &Lift, state: &State, setpoint: &Setpoint, dt_s: f32) -> Setpoint {
+    pub(crate) fn advance(
+        &mut self,
+        lift: &AvailableThrust,
+        state: &State,
+        setpoint: &Setpoint,
+        dt_s: f32,
+    ) -> Setpoint {
         let thrust_m_s2 = setpoint.acceleration_m_s2 + Vector3::new(0.0, 0.0, lift.gravity_m_s2);
         let vertical_m_s2 = max(thrust_m_s2.z, VERTICAL_MIN * lift.gravity_m_s2);
         let wanted = thrust_m_s2.xy() / vertical_m_s2;

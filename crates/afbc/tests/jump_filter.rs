@@ -1,6 +1,6 @@
 //! Compares the smoothed jerk and snap with the setpoint's derivatives and the filter in double precision.
 
-use afbc::forward::{Followed, Forward};
+use afbc::jump_filter::{JumpFilter, JumpMemory};
 use afbc_types::Setpoint;
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -19,9 +19,9 @@ fn corner(t: f32, jump: f32, snap: f32) -> [f32; 3] {
 
 #[test]
 fn a_smooth_setpoint_is_followed_as_it_is() {
-    let forward = Forward::new(15.0, DT_S).unwrap();
+    let forward = JumpFilter::new(15.0, DT_S).unwrap();
     let (size, rate) = (4.0_f32, 3.0_f32);
-    let mut followed: Option<Followed> = None;
+    let mut followed: Option<JumpMemory> = None;
     for k in 0..5000_u16 {
         let angle = rate * f32::from(k) * DT_S;
         let (sine, cosine) = (angle.sin() * size, angle.cos() * size);
@@ -39,7 +39,7 @@ fn a_jump_of_the_jerk_is_followed_as_the_filter_says() {
     // The error e = x - x_f obeys d^2 e/dt^2 + 2 w de/dt + w^2 e = 0 from e = 0 and de/dt = jump, so e = jump t exp(-w
     // t).
     let (w, jump, snap) = (20.0_f32, 30.0_f32, -40.0_f32);
-    let forward = Forward::new(w, DT_S).unwrap();
+    let forward = JumpFilter::new(w, DT_S).unwrap();
     let mut followed = None;
     for _ in 0..10 {
         forward.advance(&mut followed, &Setpoint::default());
@@ -68,7 +68,7 @@ proptest! {
         bandwidth in 1.0_f32..1000.0,
         jumps in prop::collection::vec((-50.0_f32..50.0, -500.0_f32..500.0), 1..50),
     ) {
-        let forward = Forward::new(bandwidth, DT_S).unwrap();
+        let forward = JumpFilter::new(bandwidth, DT_S).unwrap();
         let mut followed = None;
         let most = 2.0 * 50.0 * bandwidth + 2.0 * 500.0;
         for (a, j) in jumps {

@@ -3,7 +3,7 @@
 
 use crate::address::Address;
 use crate::message::{MessageFormat, PAYLOAD_MAX};
-use crate::wire::{Layout, Unused};
+use crate::wire::{MessageLayout, Unused};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     LOG_DATA_DATA, LOG_ENTRY_DATA, LOG_ERASE_DATA, LOG_REQUEST_DATA_DATA, LOG_REQUEST_END_DATA, LOG_REQUEST_LIST_DATA,
@@ -66,14 +66,14 @@ pub(super) const RECEIVED_ID: u32 = LOGGING_ACK_DATA::ID;
 pub(super) const ENTRY_ID: u32 = LOG_ENTRY_DATA::ID;
 pub(super) const DATA_ID: u32 = LOG_DATA_DATA::ID;
 
-const LIST: Layout<LOG_REQUEST_LIST_DATA, (u16, u16, Address)> = Layout::NEW;
-const DATA_REQUEST: Layout<LOG_REQUEST_DATA_DATA, (u32, u32, u16, Address)> = Layout::NEW;
-const ERASE: Layout<LOG_ERASE_DATA, (Address,)> = Layout::NEW;
-const END: Layout<LOG_REQUEST_END_DATA, (Address,)> = Layout::NEW;
-const RECEIVED: Layout<LOGGING_ACK_DATA, (u16, Address)> = Layout::NEW;
+const LIST: MessageLayout<LOG_REQUEST_LIST_DATA, (u16, u16, Address)> = MessageLayout::NEW;
+const DATA_REQUEST: MessageLayout<LOG_REQUEST_DATA_DATA, (u32, u32, u16, Address)> = MessageLayout::NEW;
+const ERASE: MessageLayout<LOG_ERASE_DATA, (Address,)> = MessageLayout::NEW;
+const END: MessageLayout<LOG_REQUEST_END_DATA, (Address,)> = MessageLayout::NEW;
+const RECEIVED: MessageLayout<LOGGING_ACK_DATA, (u16, Address)> = MessageLayout::NEW;
 /// Fields: time and size; log id; number of logs and last log id.
-const ENTRY: Layout<LOG_ENTRY_DATA, (Unused<8>, u16, [u16; 2])> = Layout::NEW;
-const DATA: Layout<LOG_DATA_DATA, (u32, u16, u8, Unused<90>)> = Layout::NEW;
+const ENTRY: MessageLayout<LOG_ENTRY_DATA, (Unused<8>, u16, [u16; 2])> = MessageLayout::NEW;
+const DATA: MessageLayout<LOG_DATA_DATA, (u32, u16, u8, Unused<90>)> = MessageLayout::NEW;
 
 impl LogRequest {
     pub(super) fn format(id: u32) -> Option<MessageFormat> {

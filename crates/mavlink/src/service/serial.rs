@@ -1,14 +1,14 @@
 //! Serial ports and shells: SERIAL_CONTROL, in both directions.
 
 use crate::address::Address;
-use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
-use crate::wire::{Layout, Unused};
+use crate::message::{FrameFault, MessageFormat, PAYLOAD_MAX};
+use crate::wire::{MessageLayout, Unused};
 use mavlink::MessageData;
 use mavlink::dialects::common::SERIAL_CONTROL_DATA;
 
 /// SERIAL_CONTROL (126). Its data are ignored, except that a vehicle without a shell sends a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Serial {
+pub struct SerialControl {
     /// `SERIAL_CONTROL_DEV`.
     pub device: u8,
     /// Number of bytes.
@@ -22,26 +22,27 @@ pub(super) const RESPOND: u8 = 2;
 pub(super) const ID: u32 = SERIAL_CONTROL_DATA::ID;
 
 /// Fields: baud rate, timeout, device, flags, number of bytes, data, receiver.
-const SERIAL: Layout<SERIAL_CONTROL_DATA, (u32, u16, u8, u8, u8, [u8; LENGTH], Unused<60>, Address)> = Layout::NEW;
-const LENGTH: usize = Serial::NO_SHELL.len();
+const SERIAL: MessageLayout<SERIAL_CONTROL_DATA, (u32, u16, u8, u8, u8, [u8; LENGTH], Unused<60>, Address)> =
+    MessageLayout::NEW;
+const LENGTH: usize = SerialControl::NO_SHELL.len();
 
 pub(super) fn format() -> MessageFormat {
     SERIAL.format()
 }
 
-impl Serial {
+impl SerialControl {
     /// Text sent by a vehicle without a shell.
     pub const NO_SHELL: [u8; 10] = *b"no shell\r\n";
     /// Number of the shell in `SERIAL_CONTROL_DEV`.
     pub const SHELL: u8 = 10;
 
     /// Reads a message that has this one of the two flags, and not the other.
-    pub(super) fn read(payload: &[u8], flag: u8) -> Result<(Self, Address), Fault> {
+    pub(super) fn read(payload: &[u8], flag: u8) -> Result<(Self, Address), FrameFault> {
         let (_, _, device, flags, bytes, _, _, to) = SERIAL.read(payload);
         if flags & (REPLY | RESPOND) != flag {
-            return Err(Fault::Unsupported);
+            return Err(FrameFault::Unsupported);
         }
-        Ok((Serial { device, bytes }, to))
+        Ok((SerialControl { device, bytes }, to))
     }
 
     /// Returns the receiver of a shell line that requires no reply; none for other messages.
@@ -59,5 +60,5 @@ impl Serial {
 
 /// Writes a shell line that requires no reply.
 pub(super) fn write_line(payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
-    SERIAL.write(&(0, 0, Serial::SHELL, 0, 1, [b'\n'; LENGTH], Unused, Address::default()), payload)
+    SERIAL.write(&(0, 0, SerialControl::SHELL, 0, 1, [b'\n'; LENGTH], Unused, Address::default()), payload)
 }

@@ -3,7 +3,7 @@
 
 use crate::address::Address;
 use crate::message::{MessageFormat, PAYLOAD_MAX};
-use crate::wire::{Layout, Unused};
+use crate::wire::{MessageLayout, Unused};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     PARAM_EXT_ACK_DATA, PARAM_EXT_REQUEST_LIST_DATA, PARAM_EXT_REQUEST_READ_DATA, PARAM_EXT_SET_DATA,
@@ -66,13 +66,13 @@ pub(super) const VALUE_ID: u32 = PARAM_EXT_VALUE_DATA::ID;
 pub(super) const ACK_ID: u32 = PARAM_EXT_ACK_DATA::ID;
 
 /// Value of a parameter.
-type Text = Unused<128>;
+type ExtendedValue = Unused<128>;
 
-const READ: Layout<PARAM_EXT_REQUEST_READ_DATA, (i16, Address, ExtendedName)> = Layout::NEW;
-const LIST: Layout<PARAM_EXT_REQUEST_LIST_DATA, (Address,)> = Layout::NEW;
-const SET: Layout<PARAM_EXT_SET_DATA, (Address, ExtendedName, Text, u8)> = Layout::NEW;
-const VALUE: Layout<PARAM_EXT_VALUE_DATA, (u16, u16, ExtendedName, Text, u8)> = Layout::NEW;
-const ACK: Layout<PARAM_EXT_ACK_DATA, (ExtendedName, Text, u8, u8)> = Layout::NEW;
+const READ: MessageLayout<PARAM_EXT_REQUEST_READ_DATA, (i16, Address, ExtendedName)> = MessageLayout::NEW;
+const LIST: MessageLayout<PARAM_EXT_REQUEST_LIST_DATA, (Address,)> = MessageLayout::NEW;
+const SET: MessageLayout<PARAM_EXT_SET_DATA, (Address, ExtendedName, ExtendedValue, u8)> = MessageLayout::NEW;
+const VALUE: MessageLayout<PARAM_EXT_VALUE_DATA, (u16, u16, ExtendedName, ExtendedValue, u8)> = MessageLayout::NEW;
+const ACK: MessageLayout<PARAM_EXT_ACK_DATA, (ExtendedName, ExtendedValue, u8, u8)> = MessageLayout::NEW;
 
 impl ExtendedRequest {
     pub(super) fn format(id: u32) -> Option<MessageFormat> {

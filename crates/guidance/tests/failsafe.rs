@@ -1,4 +1,4 @@
-//! Tests of the safety net: every cause with every action, alone and in pairs; announcements; checks before arming.
+//! Tests of the failsafes: every cause with every action, alone and in pairs; announcements; checks before arming.
 
 use crate::bench::{Bench, motion, settings};
 use afbc_flight_core::{Mode, Refusal};
@@ -7,33 +7,33 @@ use afbc_types::{Choice, Declared, State};
 use nalgebra::Vector3;
 
 /// Returns causes that a test can trigger in flight, each with its parameter's choices and the action of each choice.
-fn causes() -> Vec<(Cause, Vec<(usize, FailsafeAction)>)> {
+fn causes() -> Vec<(FailsafeCause, Vec<(usize, FailsafeAction)>)> {
     use FailsafeAction::{Hold, Land, None, Return, Warn};
     vec![
-        (Cause::Fence, vec![(0, None), (1, Warn), (2, Hold), (3, Return), (4, Land), (5, Land)]),
-        (Cause::Station, vec![(0, None), (1, Hold), (2, Return), (3, Land)]),
-        (Cause::Targets, vec![(0, Land), (1, Hold), (2, Return)]),
-        (Cause::Sensors, vec![(0, None), (1, Warn), (2, Hold), (3, Return), (4, Land)]),
-        (Cause::BatteryCritical, vec![(0, Warn), (1, Return), (2, Land), (3, Return)]),
-        (Cause::BatteryEmergency, vec![(0, Warn), (1, Return), (2, Land), (3, Land)]),
+        (FailsafeCause::Fence, vec![(0, None), (1, Warn), (2, Hold), (3, Return), (4, Land), (5, Land)]),
+        (FailsafeCause::Station, vec![(0, None), (1, Hold), (2, Return), (3, Land)]),
+        (FailsafeCause::Targets, vec![(0, Land), (1, Hold), (2, Return)]),
+        (FailsafeCause::Sensors, vec![(0, None), (1, Warn), (2, Hold), (3, Return), (4, Land)]),
+        (FailsafeCause::BatteryCritical, vec![(0, Warn), (1, Return), (2, Land), (3, Return)]),
+        (FailsafeCause::BatteryEmergency, vec![(0, Warn), (1, Return), (2, Land), (3, Land)]),
     ]
 }
 
-fn with(mut settings: Settings, cause: Cause, number: usize) -> Settings {
-    let net = &mut settings.net;
+fn with(mut settings: Settings, cause: FailsafeCause, number: usize) -> Settings {
+    let failsafe = &mut settings.failsafe;
     match cause {
-        Cause::Fence => net.fence_action = Choice::ALL[number],
-        Cause::Station => net.station_action = Choice::ALL[number],
-        Cause::Targets => net.targets_action = Choice::ALL[number],
-        Cause::Sensors => net.sensors_action = Choice::ALL[number],
-        _ => net.battery_action = Choice::ALL[number],
+        FailsafeCause::Fence => failsafe.fence_action = Choice::ALL[number],
+        FailsafeCause::Station => failsafe.station_action = Choice::ALL[number],
+        FailsafeCause::Targets => failsafe.targets_action = Choice::ALL[number],
+        FailsafeCause::Sensors => failsafe.sensors_action = Choice::ALL[number],
+        _ => failsafe.battery_action = Choice::ALL[number],
     }
     settings
 }
 
 fn quiet() -> Settings {
     let mut settings = settings();
-    settings.net = Net { cells: 3, fence_radius_m: 30.0, station_lost_s: 1.0, ..settings.net };
+    settings.failsafe = FailsafeSettings { cells: 3, fence_radius_m: 30.0, station_lost_s: 1.0, ..settings.failsafe };
     settings
 }
 
@@ -62,13 +62,13 @@ fn stream(bench: &mut Bench, time_s: f32) {
     }
 }
 
-fn bring_about(bench: &mut Bench, cause: Cause) {
+fn bring_about(bench: &mut Bench, cause: FailsafeCause) {
     match cause {
-        Cause::Fence => bench.state.position_m.x = 31.0,
-        Cause::Station => bench.heard = false,
-        Cause::Targets => bench.orders.target = None,
-        Cause::Sensors => bench.sensors.magnetometer = true,
-        Cause::BatteryCritical => bench.battery = charge(0.06),
+        FailsafeCause::Fence => bench.state.position_m.x = 31.0,
+        FailsafeCause::Station => bench.heard = false,
+        FailsafeCause::Targets => bench.orders.target = None,
+        FailsafeCause::Sensors => bench.sensors.magnetometer = true,
+        FailsafeCause::BatteryCritical => bench.battery = charge(0.06),
         _ => bench.battery = charge(0.01),
     }
 }
@@ -90,9 +90,9 @@ fn find(bench: &mut Bench) {
     }
 }
 
-fn announced(bench: &Bench, cause: Cause) -> usize {
-    let of = |notice: &&Notice| match notice {
-        Notice::Mode(_, ModeReason::Failsafe(found)) | Notice::Found(found) => *found == cause,
+fn announced(bench: &Bench, cause: FailsafeCause) -> usize {
+    let of = |notice: &&GuidanceNotice| match notice {
+        GuidanceNotice::Mode(_, ModeReason::Failsafe(found)) | GuidanceNotice::Found(found) => *found == cause,
         _ => false,
     };
     bench.said.iter().filter(of).count()
@@ -122,9 +122,10 @@ fn every_cause_does_what_its_parameter_says_and_is_announced_once() {
 fn of_every_pair_the_stronger_action_counts() {
     for (first, of_first) in causes() {
         for (second, of_second) in causes() {
-            let one_parameter = |cause| matches!(cause, Cause::BatteryCritical | Cause::BatteryEmergency);
+            let one_parameter =
+                |cause| matches!(cause, FailsafeCause::BatteryCritical | FailsafeCause::BatteryEmergency);
             // Targets can be lost in offboard mode only, which the first cause may have ended.
-            if first == second || one_parameter(first) && one_parameter(second) || second == Cause::Targets {
+            if first == second || one_parameter(first) && one_parameter(second) || second == FailsafeCause::Targets {
                 continue;
             }
             for (number, action) in [of_first[1], of_first[of_first.len() - 1]] {
@@ -150,20 +151,20 @@ fn of_every_pair_the_stronger_action_counts() {
 
 #[test]
 fn a_failsafe_yields_to_stronger_modes_only_until_its_cause_is_over() {
-    let mut bench = offboard(with(quiet(), Cause::Station, 2));
-    bring_about(&mut bench, Cause::Station);
+    let mut bench = offboard(with(quiet(), FailsafeCause::Station, 2));
+    bring_about(&mut bench, FailsafeCause::Station);
     stream(&mut bench, 2.0);
     assert_eq!(bench.guidance.mode(), FlightMode::Return);
     assert_eq!(bench.select(FlightMode::Hold), Err(OrderRefusal::Failsafe));
     assert_eq!(bench.select(FlightMode::Offboard), Err(OrderRefusal::Failsafe));
-    assert_eq!(bench.last.unwrap().failsafe, Some(Cause::Station));
+    assert_eq!(bench.last.unwrap().failsafe, Some(FailsafeCause::Station));
     bench.heard = true;
     bench.run(0.1);
     assert_eq!(bench.guidance.mode(), FlightMode::Return, "the mode stays");
-    assert!(bench.said.contains(&Notice::Over(Cause::Station)));
+    assert!(bench.said.contains(&GuidanceNotice::Over(FailsafeCause::Station)));
     assert_eq!(bench.select(FlightMode::Hold), Ok(()));
     assert_eq!(bench.last.unwrap().failsafe, None);
-    bring_about(&mut bench, Cause::Station);
+    bring_about(&mut bench, FailsafeCause::Station);
     bench.run(2.0);
     assert_eq!(bench.select(FlightMode::Land), Ok(()), "a stronger one may be selected");
 }
@@ -171,7 +172,7 @@ fn a_failsafe_yields_to_stronger_modes_only_until_its_cause_is_over() {
 #[test]
 fn on_the_ground_a_failsafe_disarms() {
     for (number, disarms) in [(1, false), (2, true), (3, true)] {
-        let mut bench = Bench::new(with(quiet(), Cause::Station, number));
+        let mut bench = Bench::new(with(quiet(), FailsafeCause::Station, number));
         bench.battery = charge(0.8);
         bench.run(1.5);
         bench.arm();
@@ -193,7 +194,7 @@ fn a_disarming_is_announced_once_however_long_it_has_stood() {
         bench.heard = false;
         bench.run_until(3.0, |guided| guided.request.is_some());
         bench.run(1.0);
-        let reported = bench.said.iter().filter(|notice| **notice == Notice::Disarms).count();
+        let reported = bench.said.iter().filter(|notice| **notice == GuidanceNotice::Disarms).count();
         assert_eq!((reported, bench.core), (1, Mode::Disarmed), "{:?}", bench.said);
     }
 }
@@ -202,7 +203,7 @@ fn a_disarming_is_announced_once_however_long_it_has_stood() {
 #[test]
 fn climbs_stay_below_the_fence() {
     let mut settings = quiet();
-    (settings.net.fence_height_m, settings.flying.takeoff_height_m) = (6.0, 9.0);
+    (settings.failsafe.fence_height_m, settings.flying.takeoff_height_m) = (6.0, 9.0);
     settings.flying.return_height_m = 15.0;
     let mut bench = Bench::new(settings);
     bench.run(1.5);
@@ -213,7 +214,7 @@ fn climbs_stay_below_the_fence() {
     bench.run(0.01);
     bench.select(FlightMode::Mission).unwrap();
     bench.run(0.1);
-    assert!(bench.said.contains(&Notice::ItemRefused) && !bench.airborne());
+    assert!(bench.said.contains(&GuidanceNotice::ItemRefused) && !bench.airborne());
     let away = |x: f32| Item::Waypoint {
         position_m: Vector3::new(x, 0.0, 4.0),
         yaw_rad: f32::NAN,
@@ -246,7 +247,7 @@ fn the_charge_is_that_without_load() {
     let settings = quiet();
     for current_a in [0.0, 10.0, 30.0] {
         let mut bench = offboard(settings);
-        let sag_v = 3.0 * settings.net.resistance_ohm * current_a;
+        let sag_v = 3.0 * settings.failsafe.resistance_ohm * current_a;
         let voltage_v = 3.0 * (3.6 + 0.45 * 0.3) - sag_v;
         bench.battery = Some(BatteryReading { voltage_v, current_a, charge: None });
         stream(&mut bench, 15.0);
@@ -267,18 +268,21 @@ fn the_charge_is_that_without_load() {
 
 #[test]
 fn a_battery_does_not_recover_in_flight() {
-    let mut bench = offboard(with(quiet(), Cause::BatteryCritical, 0));
+    let mut bench = offboard(with(quiet(), FailsafeCause::BatteryCritical, 0));
     bench.battery = charge(0.06);
     stream(&mut bench, 15.0);
     bench.battery = charge(0.9);
     stream(&mut bench, 15.0);
-    assert_eq!(bench.said, [Notice::Found(Cause::BatteryLow), Notice::Found(Cause::BatteryCritical)]);
+    assert_eq!(
+        bench.said,
+        [GuidanceNotice::Found(FailsafeCause::BatteryLow), GuidanceNotice::Found(FailsafeCause::BatteryCritical)]
+    );
 }
 
 #[test]
 fn places_outside_the_fence_are_declined_and_missions_to_them_end() {
     let mut settings = quiet();
-    settings.net.fence_height_m = 20.0;
+    settings.failsafe.fence_height_m = 20.0;
     let mut bench = Bench::hovering(settings);
     bench.battery = charge(0.8);
     let go = |x, z| Order::GoTo { position_m: Vector3::new(x, 0.0, z), yaw_rad: f32::NAN, speed_m_s: None };
@@ -296,7 +300,7 @@ fn places_outside_the_fence_are_declined_and_missions_to_them_end() {
     bench.select(FlightMode::Mission).unwrap();
     bench.run(0.1);
     assert_eq!(bench.guidance.mode(), FlightMode::Hold);
-    assert!(bench.said.contains(&Notice::ItemRefused));
+    assert!(bench.said.contains(&GuidanceNotice::ItemRefused));
 }
 
 #[test]
@@ -304,8 +308,8 @@ fn the_flight_cores_descent_is_a_landing_that_no_order_ends() {
     let mut bench = offboard(quiet());
     (bench.core, bench.sees) = (Mode::Descending, false);
     let guided = bench.tick();
-    assert_eq!((guided.mode, guided.setpoint, guided.failsafe), (FlightMode::Land, None, Some(Cause::Descent)));
-    assert_eq!(bench.said, [Notice::Mode(FlightMode::Land, ModeReason::Failsafe(Cause::Descent))]);
+    assert_eq!((guided.mode, guided.setpoint, guided.failsafe), (FlightMode::Land, None, Some(FailsafeCause::Descent)));
+    assert_eq!(bench.said, [GuidanceNotice::Mode(FlightMode::Land, ModeReason::Failsafe(FailsafeCause::Descent))]);
     for mode in FlightMode::ALL {
         let expected = if mode == FlightMode::Land { Ok(()) } else { Err(OrderRefusal::Failsafe) };
         assert_eq!(bench.select(mode), expected);
@@ -338,7 +342,7 @@ fn the_guidance_bars_arming_for_its_own_reasons_only() {
         rested: true,
         battery: charge(0.8),
         sensors: FailedSensors::default(),
-        lift: Lift { most_m_s2: 20.0, gravity_m_s2: 9.81, given_m_s2: None },
+        available_thrust: AvailableThrust { most_m_s2: 20.0, gravity_m_s2: 9.81, given_m_s2: None },
     };
     let mut bench = Bench::new(quiet());
     bench.battery = charge(0.8);
@@ -346,7 +350,7 @@ fn the_guidance_bars_arming_for_its_own_reasons_only() {
     let against = |bench: &Bench, sight: &GuidanceInputs<'_>| {
         let mut guidance = bench.guidance;
         let _ = guidance.tick(sight, &Orders::default());
-        guidance.against().iter().collect::<Vec<_>>()
+        guidance.arming_refusals().iter().collect::<Vec<_>>()
     };
     let far = State { position_m: Vector3::new(1e3, 0.0, 0.0), ..here };
     let tilted = State { attitude_rad: Vector3::new(0.0, 0.8, 0.0), velocity_m_s: Vector3::new(9.0, 0.0, 0.0), ..here };
@@ -389,7 +393,7 @@ fn home_is_where_the_vehicle_has_rested() {
             rested,
             battery: None,
             sensors: FailedSensors::default(),
-            lift: Lift { most_m_s2: 20.0, gravity_m_s2: 9.81, given_m_s2: None },
+            available_thrust: AvailableThrust { most_m_s2: 20.0, gravity_m_s2: 9.81, given_m_s2: None },
         };
         let guided = guidance.tick(&sight, &Orders::default());
         assert_eq!(guided.home_m.map(|home| home.x), home);
@@ -399,17 +403,17 @@ fn home_is_where_the_vehicle_has_rested() {
 #[test]
 fn parameters_are_validated_by_name() {
     assert_eq!(Settings::DEFAULT.validate(), Ok(()));
-    let net = Net::DEFAULT;
-    for (net, name) in [
-        (Net { cells: 25, ..net }, "cells"),
-        (Net { empty_v: 4.05, ..net }, "empty_v"),
-        (Net { critical: 0.2, ..net }, "critical"),
-        (Net { emergency: 0.08, ..net }, "emergency"),
+    let failsafe = FailsafeSettings::DEFAULT;
+    for (failsafe, name) in [
+        (FailsafeSettings { cells: 25, ..failsafe }, "cells"),
+        (FailsafeSettings { empty_v: 4.05, ..failsafe }, "empty_v"),
+        (FailsafeSettings { critical: 0.2, ..failsafe }, "critical"),
+        (FailsafeSettings { emergency: 0.08, ..failsafe }, "emergency"),
     ] {
-        let error = Guidance::new(Settings { net, ..Settings::DEFAULT }).unwrap_err();
+        let error = Guidance::new(Settings { failsafe, ..Settings::DEFAULT }).unwrap_err();
         assert_eq!(error.range.name, name);
         let mut guidance = Guidance::new(Settings::DEFAULT).unwrap();
-        assert!(guidance.set(Settings { net, ..Settings::DEFAULT }).is_err());
+        assert!(guidance.set(Settings { failsafe, ..Settings::DEFAULT }).is_err());
         assert_eq!(guidance.settings(), &Settings::DEFAULT, "what is refused changes nothing");
     }
 }

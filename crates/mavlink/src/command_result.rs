@@ -1,14 +1,14 @@
 //! Answers to commands: COMMAND_ACK.
 
 use crate::address::Address;
-use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
-use crate::wire::Layout;
+use crate::message::{FrameFault, MessageFormat, PAYLOAD_MAX};
+use crate::wire::MessageLayout;
 use mavlink::dialects::common::{COMMAND_ACK_DATA, MavResult};
 
 /// An answer to a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
-pub enum Answer {
+pub enum CommandResult {
     /// The command was carried out.
     Accepted,
     /// Refused for now; `result_param2` holds the number of the reason.
@@ -24,7 +24,7 @@ pub enum Answer {
 }
 
 /// Fields: command, result, progress, `result_param2`, receiver.
-const ACK: Layout<COMMAND_ACK_DATA, (u16, u8, u8, i32, Address)> = Layout::NEW;
+const ACK: MessageLayout<COMMAND_ACK_DATA, (u16, u8, u8, i32, Address)> = MessageLayout::NEW;
 
 const ACCEPTED: u8 = MavResult::MAV_RESULT_ACCEPTED as u8;
 const REFUSED: u8 = MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
@@ -40,28 +40,28 @@ pub(crate) fn format() -> MessageFormat {
 }
 
 /// Returns command, answer and receiver. Accepts any command of any dialect.
-pub(crate) fn read(payload: &[u8]) -> Result<(u16, Answer, Address), Fault> {
+pub(crate) fn read(payload: &[u8]) -> Result<(u16, CommandResult, Address), FrameFault> {
     let (command, result, _, reason, to) = ACK.read(payload);
     let answer = match result {
-        ACCEPTED => Answer::Accepted,
-        REFUSED => Answer::Refused(reason),
-        DENIED => Answer::Denied,
-        UNSUPPORTED => Answer::Unsupported,
-        FAILED => Answer::Failed,
-        IN_PROGRESS => Answer::InProgress,
-        _ => return Err(Fault::Unsupported),
+        ACCEPTED => CommandResult::Accepted,
+        REFUSED => CommandResult::Refused(reason),
+        DENIED => CommandResult::Denied,
+        UNSUPPORTED => CommandResult::Unsupported,
+        FAILED => CommandResult::Failed,
+        IN_PROGRESS => CommandResult::InProgress,
+        _ => return Err(FrameFault::Unsupported),
     };
     Ok((command, answer, to))
 }
 
-pub(crate) fn write(command: u16, answer: Answer, to: Address, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+pub(crate) fn write(command: u16, answer: CommandResult, to: Address, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
     let (result, progress, reason) = match answer {
-        Answer::Accepted => (ACCEPTED, 0, 0),
-        Answer::Refused(reason) => (REFUSED, 0, reason),
-        Answer::Denied => (DENIED, 0, 0),
-        Answer::Unsupported => (UNSUPPORTED, 0, 0),
-        Answer::Failed => (FAILED, 0, 0),
-        Answer::InProgress => (IN_PROGRESS, SOME, 0),
+        CommandResult::Accepted => (ACCEPTED, 0, 0),
+        CommandResult::Refused(reason) => (REFUSED, 0, reason),
+        CommandResult::Denied => (DENIED, 0, 0),
+        CommandResult::Unsupported => (UNSUPPORTED, 0, 0),
+        CommandResult::Failed => (FAILED, 0, 0),
+        CommandResult::InProgress => (IN_PROGRESS, SOME, 0),
     };
     ACK.write(&(command, result, progress, reason, to), payload)
 }

@@ -1,7 +1,7 @@
 //! Terrain heights: TERRAIN_CHECK and TERRAIN_REPORT.
 
 use crate::message::{MessageFormat, PAYLOAD_MAX};
-use crate::wire::{Layout, Unused};
+use crate::wire::{MessageLayout, Unused};
 use mavlink::MessageData;
 use mavlink::dialects::common::{TERRAIN_CHECK_DATA, TERRAIN_REPORT_DATA};
 
@@ -15,9 +15,9 @@ pub struct Terrain {
 pub(super) const CHECK_ID: u32 = TERRAIN_CHECK_DATA::ID;
 pub(super) const REPORT_ID: u32 = TERRAIN_REPORT_DATA::ID;
 
-const CHECK: Layout<TERRAIN_CHECK_DATA, ([i32; 2],)> = Layout::NEW;
+const CHECK: MessageLayout<TERRAIN_CHECK_DATA, ([i32; 2],)> = MessageLayout::NEW;
 /// Fields: position; heights, grid spacing (0: unknown), blocks pending and loaded.
-const REPORT: Layout<TERRAIN_REPORT_DATA, ([i32; 2], Unused<14>)> = Layout::NEW;
+const REPORT: MessageLayout<TERRAIN_REPORT_DATA, ([i32; 2], Unused<14>)> = MessageLayout::NEW;
 
 pub(super) fn check_format() -> MessageFormat {
     CHECK.format()

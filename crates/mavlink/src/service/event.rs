@@ -2,7 +2,7 @@
 
 use crate::address::Address;
 use crate::message::{MessageFormat, PAYLOAD_MAX};
-use crate::wire::Layout;
+use crate::wire::MessageLayout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{REQUEST_EVENT_DATA, RESPONSE_EVENT_ERROR_DATA};
 
@@ -27,8 +27,8 @@ pub struct EventError {
 pub(super) const REQUEST_ID: u32 = REQUEST_EVENT_DATA::ID;
 pub(super) const ERROR_ID: u32 = RESPONSE_EVENT_ERROR_DATA::ID;
 
-const REQUEST: Layout<REQUEST_EVENT_DATA, ([u16; 2], Address)> = Layout::NEW;
-const ERROR: Layout<RESPONSE_EVENT_ERROR_DATA, (u16, u16, Address, u8)> = Layout::NEW;
+const REQUEST: MessageLayout<REQUEST_EVENT_DATA, ([u16; 2], Address)> = MessageLayout::NEW;
+const ERROR: MessageLayout<RESPONSE_EVENT_ERROR_DATA, (u16, u16, Address, u8)> = MessageLayout::NEW;
 
 impl EventRequest {
     pub(super) fn format() -> MessageFormat {

@@ -3,14 +3,14 @@
 use super::serial;
 use crate::address::Address;
 use crate::message::{MessageFormat, PAYLOAD_MAX, put};
-use crate::wire::{Layout, Unused};
+use crate::wire::{MessageLayout, Unused};
 use mavlink::MessageData;
 use mavlink::dialects::common::{FOLLOW_TARGET_DATA, GPS_INJECT_DATA_DATA, GPS_RTCM_DATA_DATA, PLAY_TUNE_DATA};
 use mavlink::dialects::common::{PLAY_TUNE_V2_DATA, TuneFormat};
 
 /// Content of an unusable message without an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum UnansweredWish {
+pub enum UnansweredRequest {
     /// GNSS corrections: GPS_RTCM_DATA (233), GPS_INJECT_DATA (123).
     Corrections,
     /// A tune: PLAY_TUNE (258), PLAY_TUNE_V2 (400).
@@ -21,13 +21,13 @@ pub enum UnansweredWish {
     Shell,
 }
 
-const INJECT: Layout<GPS_INJECT_DATA_DATA, (Address, Unused<111>)> = Layout::NEW;
+const INJECT: MessageLayout<GPS_INJECT_DATA_DATA, (Address, Unused<111>)> = MessageLayout::NEW;
 /// Fields: receiver, tune; more of the tune in an extension field.
-const TUNE: Layout<PLAY_TUNE_DATA, (Address, Unused<30>, Unused<200>)> = Layout::NEW;
+const TUNE: MessageLayout<PLAY_TUNE_DATA, (Address, Unused<30>, Unused<200>)> = MessageLayout::NEW;
 /// Fields: format of the tune, receiver, tune.
-const TUNE_V2: Layout<PLAY_TUNE_V2_DATA, (u32, Address, Unused<248>)> = Layout::NEW;
+const TUNE_V2: MessageLayout<PLAY_TUNE_V2_DATA, (u32, Address, Unused<248>)> = MessageLayout::NEW;
 
-impl UnansweredWish {
+impl UnansweredRequest {
     pub(super) fn format(id: u32) -> Option<MessageFormat> {
         Some(match id {
             GPS_RTCM_DATA_DATA::ID => MessageFormat::of::<GPS_RTCM_DATA_DATA>(0),
@@ -42,23 +42,23 @@ impl UnansweredWish {
     /// Returns the kind of message and its receiver.
     pub(super) fn read(id: u32, payload: &[u8]) -> (Self, Address) {
         match id {
-            GPS_INJECT_DATA_DATA::ID => (UnansweredWish::Corrections, INJECT.read(payload).0),
-            FOLLOW_TARGET_DATA::ID => (UnansweredWish::Follow, Address::default()),
-            PLAY_TUNE_DATA::ID => (UnansweredWish::Tune, TUNE.read(payload).0),
-            PLAY_TUNE_V2_DATA::ID => (UnansweredWish::Tune, TUNE_V2.read(payload).1),
-            _ => (UnansweredWish::Corrections, Address::default()),
+            GPS_INJECT_DATA_DATA::ID => (UnansweredRequest::Corrections, INJECT.read(payload).0),
+            FOLLOW_TARGET_DATA::ID => (UnansweredRequest::Follow, Address::default()),
+            PLAY_TUNE_DATA::ID => (UnansweredRequest::Tune, TUNE.read(payload).0),
+            PLAY_TUNE_V2_DATA::ID => (UnansweredRequest::Tune, TUNE_V2.read(payload).1),
+            _ => (UnansweredRequest::Corrections, Address::default()),
         }
     }
 
     pub(super) fn write(self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         match self {
-            UnansweredWish::Corrections => put(&GPS_RTCM_DATA_DATA::DEFAULT, payload),
-            UnansweredWish::Tune => {
+            UnansweredRequest::Corrections => put(&GPS_RTCM_DATA_DATA::DEFAULT, payload),
+            UnansweredRequest::Tune => {
                 let kind = TuneFormat::TUNE_FORMAT_QBASIC1_1 as u32;
                 TUNE_V2.write(&(kind, Address::default(), Unused), payload)
             }
-            UnansweredWish::Follow => put(&FOLLOW_TARGET_DATA::DEFAULT, payload),
-            UnansweredWish::Shell => serial::write_line(payload),
+            UnansweredRequest::Follow => put(&FOLLOW_TARGET_DATA::DEFAULT, payload),
+            UnansweredRequest::Shell => serial::write_line(payload),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Mode offboard: follows the targets of a companion computer.
 
-use crate::lift::Lift;
+use crate::available_thrust::AvailableThrust;
 use crate::limiter::LimiterTarget;
 use crate::mode_io::{ModeInputs, ModeOutput, Shaping};
 use crate::order::{AttitudeTarget, MotionTarget, OffboardTarget};
@@ -19,7 +19,7 @@ const LIFTS_SHARE: f32 = 0.8;
 
 /// Memory of mode offboard.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Targets {
+pub(crate) struct OffboardMemory {
     /// Last target in body coordinates: time of its message \[us\], place \[m\] and heading \[rad\] in the local frame.
     body: Option<(u64, Vector3<f32>, f32)>,
 }
@@ -46,8 +46,13 @@ pub(crate) fn is_plausible(target: &OffboardTarget) -> bool {
     }
 }
 
-impl Targets {
-    pub(crate) fn fly(&mut self, target: &Stamped<OffboardTarget>, inputs: &ModeInputs<'_>, lift: &Lift) -> ModeOutput {
+impl OffboardMemory {
+    pub(crate) fn fly(
+        &mut self,
+        target: &Stamped<OffboardTarget>,
+        inputs: &ModeInputs<'_>,
+        lift: &AvailableThrust,
+    ) -> ModeOutput {
         match &target.value {
             OffboardTarget::Motion(motion) => self.motion(motion, target.at_us, inputs),
             OffboardTarget::Attitude(target) => attitude(target, inputs, lift),
@@ -97,7 +102,7 @@ impl Targets {
     }
 }
 
-fn attitude(target: &AttitudeTarget, inputs: &ModeInputs<'_>, lift: &Lift) -> ModeOutput {
+fn attitude(target: &AttitudeTarget, inputs: &ModeInputs<'_>, lift: &AvailableThrust) -> ModeOutput {
     let q = target.attitude;
     let (w, x, y, z) = (q.w, q.i, q.j, q.k);
     let up = Vector3::new(2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
