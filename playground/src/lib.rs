@@ -3,8 +3,8 @@
 
 use afbc::Profile;
 use afbc_scenario::{BUILT_IN, Scenario, built_in};
-use afbc_serve::page::Cockpit;
-use afbc_serve::{Server, Then, TimeFlow, TimeRate, fleet};
+use afbc_serve::page::PageBackend;
+use afbc_serve::{Server, ServerAction, TimeFlow, TimeRate, fleet};
 use afbc_sim::LogRate;
 use afbc_sim::columns::{ESTIMATE, MOTION};
 use afbc_sim::flight::Sample;
@@ -19,7 +19,7 @@ const OWN: &str = "paper";
 #[wasm_bindgen]
 pub struct Playground {
     server: Server,
-    cockpit: Cockpit,
+    backend: PageBackend,
 }
 
 #[wasm_bindgen]
@@ -38,29 +38,29 @@ impl Playground {
         scenario.seed = seed as u64;
         let scenarios = fleet(&scenario, 1).map_err(|error| JsError::new(&error.to_string()))?;
         let server = Server::new(&scenarios, 1).map_err(|error| JsError::new(&format!("{error:?}")))?;
-        Ok(Playground { server, cockpit: Cockpit::new() })
+        Ok(Playground { server, backend: PageBackend::new() })
     }
 
     /// Returns the data that the page needs once, since they do not change.
     pub fn hello(&self) -> String {
-        self.cockpit.hello(&self.server).unwrap_or_default()
+        self.backend.description(&self.server).unwrap_or_default()
     }
 
     /// Returns the values of the parameters.
     pub fn values(&self) -> String {
-        self.cockpit.values(&self.server).unwrap_or_default()
+        self.backend.values(&self.server).unwrap_or_default()
     }
 
     /// Advances by this many milliseconds. Returns the action left to the caller by a scheduled command, if any.
     pub fn advance(&mut self, steps: u32) -> String {
-        let mut left = Then::Nothing;
+        let mut left = ServerAction::Nothing;
         for _ in 0..steps {
-            let (cockpit, mut said) = (&mut self.cockpit, Vec::new());
-            let then =
-                self.server.step(|vehicle, bytes| cockpit.sent(vehicle, bytes), |text| said.push(text.to_owned()));
-            self.cockpit.turn(&mut self.server);
-            if then != Then::Nothing {
-                left = then;
+            let (backend, mut said) = (&mut self.backend, Vec::new());
+            let action =
+                self.server.step(|vehicle, bytes| backend.sent(vehicle, bytes), |text| said.push(text.to_owned()));
+            self.backend.update(&mut self.server);
+            if action != ServerAction::Nothing {
+                left = action;
             }
         }
         to_do(left)
@@ -69,13 +69,13 @@ impl Playground {
     /// Returns the current state for the page.
     pub fn frame(&mut self, speed: f64, paused: bool) -> String {
         let flow = TimeFlow { rate: TimeRate::Times(speed), paused };
-        self.cockpit.frame(&self.server, flow).unwrap_or_default()
+        self.backend.frame(&self.server, flow).unwrap_or_default()
     }
 
     /// Runs a command of the page; returns its messages and the action left to the caller.
     pub fn command(&mut self, command: &str) -> String {
-        let reply = self.cockpit.command(&mut self.server, command);
-        json!({ "messages": reply.messages, "then": to_do(reply.then) }).to_string()
+        let reply = self.backend.command(&mut self.server, command);
+        json!({ "messages": reply.messages, "then": to_do(reply.action) }).to_string()
     }
 }
 
@@ -152,11 +152,11 @@ fn on(scenario: Scenario, vehicle: &afbc_vehicles::Vehicle) -> Result<Scenario, 
 }
 
 /// Returns the caller's action as text, such as `speed 2`; empty if there is none.
-fn to_do(then: Then) -> String {
-    match then {
-        Then::Nothing | Then::Step(_) | Then::Quit => String::new(),
-        Then::Speed(speed) => format!("speed {speed}"),
-        Then::Pause(true) => "pause".into(),
-        Then::Pause(false) => "resume".into(),
+fn to_do(action: ServerAction) -> String {
+    match action {
+        ServerAction::Nothing | ServerAction::Step(_) | ServerAction::Quit => String::new(),
+        ServerAction::Speed(speed) => format!("speed {speed}"),
+        ServerAction::Pause(true) => "pause".into(),
+        ServerAction::Pause(false) => "resume".into(),
     }
 }

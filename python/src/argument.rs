@@ -17,41 +17,41 @@ pub(crate) const SEEDS: RangeInclusive<u64> = 0..=i64::MAX as u64;
 const SHOWN: usize = 40;
 
 /// An argument as it was given, or its default. The value is converted when asked for by the argument's name.
-pub(crate) enum Given<'py, T> {
+pub(crate) enum CallArg<'py, T> {
     Default(T),
     As(Bound<'py, PyAny>),
 }
 
-impl<'py, T> FromPyObject<'_, 'py> for Given<'py, T> {
+impl<'py, T> FromPyObject<'_, 'py> for CallArg<'py, T> {
     type Error = Infallible;
 
     fn extract(object: Borrowed<'_, 'py, PyAny>) -> Result<Self, Infallible> {
-        Ok(Given::As(object.to_owned()))
+        Ok(CallArg::As(object.to_owned()))
     }
 }
 
-impl<'py, T: Argument<'py>> Given<'py, T> {
+impl<'py, T: Argument<'py>> CallArg<'py, T> {
     /// Returns the value of the argument called `name`.
     pub(crate) fn named(&self, name: &str) -> PyResult<T>
     where
         T: Clone,
     {
         match self {
-            Given::Default(value) => Ok(value.clone()),
-            Given::As(object) => T::of(name, object),
+            CallArg::Default(value) => Ok(value.clone()),
+            CallArg::As(object) => T::of(name, object),
         }
     }
 }
 
 /// Returns the value of the optional argument called `name`; none if it was not given.
 pub(crate) fn optional<'py, T: Argument<'py> + Clone>(
-    given: Option<&Given<'py, T>>,
+    given: Option<&CallArg<'py, T>>,
     name: &str,
 ) -> PyResult<Option<T>> {
     given.map(|given| given.named(name)).transpose()
 }
 
-impl Given<'_, u64> {
+impl CallArg<'_, u64> {
     /// Returns the value of the argument called `name`, which must be a whole number within `range`.
     pub(crate) fn within(&self, name: &str, range: RangeInclusive<u64>) -> PyResult<u64> {
         let outside = |shown: String| {
@@ -59,8 +59,8 @@ impl Given<'_, u64> {
             error(format!("{name}: {shown} given; a whole number from {least} to {most} is needed"))
         };
         let value = match self {
-            Given::Default(value) => *value,
-            Given::As(object) => match object.extract::<u64>() {
+            CallArg::Default(value) => *value,
+            CallArg::As(object) => match object.extract::<u64>() {
                 Ok(value) => value,
                 Err(problem) if problem.is_instance_of::<PyOverflowError>(object.py()) => {
                     return Err(outside(shown(object)));
@@ -73,12 +73,12 @@ impl Given<'_, u64> {
 }
 
 /// Returns the requested number of threads; none for the default.
-pub(crate) fn threads(given: Option<&Given<'_, u64>>) -> PyResult<Option<usize>> {
+pub(crate) fn threads(given: Option<&CallArg<'_, u64>>) -> PyResult<Option<usize>> {
     given.map(|threads| threads.within("threads", 1..=1024).map(|threads| threads as usize)).transpose()
 }
 
 /// Returns the requested seed; none for the scenario's own.
-pub(crate) fn seed(given: Option<&Given<'_, u64>>) -> PyResult<Option<u64>> {
+pub(crate) fn seed(given: Option<&CallArg<'_, u64>>) -> PyResult<Option<u64>> {
     given.map(|seed| seed.within("seed", SEEDS)).transpose()
 }
 
@@ -153,9 +153,9 @@ impl<'py, T: Argument<'py>> Argument<'py> for Vec<T> {
 
 /// Named values from a mapping or from pairs.
 #[derive(Clone, Default)]
-pub(crate) struct Gains(pub(crate) Vec<(String, f64)>);
+pub(crate) struct NamedGains(pub(crate) Vec<(String, f64)>);
 
-impl<'py> Argument<'py> for Gains {
+impl<'py> Argument<'py> for NamedGains {
     fn of(name: &str, object: &Bound<'py, PyAny>) -> PyResult<Self> {
         let pairs = match object.cast::<PyMapping>() {
             Ok(mapping) => mapping.items()?.into_any(),
@@ -174,18 +174,18 @@ impl<'py> Argument<'py> for Gains {
             let value = f64::of(&format!("{name}[{gain:?}]"), &value)?;
             Ok((gain, value))
         };
-        items.map(pair).collect::<PyResult<_>>().map(Gains)
+        items.map(pair).collect::<PyResult<_>>().map(NamedGains)
     }
 }
 
 /// Numbers of an array of any shape.
 #[derive(Clone)]
-pub(crate) struct Array {
+pub(crate) struct ArgumentArray {
     numbers: Vec<f64>,
     shape: Vec<usize>,
 }
 
-impl Array {
+impl ArgumentArray {
     /// Returns the numbers of the argument called `name` if its shape is `wanted`. A length of none accepts any length.
     pub(crate) fn shaped<const D: usize>(self, name: &str, wanted: [Option<usize>; D]) -> PyResult<Vec<f64>> {
         let fits = |(wanted, given): (&Option<usize>, &usize)| wanted.is_none_or(|wanted| wanted == *given);
@@ -206,7 +206,7 @@ fn tuple(lengths: &[String]) -> String {
     }
 }
 
-impl<'py> Argument<'py> for Array {
+impl<'py> Argument<'py> for ArgumentArray {
     fn of(name: &str, object: &Bound<'py, PyAny>) -> PyResult<Self> {
         static AS_ARRAY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
         let py = object.py();
@@ -214,7 +214,7 @@ impl<'py> Argument<'py> for Array {
         let array = match object.cast::<PyArrayDyn<f64>>() {
             // A fast path, since most arguments are such arrays and a step may run a thousand times a second.
             Ok(array) if array.is_c_contiguous() && array.data().is_aligned() => {
-                return Ok(Array { numbers: array.to_vec().map_err(error)?, shape: array.shape().to_vec() });
+                return Ok(ArgumentArray { numbers: array.to_vec().map_err(error)?, shape: array.shape().to_vec() });
             }
             Ok(array) => array.clone().into_any(),
             Err(_) => {
@@ -231,7 +231,7 @@ impl<'py> Argument<'py> for Array {
         // Copies the array: nobody else can write the copy meanwhile, and it is contiguous.
         let array = array.call_method1("astype", ("float64", "C"))?;
         let array = array.cast_into::<PyArrayDyn<f64>>()?;
-        Ok(Array { numbers: array.to_vec().map_err(error)?, shape: array.shape().to_vec() })
+        Ok(ArgumentArray { numbers: array.to_vec().map_err(error)?, shape: array.shape().to_vec() })
     }
 }
 
@@ -244,7 +244,7 @@ impl<'py, const N: usize> Argument<'py> for [f64; N] {
         {
             return list.extract();
         }
-        let numbers = Array::of(name, object)?.shaped(name, [Some(N)])?;
+        let numbers = ArgumentArray::of(name, object)?.shaped(name, [Some(N)])?;
         let mut numbers = numbers.into_iter();
         Ok(core::array::from_fn(|_| numbers.next().unwrap_or_default()))
     }

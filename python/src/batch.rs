@@ -1,6 +1,6 @@
 //! The class `Batch`: many vehicles stepped in one call.
 
-use crate::argument::{Array, Given, SEEDS, optional};
+use crate::argument::{ArgumentArray, CallArg, SEEDS, optional};
 use crate::error::error;
 use crate::plant::{StateArgument, begun, commands, start, step_s};
 use crate::scenario::{ScenarioArgument, asked};
@@ -54,16 +54,16 @@ impl PyBatch {
     /// Makes `count` worlds of a scenario. The seeds are consecutive, from `seed` or the scenario's own seed on.
     #[new]
     #[pyo3(
-        signature = (count, scenario=None, *, vehicle=None, seed=None, dt_s=Given::Default(0.001)),
+        signature = (count, scenario=None, *, vehicle=None, seed=None, dt_s=CallArg::Default(0.001)),
         text_signature = "(count, scenario=None, *, vehicle=None, seed=None, dt_s=0.001)"
     )]
     fn new(
         py: Python<'_>,
-        count: Given<'_, u64>,
-        scenario: Option<Given<'_, ScenarioArgument<'_>>>,
-        vehicle: Option<Given<'_, VehicleArgument<'_>>>,
-        seed: Option<Given<'_, u64>>,
-        dt_s: Given<'_, f64>,
+        count: CallArg<'_, u64>,
+        scenario: Option<CallArg<'_, ScenarioArgument<'_>>>,
+        vehicle: Option<CallArg<'_, VehicleArgument<'_>>>,
+        seed: Option<CallArg<'_, u64>>,
+        dt_s: CallArg<'_, f64>,
     ) -> PyResult<Self> {
         let count = count.within("count", 1..=COUNT_MAX)?;
         let scenario = asked(scenario.as_ref(), "hover", vehicle.as_ref(), seed.as_ref())?;
@@ -90,8 +90,13 @@ impl PyBatch {
     }
 
     /// Moves every vehicle by `steps` steps with these commanded rotor speeds [rad/s], shape (count, rotors).
-    #[pyo3(signature = (speeds_rad_s, steps=Given::Default(1)), text_signature = "($self, speeds_rad_s, steps=1)")]
-    fn step(&mut self, py: Python<'_>, speeds_rad_s: Given<'_, Array>, steps: Given<'_, u64>) -> PyResult<()> {
+    #[pyo3(signature = (speeds_rad_s, steps=CallArg::Default(1)), text_signature = "($self, speeds_rad_s, steps=1)")]
+    fn step(
+        &mut self,
+        py: Python<'_>,
+        speeds_rad_s: CallArg<'_, ArgumentArray>,
+        steps: CallArg<'_, u64>,
+    ) -> PyResult<()> {
         let (count, rotors) = (self.worlds.len(), self.scenario.rotors.len());
         let speeds = speeds_rad_s.named("speeds_rad_s")?.shaped("speeds_rad_s", [Some(count), Some(rotors)])?;
         let speeds = speeds.chunks_exact(rotors).map(commands).collect::<PyResult<Vec<_>>>()?;
@@ -111,7 +116,12 @@ impl PyBatch {
 
     /// Restarts vehicle `index` with this seed, from the scenario's start or from the motion `state`.
     #[pyo3(signature = (index, seed, state=None))]
-    fn reset(&mut self, index: Given<'_, u64>, seed: Given<'_, u64>, state: Option<StateArgument<'_>>) -> PyResult<()> {
+    fn reset(
+        &mut self,
+        index: CallArg<'_, u64>,
+        seed: CallArg<'_, u64>,
+        state: Option<StateArgument<'_>>,
+    ) -> PyResult<()> {
         let index = index.within("index", 0..=self.worlds.len() as u64 - 1)? as usize;
         let seed = seed.within("seed", SEEDS)?;
         let state = optional(state.as_ref(), "state")?;

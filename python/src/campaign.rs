@@ -1,11 +1,13 @@
 //! The functions `campaign`, `merge` and `campaigns`.
 
-use crate::argument::{self, Given, optional};
+use crate::argument::{self, CallArg, optional};
 use crate::error::error;
 use crate::vehicle::{self, VehicleArgument};
-use crate::work::{Watch, watched};
+use crate::work::{WorkProgress, watched};
 use afbc::Profile;
-use afbc_campaign::{self as campaigns, BUILT_IN, Campaign, CampaignFolder, Manifest, Row, Shard, Summary, subject};
+use afbc_campaign::{
+    self as campaigns, BUILT_IN, Campaign, CampaignFolder, CampaignSummary, Manifest, ResultRow, Shard, subject,
+};
 use numpy::{PyArray1, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -23,12 +25,12 @@ use std::path::PathBuf;
 #[expect(clippy::too_many_arguments, reason = "each by its name")]
 pub(crate) fn campaign<'py>(
     py: Python<'py>,
-    campaign: Given<'py, PathBuf>,
-    flights: Option<Given<'py, u64>>,
-    vehicle: Option<Given<'py, VehicleArgument<'py>>>,
-    shard: Option<Given<'py, String>>,
-    out: Option<Given<'py, PathBuf>>,
-    threads: Option<Given<'py, u64>>,
+    campaign: CallArg<'py, PathBuf>,
+    flights: Option<CallArg<'py, u64>>,
+    vehicle: Option<CallArg<'py, VehicleArgument<'py>>>,
+    shard: Option<CallArg<'py, String>>,
+    out: Option<CallArg<'py, PathBuf>>,
+    threads: Option<CallArg<'py, u64>>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let mut plan = subject::campaign(&campaign.named("campaign")?).map_err(error)?;
@@ -76,7 +78,7 @@ pub(crate) fn campaign<'py>(
 }
 
 /// Flies a campaign in a folder and returns all its rows.
-fn kept(plan: &Campaign, folder: &CampaignFolder, watch: &Watch) -> Result<Vec<Row>, String> {
+fn kept(plan: &Campaign, folder: &CampaignFolder, watch: &WorkProgress) -> Result<Vec<ResultRow>, String> {
     // Counts the flights flown now; those of earlier runs are reported as one sum.
     let summary = campaigns::fly(plan, folder, watch.stop(), &|done| watch.add(done));
     let summary = summary.map_err(|error| error.to_string())?.ok_or("interrupted; the same call resumes")?;
@@ -88,8 +90,8 @@ fn kept(plan: &Campaign, folder: &CampaignFolder, watch: &Watch) -> Result<Vec<R
 #[pyfunction]
 pub(crate) fn merge<'py>(
     py: Python<'py>,
-    shards: Given<'py, Vec<PathBuf>>,
-    out: Given<'py, PathBuf>,
+    shards: CallArg<'py, Vec<PathBuf>>,
+    out: CallArg<'py, PathBuf>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (shards, out) = (shards.named("shards")?, out.named("out")?);
     if shards.is_empty() {
@@ -104,13 +106,13 @@ pub(crate) fn merge<'py>(
 }
 
 /// Writes the report of a folder's flights and returns their rows.
-fn concluded(folder: &CampaignFolder, summary: &Summary) -> Result<Vec<Row>, String> {
-    afbc_report::campaign::write(folder.place(), summary).map_err(|error| error.to_string())?;
+fn concluded(folder: &CampaignFolder, summary: &CampaignSummary) -> Result<Vec<ResultRow>, String> {
+    afbc_report::campaign::write(folder.output_folder(), summary).map_err(|error| error.to_string())?;
     let rows = folder.results().map_err(|error| error.to_string())?.ok_or("the results are gone")?;
     rows.collect::<Result<_, _>>().map_err(|error| error.to_string())
 }
 
-fn columns<'py>(py: Python<'py>, manifest: &Manifest, rows: &[Row]) -> PyResult<Bound<'py, PyDict>> {
+fn columns<'py>(py: Python<'py>, manifest: &Manifest, rows: &[ResultRow]) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("flight", rows.iter().map(|row| row.flight).collect::<Vec<_>>().to_pyarray(py))?;
     dict.set_item("seed", rows.iter().map(|row| row.seed).collect::<Vec<_>>().to_pyarray(py))?;
@@ -119,7 +121,7 @@ fn columns<'py>(py: Python<'py>, manifest: &Manifest, rows: &[Row]) -> PyResult<
     dict.set_item("lost_reason", rows.iter().map(|row| row.lost_reason.as_deref()).collect::<Vec<_>>())?;
     dict.set_item("trip_reason", rows.iter().map(|row| row.trip_reason.as_deref()).collect::<Vec<_>>())?;
     for (i, column) in manifest.columns().into_iter().enumerate() {
-        let value = |row: &Row| row.numbers.get(i).copied().flatten().unwrap_or(f64::NAN);
+        let value = |row: &ResultRow| row.numbers.get(i).copied().flatten().unwrap_or(f64::NAN);
         dict.set_item(column.name, PyArray1::from_iter(py, rows.iter().map(value)))?;
     }
     Ok(dict)

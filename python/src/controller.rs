@@ -1,6 +1,6 @@
 //! The class `Controller`: a control law, step by step.
 
-use crate::argument::{Gains, Given, optional};
+use crate::argument::{CallArg, NamedGains, optional};
 use crate::error::error;
 use crate::motion::{PySetpoint, PyState};
 use crate::plant::StateArgument;
@@ -84,23 +84,23 @@ fn inputs<'py>(py: Python<'py>, u: &Inputs) -> Bound<'py, PyArray1<f64>> {
 }
 
 /// Argument that must be a setpoint.
-pub(crate) type SetpointArgument<'py> = Given<'py, Bound<'py, PySetpoint>>;
+pub(crate) type SetpointArgument<'py> = CallArg<'py, Bound<'py, PySetpoint>>;
 
 /// A controller for any number of rotors, which is fixed when it is made.
-trait AnyRotors: Send + Sync {
+trait DynController: Send + Sync {
     fn step(&mut self, state: Option<&PyState>, setpoint: &PySetpoint) -> Action<ROTORS_MAX>;
     fn reset(&mut self);
     fn trace(&self) -> Trace;
     fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>>;
 }
 
-struct OfRotors<const N: usize> {
+struct SizedController<const N: usize> {
     /// The mutex makes the controller `Sync`: a user's own law cannot be shared between threads.
     controller: Mutex<AnyController<N>>,
     memory: Validated<AnyControllerMemory<N>>,
 }
 
-impl<const N: usize> AnyRotors for OfRotors<N> {
+impl<const N: usize> DynController for SizedController<N> {
     fn step(&mut self, state: Option<&PyState>, setpoint: &PySetpoint) -> Action<ROTORS_MAX> {
         let controller = self.controller.get_mut().unwrap_or_else(PoisonError::into_inner);
         controller.step(&mut self.memory, state.map(|state| &state.0), &setpoint.0).padded()
@@ -124,7 +124,7 @@ impl<const N: usize> AnyRotors for OfRotors<N> {
 pub(crate) struct PyController {
     contender: Contender,
     rotors: usize,
-    law: Box<dyn AnyRotors>,
+    law: Box<dyn DynController>,
 }
 
 #[pymethods]
@@ -135,18 +135,18 @@ impl PyController {
     #[pyo3(signature = (law="afbc", vehicle=None, *, profile="flight", monitored=false, gains=None))]
     fn new(
         law: &str,
-        vehicle: Option<Given<'_, VehicleArgument<'_>>>,
+        vehicle: Option<CallArg<'_, VehicleArgument<'_>>>,
         profile: &str,
         monitored: bool,
-        gains: Option<Given<'_, Gains>>,
+        gains: Option<CallArg<'_, NamedGains>>,
     ) -> PyResult<Self> {
         let vehicle = vehicle::given(vehicle.as_ref())?;
-        let Gains(gains) = optional(gains.as_ref(), "gains")?.unwrap_or_default();
-        let named = Named { law, profile, monitored, gains };
+        let NamedGains(gains) = optional(gains.as_ref(), "gains")?.unwrap_or_default();
+        let named = LawChoice { law, profile, monitored, gains };
         let (contender, parameters, rotors) = made(&named, vehicle.as_ref())?;
-        let law: Box<dyn AnyRotors> = with_rotors!(rotors.len(), N => {
+        let law: Box<dyn DynController> = with_rotors!(rotors.len(), N => {
             let controller = contender.controller::<N>(&parameters, &rotors).map_err(error)?;
-            Ok::<Box<dyn AnyRotors>, PyErr>(Box::new(OfRotors {
+            Ok::<Box<dyn DynController>, PyErr>(Box::new(SizedController {
                 controller: Mutex::new(controller),
                 memory: Validated::default(),
             }))
@@ -213,7 +213,7 @@ impl PyController {
 }
 
 /// Choice of a law and its gains.
-pub(crate) struct Named<'a> {
+pub(crate) struct LawChoice<'a> {
     pub(crate) law: &'a str,
     pub(crate) profile: &'a str,
     pub(crate) monitored: bool,
@@ -222,10 +222,10 @@ pub(crate) struct Named<'a> {
 
 /// Returns the law, and parameters and rotors of its vehicle. Without a vehicle, these are the paper's.
 pub(crate) fn made(
-    named: &Named<'_>,
+    named: &LawChoice<'_>,
     vehicle: Option<&Vehicle>,
 ) -> PyResult<(Contender, Parameters<f64>, Vec<Rotor<f64>>)> {
-    let Named { law, profile, monitored, gains } = named;
+    let LawChoice { law, profile, monitored, gains } = named;
     let kind = ControllerKind::named(law)
         .ok_or_else(|| error(format!("{law}: no such law; {}", ControllerKind::cure(law))))?;
     let profile = Profile::ALL.into_iter().find(|known| known.name() == *profile).ok_or_else(|| {

@@ -1,6 +1,6 @@
 //! The class `Estimator`: the state estimator, step by step.
 
-use crate::argument::{Given, all_finite, finite};
+use crate::argument::{CallArg, all_finite, finite};
 use crate::error::error;
 use crate::motion::{PyState, array, vector};
 use afbc_estimator::{Estimate, Estimator, ImuSample, Measurement, Memory, Settings, Stamped};
@@ -24,12 +24,12 @@ pub(crate) struct PyEstimator {
 }
 
 /// A number as an argument.
-type Number<'py> = Given<'py, f64>;
+type NumberArgument<'py> = CallArg<'py, f64>;
 /// Three numbers as an argument.
-type Three<'py> = Given<'py, [f64; 3]>;
+type Vector3Argument<'py> = CallArg<'py, [f64; 3]>;
 
 /// Returns the time of the argument called `name` on the estimator's clock \[us\].
-fn us(time_s: &Number<'_>, name: &str) -> PyResult<u64> {
+fn us(time_s: &NumberArgument<'_>, name: &str) -> PyResult<u64> {
     let time_s = time_s.named(name)?;
     if (0.0..=LATEST_S).contains(&time_s) {
         return Ok((time_s * 1e6).round() as u64);
@@ -38,12 +38,12 @@ fn us(time_s: &Number<'_>, name: &str) -> PyResult<u64> {
 }
 
 /// Returns the number of the argument called `name` if it is finite.
-fn number(given: &Number<'_>, name: &str) -> PyResult<f32> {
+fn number(given: &NumberArgument<'_>, name: &str) -> PyResult<f32> {
     Ok(finite(name, given.named(name)?)? as f32)
 }
 
 /// Returns the standard deviation of the argument called `name` if it is positive.
-fn sigma(given: &Number<'_>, name: &str) -> PyResult<f32> {
+fn sigma(given: &NumberArgument<'_>, name: &str) -> PyResult<f32> {
     match number(given, name)? {
         value if value > 0.0 => Ok(value),
         value => Err(error(format!("{name}: {value} given; a positive number is needed"))),
@@ -51,12 +51,12 @@ fn sigma(given: &Number<'_>, name: &str) -> PyResult<f32> {
 }
 
 /// Returns the numbers of the argument called `name` if they are finite.
-fn three(given: &Three<'_>, name: &str) -> PyResult<Vector3<f32>> {
+fn three(given: &Vector3Argument<'_>, name: &str) -> PyResult<Vector3<f32>> {
     Ok(vector(all_finite(name, given.named(name)?)?))
 }
 
 impl PyEstimator {
-    fn offer(&mut self, at_s: &Number<'_>, value: Measurement) -> PyResult<()> {
+    fn offer(&mut self, at_s: &NumberArgument<'_>, value: Measurement) -> PyResult<()> {
         if !value.is_plausible() {
             return Err(error(format!("{value:?}: not plausible; check units, and that the attitude has length 1")));
         }
@@ -79,17 +79,18 @@ impl PyEstimator {
     /// and standard deviations [m, rad].
     #[pyo3(
         signature = (
-            at_s, position_m, attitude, position_sigma_m=Given::Default(0.001), attitude_sigma_rad=Given::Default(0.01)
+            at_s, position_m, attitude, position_sigma_m=CallArg::Default(0.001),
+            attitude_sigma_rad=CallArg::Default(0.01)
         ),
         text_signature = "($self, at_s, position_m, attitude, position_sigma_m=0.001, attitude_sigma_rad=0.01)"
     )]
     fn pose(
         &mut self,
-        at_s: Number<'_>,
-        position_m: Three<'_>,
-        attitude: Given<'_, [f64; 4]>,
-        position_sigma_m: Number<'_>,
-        attitude_sigma_rad: Number<'_>,
+        at_s: NumberArgument<'_>,
+        position_m: Vector3Argument<'_>,
+        attitude: CallArg<'_, [f64; 4]>,
+        position_sigma_m: NumberArgument<'_>,
+        attitude_sigma_rad: NumberArgument<'_>,
     ) -> PyResult<()> {
         let attitude = all_finite("attitude", attitude.named("attitude")?)?;
         let pose = Measurement::Pose {
@@ -105,9 +106,9 @@ impl PyEstimator {
     /// deviations.
     #[pyo3(
         signature = (
-            at_s, position_m, velocity_m_s, horizontal_sigma_m=Given::Default(1.5),
-            vertical_sigma_m=Given::Default(3.0), speed_sigma_m_s=Given::Default(0.2),
-            climb_sigma_m_s=Given::Default(0.3)
+            at_s, position_m, velocity_m_s, horizontal_sigma_m=CallArg::Default(1.5),
+            vertical_sigma_m=CallArg::Default(3.0), speed_sigma_m_s=CallArg::Default(0.2),
+            climb_sigma_m_s=CallArg::Default(0.3)
         ),
         text_signature = "($self, at_s, position_m, velocity_m_s, horizontal_sigma_m=1.5, vertical_sigma_m=3.0, \
                           speed_sigma_m_s=0.2, climb_sigma_m_s=0.3)"
@@ -115,13 +116,13 @@ impl PyEstimator {
     #[expect(clippy::too_many_arguments, reason = "each by its name")]
     fn gnss(
         &mut self,
-        at_s: Number<'_>,
-        position_m: Three<'_>,
-        velocity_m_s: Three<'_>,
-        horizontal_sigma_m: Number<'_>,
-        vertical_sigma_m: Number<'_>,
-        speed_sigma_m_s: Number<'_>,
-        climb_sigma_m_s: Number<'_>,
+        at_s: NumberArgument<'_>,
+        position_m: Vector3Argument<'_>,
+        velocity_m_s: Vector3Argument<'_>,
+        horizontal_sigma_m: NumberArgument<'_>,
+        vertical_sigma_m: NumberArgument<'_>,
+        speed_sigma_m_s: NumberArgument<'_>,
+        climb_sigma_m_s: NumberArgument<'_>,
     ) -> PyResult<()> {
         let fix = Measurement::Gnss {
             position_m: three(&position_m, "position_m")?,
@@ -136,27 +137,42 @@ impl PyEstimator {
 
     /// Adds a barometer's height [m] above any fixed reference.
     #[pyo3(
-        signature = (at_s, height_m, sigma_m=Given::Default(0.1)),
+        signature = (at_s, height_m, sigma_m=CallArg::Default(0.1)),
         text_signature = "($self, at_s, height_m, sigma_m=0.1)"
     )]
-    fn height(&mut self, at_s: Number<'_>, height_m: Number<'_>, sigma_m: Number<'_>) -> PyResult<()> {
+    fn height(
+        &mut self,
+        at_s: NumberArgument<'_>,
+        height_m: NumberArgument<'_>,
+        sigma_m: NumberArgument<'_>,
+    ) -> PyResult<()> {
         let (height_m, sigma_m) = (number(&height_m, "height_m")?, sigma(&sigma_m, "sigma_m")?);
         self.offer(&at_s, Measurement::Height { height_m, sigma_m })
     }
 
     /// Adds a magnetometer's field in the body frame, in any unit, as long as the unit stays the same.
     #[pyo3(signature = (at_s, field, sigma))]
-    fn magnetic_field(&mut self, at_s: Number<'_>, field: Three<'_>, sigma: Number<'_>) -> PyResult<()> {
+    fn magnetic_field(
+        &mut self,
+        at_s: NumberArgument<'_>,
+        field: Vector3Argument<'_>,
+        sigma: NumberArgument<'_>,
+    ) -> PyResult<()> {
         let (field, sigma) = (three(&field, "field")?, self::sigma(&sigma, "sigma")?);
         self.offer(&at_s, Measurement::MagneticField { field, sigma })
     }
 
     /// Adds a heading [rad].
     #[pyo3(
-        signature = (at_s, heading_rad, sigma_rad=Given::Default(0.05)),
+        signature = (at_s, heading_rad, sigma_rad=CallArg::Default(0.05)),
         text_signature = "($self, at_s, heading_rad, sigma_rad=0.05)"
     )]
-    fn heading(&mut self, at_s: Number<'_>, heading_rad: Number<'_>, sigma_rad: Number<'_>) -> PyResult<()> {
+    fn heading(
+        &mut self,
+        at_s: NumberArgument<'_>,
+        heading_rad: NumberArgument<'_>,
+        sigma_rad: NumberArgument<'_>,
+    ) -> PyResult<()> {
         let (heading_rad, sigma_rad) = (number(&heading_rad, "heading_rad")?, sigma(&sigma_rad, "sigma_rad")?);
         self.offer(&at_s, Measurement::Heading { heading_rad, sigma_rad })
     }
@@ -171,9 +187,9 @@ impl PyEstimator {
     #[pyo3(signature = (now_s, rates_rad_s=None, specific_force_m_s2=None))]
     fn step(
         &mut self,
-        now_s: Number<'_>,
-        rates_rad_s: Option<Three<'_>>,
-        specific_force_m_s2: Option<Three<'_>>,
+        now_s: NumberArgument<'_>,
+        rates_rad_s: Option<Vector3Argument<'_>>,
+        specific_force_m_s2: Option<Vector3Argument<'_>>,
     ) -> PyResult<PyState> {
         let now_us = us(&now_s, "now_s")?;
         if now_us < self.now_us {

@@ -1,10 +1,10 @@
 //! The class `Flight` and the functions `fly` and `compare`.
 
-use crate::argument::{self, Given, optional};
+use crate::argument::{self, CallArg, optional};
 use crate::error::error;
 use crate::scenario::{ScenarioArgument, changed};
 use crate::vehicle::{self, VehicleArgument};
-use crate::work::{Watch, watched};
+use crate::work::{WorkProgress, watched};
 use afbc::Profile;
 use afbc_campaign::compare as comparison;
 use afbc_report::flights;
@@ -24,7 +24,7 @@ use rayon::prelude::*;
 /// One flight under one contender: its log as columns, and its figures of merit.
 #[pyclass(name = "Flight", module = "afbc", frozen)]
 pub(crate) struct PyFlight {
-    told: Told,
+    told: FlightSummary,
     /// The flight itself, whose log is converted to columns when they are asked for; none if `pickle` restored the
     /// columns.
     flown: Option<ScenarioFlight>,
@@ -32,13 +32,13 @@ pub(crate) struct PyFlight {
 }
 
 /// Time [s] and reason.
-type When = (f64, String);
+type TimedReason = (f64, String);
 /// Name and value of a figure of merit; no value if nothing could be measured.
-type Figure = (String, Option<f64>);
+type NamedFigure = (String, Option<f64>);
 /// Summary of a flight: contender, scenario, rows of the log, loss, trip, figures of merit.
-type Told = (String, String, usize, Option<When>, Option<When>, Vec<Figure>);
+type FlightSummary = (String, String, usize, Option<TimedReason>, Option<TimedReason>, Vec<NamedFigure>);
 /// Function and arguments that restore a flight in another process.
-type Reduced<'py> = (Bound<'py, PyAny>, (Told, Bound<'py, PyDict>));
+type PickledFlight<'py> = (Bound<'py, PyAny>, (FlightSummary, Bound<'py, PyDict>));
 
 impl PyFlight {
     fn of(flown: ScenarioFlight) -> Self {
@@ -53,7 +53,7 @@ impl PyFlight {
 
 /// Restores a flight from the data that `pickle` kept.
 #[pyfunction]
-pub(crate) fn _flight(py: Python<'_>, told: Told, columns: Py<PyDict>) -> PyResult<PyFlight> {
+pub(crate) fn _flight(py: Python<'_>, told: FlightSummary, columns: Py<PyDict>) -> PyResult<PyFlight> {
     let kept = PyOnceLock::new();
     // Cannot fail, since the cell is new and empty.
     let _ = kept.set(py, columns);
@@ -76,13 +76,13 @@ impl PyFlight {
 
     /// Time [s] and reason of the vehicle's loss; None if it was not lost.
     #[getter]
-    fn lost(&self) -> Option<When> {
+    fn lost(&self) -> Option<TimedReason> {
         self.told.3.clone()
     }
 
     /// Time [s] and reason of the monitor's switch to the fallback law; None if it did not switch.
     #[getter]
-    fn tripped(&self) -> Option<When> {
+    fn tripped(&self) -> Option<TimedReason> {
         self.told.4.clone()
     }
 
@@ -108,7 +108,7 @@ impl PyFlight {
         Ok(columns.bind(py).clone())
     }
 
-    fn __getitem__<'py>(&self, py: Python<'py>, column: Given<'py, String>) -> PyResult<Bound<'py, PyAny>> {
+    fn __getitem__<'py>(&self, py: Python<'py>, column: CallArg<'py, String>) -> PyResult<Bound<'py, PyAny>> {
         let column = column.named("column")?;
         let columns = self.columns(py)?;
         columns.get_item(&column)?.ok_or_else(|| {
@@ -121,7 +121,7 @@ impl PyFlight {
         self.told.2
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<PickledFlight<'py>> {
         Ok((py.import("afbc._afbc")?.getattr("_flight")?, (self.told.clone(), self.columns(py)?)))
     }
 
@@ -173,7 +173,7 @@ fn named(metrics: &Metrics) -> Vec<(&'static str, Option<f64>)> {
 }
 
 /// Returns the rate of log rows.
-fn log_rate(log_hz: Option<&Given<'_, u64>>, scenario: &Scenario) -> PyResult<LogRate> {
+fn log_rate(log_hz: Option<&CallArg<'_, u64>>, scenario: &Scenario) -> PyResult<LogRate> {
     match log_hz.map(|log_hz| log_hz.within("log_hz", 1..=1000)).transpose()? {
         Some(hz) => hz.to_string().parse().map_err(|problem| error(format!("log_hz {hz}: {problem}"))),
         None => Ok(LogRate::usual(scenario.duration_s)),
@@ -181,7 +181,7 @@ fn log_rate(log_hz: Option<&Given<'_, u64>>, scenario: &Scenario) -> PyResult<Lo
 }
 
 /// Returns the names of the argument `controllers`; none if it was not given.
-fn chosen(controllers: Option<&Given<'_, Vec<String>>>) -> PyResult<Option<Vec<String>>> {
+fn chosen(controllers: Option<&CallArg<'_, Vec<String>>>) -> PyResult<Option<Vec<String>>> {
     match optional(controllers, "controllers")? {
         Some(names) if names.is_empty() => {
             Err(error("controllers: none named; name one, or leave it out for the scenario's own"))
@@ -191,7 +191,12 @@ fn chosen(controllers: Option<&Given<'_, Vec<String>>>) -> PyResult<Option<Vec<S
 }
 
 /// Flies one flight, unless the work is interrupted.
-fn flown(scenario: &Scenario, contender: &Contender, log_every: u64, watch: &Watch) -> Result<FlightResult, String> {
+fn flown(
+    scenario: &Scenario,
+    contender: &Contender,
+    log_every: u64,
+    watch: &WorkProgress,
+) -> Result<FlightResult, String> {
     let run = FlightResult::fly_unless(scenario, contender, log_every, || watch.is_over())
         .map_err(|error| error.to_string())?;
     if watch.is_over() {
@@ -212,13 +217,13 @@ fn flown(scenario: &Scenario, contender: &Contender, log_every: u64, watch: &Wat
 #[expect(clippy::too_many_arguments, reason = "each by its name")]
 pub(crate) fn fly<'py>(
     py: Python<'py>,
-    scenario: Given<'py, ScenarioArgument<'py>>,
-    controllers: Option<Given<'py, Vec<String>>>,
-    vehicle: Option<Given<'py, VehicleArgument<'py>>>,
-    seed: Option<Given<'py, u64>>,
-    duration_s: Option<Given<'py, f64>>,
-    log_hz: Option<Given<'py, u64>>,
-    threads: Option<Given<'py, u64>>,
+    scenario: CallArg<'py, ScenarioArgument<'py>>,
+    controllers: Option<CallArg<'py, Vec<String>>>,
+    vehicle: Option<CallArg<'py, VehicleArgument<'py>>>,
+    seed: Option<CallArg<'py, u64>>,
+    duration_s: Option<CallArg<'py, f64>>,
+    log_hz: Option<CallArg<'py, u64>>,
+    threads: Option<CallArg<'py, u64>>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let mut scenario = scenario.named("scenario")?.scenario()?;
@@ -243,7 +248,7 @@ pub(crate) fn fly<'py>(
 }
 
 /// Result of one flight of a comparison.
-struct Outcome<'a> {
+struct ComparedFlight<'a> {
     scenario: &'a str,
     contender: &'a str,
     seed: u64,
@@ -251,12 +256,12 @@ struct Outcome<'a> {
 }
 
 /// A planned flight of a comparison: scenario, contender and seed.
-type Planned<'a> = (&'a Scenario, &'a Contender, u64);
+type PlannedFlight<'a> = (&'a Scenario, &'a Contender, u64);
 
-impl<'a> Outcome<'a> {
-    fn of((scenario, contender, seed): &Planned<'a>, watch: &Watch) -> Result<Self, String> {
+impl<'a> ComparedFlight<'a> {
+    fn of((scenario, contender, seed): &PlannedFlight<'a>, watch: &WorkProgress) -> Result<Self, String> {
         let run = flown(&Scenario { seed: *seed, ..(*scenario).clone() }, contender, u64::MAX, watch)?;
-        Ok(Outcome { scenario: &scenario.name, contender: &contender.name, seed: *seed, run })
+        Ok(ComparedFlight { scenario: &scenario.name, contender: &contender.name, seed: *seed, run })
     }
 }
 
@@ -266,11 +271,11 @@ impl<'a> Outcome<'a> {
 #[pyo3(signature = (scenarios, controllers=None, *, vehicle=None, seeds=None, threads=None, progress=None))]
 pub(crate) fn compare<'py>(
     py: Python<'py>,
-    scenarios: Given<'py, Vec<ScenarioArgument<'py>>>,
-    controllers: Option<Given<'py, Vec<String>>>,
-    vehicle: Option<Given<'py, VehicleArgument<'py>>>,
-    seeds: Option<Given<'py, u64>>,
-    threads: Option<Given<'py, u64>>,
+    scenarios: CallArg<'py, Vec<ScenarioArgument<'py>>>,
+    controllers: Option<CallArg<'py, Vec<String>>>,
+    vehicle: Option<CallArg<'py, VehicleArgument<'py>>>,
+    seeds: Option<CallArg<'py, u64>>,
+    threads: Option<CallArg<'py, u64>>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let scenarios = scenarios.named("scenarios")?;
@@ -293,7 +298,7 @@ pub(crate) fn compare<'py>(
     let seeds = seeds.map(|seeds| seeds.within("seeds", 1..=SEEDS_MAX)).transpose()?;
     let planned = planned(&scenarios, seeds)?;
     let outcomes = watched(py, argument::threads(threads.as_ref())?, progress.as_ref(), |watch| {
-        planned.par_iter().map(|planned| Outcome::of(planned, watch)).collect::<Result<Vec<_>, _>>()
+        planned.par_iter().map(|planned| ComparedFlight::of(planned, watch)).collect::<Result<Vec<_>, _>>()
     })?;
     rows(py, &outcomes.map_err(error)?)
 }
@@ -302,7 +307,7 @@ pub(crate) fn compare<'py>(
 const SEEDS_MAX: u64 = 10_000;
 
 /// Returns the flights of a comparison, ordered by scenario, contender and seed.
-fn planned(scenarios: &[Scenario], seeds: Option<u64>) -> PyResult<Vec<Planned<'_>>> {
+fn planned(scenarios: &[Scenario], seeds: Option<u64>) -> PyResult<Vec<PlannedFlight<'_>>> {
     let mut planned = Vec::new();
     for scenario in scenarios {
         let seeds = seeds.unwrap_or_else(|| comparison::usual_seeds(scenario));
@@ -317,12 +322,12 @@ fn planned(scenarios: &[Scenario], seeds: Option<u64>) -> PyResult<Vec<Planned<'
 }
 
 /// Returns the results as columns.
-fn rows<'py>(py: Python<'py>, outcomes: &[Outcome<'_>]) -> PyResult<Bound<'py, PyDict>> {
+fn rows<'py>(py: Python<'py>, outcomes: &[ComparedFlight<'_>]) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("scenario", outcomes.iter().map(|outcome| outcome.scenario).collect::<Vec<_>>())?;
     dict.set_item("contender", outcomes.iter().map(|outcome| outcome.contender).collect::<Vec<_>>())?;
     dict.set_item("seed", outcomes.iter().map(|outcome| outcome.seed).collect::<Vec<_>>().to_pyarray(py))?;
-    let lost = |outcome: &Outcome<'_>| outcome.run.lost;
+    let lost = |outcome: &ComparedFlight<'_>| outcome.run.lost;
     let lost_at = outcomes.iter().map(|outcome| lost(outcome).map_or(f64::NAN, |lost| lost.time_s));
     dict.set_item("lost_at_s", PyArray1::from_iter(py, lost_at))?;
     let reasons = outcomes.iter().map(|outcome| lost(outcome).map(|lost| lost.reason));

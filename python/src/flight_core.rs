@@ -1,7 +1,7 @@
 //! The class `FlightCore`: the flight core around a control law, tick by tick.
 
-use crate::argument::{Gains, Given, optional};
-use crate::controller::{Named, PyAction, SetpointArgument, made};
+use crate::argument::{CallArg, NamedGains, optional};
+use crate::controller::{LawChoice, PyAction, SetpointArgument, made};
 use crate::error::error;
 use crate::plant::StateArgument;
 use crate::vehicle::{VehicleArgument, flown};
@@ -20,7 +20,7 @@ const REQUESTS: [(&str, Request); 4] =
     [("arm", Request::Arm), ("disarm", Request::Disarm), ("kill", Request::Kill), ("engage", Request::Engage)];
 
 /// Result of a tick, padded to the largest number of rotors.
-struct Ticked {
+struct TickResult {
     action: Action<ROTORS_MAX>,
     mode: Mode,
     answer: Option<RequestAnswer>,
@@ -29,27 +29,27 @@ struct Ticked {
 }
 
 /// A flight core for any number of rotors, which is fixed when it is made.
-trait AnyCore: Send + Sync {
-    fn tick(&mut self, now_us: u64, inbox: &Inbox) -> Ticked;
+trait DynFlightCore: Send + Sync {
+    fn tick(&mut self, now_us: u64, inbox: &Inbox) -> TickResult;
     fn airborne(&self) -> bool;
     fn rested(&self) -> bool;
 }
 
-struct OfRotors<const N: usize> {
+struct SizedFlightCore<const N: usize> {
     /// The mutex makes the core `Sync`: a user's own law cannot be shared between threads.
     core: Mutex<FlightCore<AnyController<N>, N>>,
     mixer: Mixer<N>,
     memory: FlightCoreMemory<<AnyController<N> as FlightController<N>>::Memory>,
 }
 
-impl<const N: usize> AnyCore for OfRotors<N> {
-    fn tick(&mut self, now_us: u64, inbox: &Inbox) -> Ticked {
+impl<const N: usize> DynFlightCore for SizedFlightCore<N> {
+    fn tick(&mut self, now_us: u64, inbox: &Inbox) -> TickResult {
         let core = self.core.get_mut().unwrap_or_else(PoisonError::into_inner);
         let outcome = core.tick(&mut self.memory, now_us, inbox);
         let inputs = self.mixer.inputs(&outcome.forces);
         let mut action = Action::new(outcome.motors, outcome.forces, inputs, false);
         action.health = outcome.health.control;
-        Ticked {
+        TickResult {
             action: action.padded(),
             mode: outcome.mode,
             answer: outcome.answer,
@@ -83,11 +83,11 @@ pub(crate) fn words(name: &impl Debug) -> String {
 /// states, and disarms.
 #[pyclass(name = "FlightCore", module = "afbc")]
 pub(crate) struct PyFlightCore {
-    core: Box<dyn AnyCore>,
+    core: Box<dyn DynFlightCore>,
     rotors: usize,
     inbox: Inbox,
     now_us: u64,
-    ticked: Option<Ticked>,
+    ticked: Option<TickResult>,
 }
 
 #[pymethods]
@@ -98,20 +98,20 @@ impl PyFlightCore {
     #[pyo3(signature = (law="afbc", vehicle=None, *, monitored=true, gains=None))]
     fn new(
         law: &str,
-        vehicle: Option<Given<'_, VehicleArgument<'_>>>,
+        vehicle: Option<CallArg<'_, VehicleArgument<'_>>>,
         monitored: bool,
-        gains: Option<Given<'_, Gains>>,
+        gains: Option<CallArg<'_, NamedGains>>,
     ) -> PyResult<Self> {
         let vehicle = flown(vehicle.as_ref())?;
-        let Gains(gains) = optional(gains.as_ref(), "gains")?.unwrap_or_default();
-        let named = Named { law, profile: "flight", monitored, gains };
+        let NamedGains(gains) = optional(gains.as_ref(), "gains")?.unwrap_or_default();
+        let named = LawChoice { law, profile: "flight", monitored, gains };
         let (contender, parameters, rotors) = made(&named, Some(&vehicle))?;
         let nominal = parameters.to_f32();
-        let core: Box<dyn AnyCore> = with_rotors!(rotors.len(), N => {
+        let core: Box<dyn DynFlightCore> = with_rotors!(rotors.len(), N => {
             let controller = contender.controller::<N>(&parameters, &rotors).map_err(error)?;
             let mixer = *controller.mixer();
             let core = FlightCore::with_rotors(nominal, &vehicle.response(), vehicle.arming, controller);
-            Ok::<Box<dyn AnyCore>, PyErr>(Box::new(OfRotors {
+            Ok::<Box<dyn DynFlightCore>, PyErr>(Box::new(SizedFlightCore {
                 core: Mutex::new(core.map_err(error)?),
                 mixer,
                 memory: FlightCoreMemory::default(),
@@ -122,7 +122,7 @@ impl PyFlightCore {
 
     /// Requests "arm", "disarm", "kill" or "engage", which takes back a law that the monitor has replaced. The next
     /// step answers.
-    fn request(&mut self, request: Given<'_, String>) -> PyResult<()> {
+    fn request(&mut self, request: CallArg<'_, String>) -> PyResult<()> {
         let request = request.named("request")?;
         let known = REQUESTS.iter().find(|(name, _)| *name == request);
         let (_, value) = known.ok_or_else(|| {

@@ -1,6 +1,6 @@
 //! The class `Guidance`: flight modes, step by step.
 
-use crate::argument::{Given, finite, optional};
+use crate::argument::{CallArg, finite, optional};
 use crate::error::error;
 use crate::flight_core::words;
 use crate::motion::{PySetpoint, vector};
@@ -53,10 +53,10 @@ impl PyGuidance {
     /// Makes the guidance with the settings of this vehicle's file, or of the paper's vehicle, for steps of `dt_s` [s].
     #[new]
     #[pyo3(
-        signature = (vehicle=None, *, dt_s=Given::Default(0.001)),
+        signature = (vehicle=None, *, dt_s=CallArg::Default(0.001)),
         text_signature = "(vehicle=None, *, dt_s=0.001)"
     )]
-    fn new(vehicle: Option<Given<'_, VehicleArgument<'_>>>, dt_s: Given<'_, f64>) -> PyResult<Self> {
+    fn new(vehicle: Option<CallArg<'_, VehicleArgument<'_>>>, dt_s: CallArg<'_, f64>) -> PyResult<Self> {
         let dt_s = step_s(&dt_s)?;
         let vehicle = flown(vehicle.as_ref())?;
         let mass_kg = vehicle.parameters.mass_kg;
@@ -71,7 +71,7 @@ impl PyGuidance {
 
     /// Orders a take-off to a height above the ground where the vehicle stands [m], by default that of the settings.
     #[pyo3(signature = (height_m=None))]
-    fn take_off(&mut self, height_m: Option<Given<'_, f64>>) -> PyResult<()> {
+    fn take_off(&mut self, height_m: Option<CallArg<'_, f64>>) -> PyResult<()> {
         let height_m = optional(height_m.as_ref(), "height_m")?.map(|height_m| finite("height_m", height_m));
         self.order(Order::TakeOff(height_m.transpose()?.map(|height_m| height_m as f32)))
     }
@@ -81,9 +81,9 @@ impl PyGuidance {
     #[pyo3(signature = (position_m, yaw_rad=None, speed_m_s=None))]
     fn go_to(
         &mut self,
-        position_m: Given<'_, [f64; 3]>,
-        yaw_rad: Option<Given<'_, f64>>,
-        speed_m_s: Option<Given<'_, f64>>,
+        position_m: CallArg<'_, [f64; 3]>,
+        yaw_rad: Option<CallArg<'_, f64>>,
+        speed_m_s: Option<CallArg<'_, f64>>,
     ) -> PyResult<()> {
         let position_m = position_m.named("position_m")?;
         // NaN has a meaning here; infinity is refused.
@@ -97,7 +97,7 @@ impl PyGuidance {
     }
 
     /// Orders a flight mode: "hold", "land", "return", or a mode flown by sticks, "position", "altitude", "stabilised".
-    fn select(&mut self, mode: Given<'_, String>) -> PyResult<()> {
+    fn select(&mut self, mode: CallArg<'_, String>) -> PyResult<()> {
         let mode = mode.named("mode")?;
         let known = MODES.into_iter().find(|known| words(known) == mode);
         let known = known.ok_or_else(|| {
@@ -111,12 +111,12 @@ impl PyGuidance {
     /// The middle of the throttle is 0.
     fn sticks(
         &mut self,
-        roll: Given<'_, f64>,
-        pitch: Given<'_, f64>,
-        yaw: Given<'_, f64>,
-        throttle: Given<'_, f64>,
+        roll: CallArg<'_, f64>,
+        pitch: CallArg<'_, f64>,
+        yaw: CallArg<'_, f64>,
+        throttle: CallArg<'_, f64>,
     ) -> PyResult<()> {
-        let stick = |stick: Given<'_, f64>, name| match stick.named(name)? {
+        let stick = |stick: CallArg<'_, f64>, name| match stick.named(name)? {
             value if (-1.0..=1.0).contains(&value) => Ok(value as f32),
             value => Err(error(format!("{name}: {value} given; a stick is within -1 to 1"))),
         };
@@ -137,7 +137,7 @@ impl PyGuidance {
         core: &str,
         airborne: bool,
         rested: bool,
-        thrust_m_s2: Option<Given<'_, f64>>,
+        thrust_m_s2: Option<CallArg<'_, f64>>,
     ) -> PyResult<Option<PySetpoint>> {
         let state = optional(state.as_ref(), "state")?;
         let thrust_m_s2 = optional(thrust_m_s2.as_ref(), "thrust_m_s2")?;

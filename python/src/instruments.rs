@@ -1,6 +1,6 @@
 //! The class `Instruments`: simulated sensors, reading by reading.
 
-use crate::argument::Given;
+use crate::argument::CallArg;
 use crate::error::error;
 use crate::plant::{PyPlant, step_s};
 use crate::scenario::{ScenarioArgument, asked};
@@ -36,14 +36,14 @@ impl PyInstruments {
     /// Makes the instruments of a scenario, by default "outdoor". They are read every `dt_s` [s].
     #[new]
     #[pyo3(
-        signature = (scenario=None, *, vehicle=None, seed=None, dt_s=Given::Default(0.001)),
+        signature = (scenario=None, *, vehicle=None, seed=None, dt_s=CallArg::Default(0.001)),
         text_signature = "(scenario=None, *, vehicle=None, seed=None, dt_s=0.001)"
     )]
     fn new(
-        scenario: Option<Given<'_, ScenarioArgument<'_>>>,
-        vehicle: Option<Given<'_, VehicleArgument<'_>>>,
-        seed: Option<Given<'_, u64>>,
-        dt_s: Given<'_, f64>,
+        scenario: Option<CallArg<'_, ScenarioArgument<'_>>>,
+        vehicle: Option<CallArg<'_, VehicleArgument<'_>>>,
+        seed: Option<CallArg<'_, u64>>,
+        dt_s: CallArg<'_, f64>,
     ) -> PyResult<Self> {
         let scenario = asked(scenario.as_ref(), "outdoor", vehicle.as_ref(), seed.as_ref())?;
         let dt_s = step_s(&dt_s)?;
@@ -59,7 +59,7 @@ impl PyInstruments {
     fn measure<'py>(
         &mut self,
         py: Python<'py>,
-        plant: Given<'py, Bound<'py, PyPlant>>,
+        plant: CallArg<'py, Bound<'py, PyPlant>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let truth = plant.named("plant")?.try_borrow()?.truth();
         let readings = self.instruments.measure(&truth);

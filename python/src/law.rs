@@ -1,6 +1,6 @@
 //! Control laws that users write in Python.
 
-use crate::argument::{Argument, Given, optional, wrong};
+use crate::argument::{Argument, CallArg, optional, wrong};
 use crate::error::error;
 use crate::motion::{PySetpoint, PyState};
 use afbc_scenario::contender::ControllerKind;
@@ -121,7 +121,7 @@ impl PyOwnVehicle {
 }
 
 /// Default, smallest and largest value of a gain.
-type Ranged = (f64, f64, f64);
+type GainRange = (f64, f64, f64);
 
 /// A control law written in Python.
 struct PythonLaw(Option<Py<PyAny>>);
@@ -161,10 +161,10 @@ impl OwnController for PythonLaw {
 #[pyfunction]
 #[pyo3(signature = (name, make, *, title=None, gains=None))]
 pub(crate) fn register(
-    name: Given<'_, String>,
+    name: CallArg<'_, String>,
     make: Bound<'_, PyAny>,
-    title: Option<Given<'_, String>>,
-    gains: Option<Vec<(String, Ranged)>>,
+    title: Option<CallArg<'_, String>>,
+    gains: Option<Vec<(String, GainRange)>>,
 ) -> PyResult<()> {
     let name = name.named("name")?;
     if !make.is_callable() {

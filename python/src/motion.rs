@@ -1,17 +1,17 @@
 //! The classes `State` and `Setpoint`.
 
-use crate::argument::Given;
+use crate::argument::CallArg;
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 use numpy::{PyArray1, ToPyArray};
 use pyo3::prelude::*;
 
-type Array<'py> = Bound<'py, PyArray1<f64>>;
-type Three<'py> = Given<'py, [f64; 3]>;
+type NumpyArray<'py> = Bound<'py, PyArray1<f64>>;
+type Vector3Argument<'py> = CallArg<'py, [f64; 3]>;
 const ZERO: [f64; 3] = [0.0; 3];
 
 /// Returns the three numbers as an array of doubles, which hold singles exactly.
-pub(crate) fn array<'py>(py: Python<'py>, vector: &Vector3<f32>) -> Array<'py> {
+pub(crate) fn array<'py>(py: Python<'py>, vector: &Vector3<f32>) -> NumpyArray<'py> {
     [vector.x, vector.y, vector.z].map(f64::from).to_pyarray(py)
 }
 
@@ -30,14 +30,14 @@ pub(crate) struct PyState(pub(crate) State);
 impl PyState {
     #[new]
     #[pyo3(signature = (
-        position_m=Given::Default(ZERO), velocity_m_s=Given::Default(ZERO), attitude_rad=Given::Default(ZERO),
-        rates_rad_s=Given::Default(ZERO)
+        position_m=CallArg::Default(ZERO), velocity_m_s=CallArg::Default(ZERO), attitude_rad=CallArg::Default(ZERO),
+        rates_rad_s=CallArg::Default(ZERO)
     ))]
     fn new(
-        position_m: Three<'_>,
-        velocity_m_s: Three<'_>,
-        attitude_rad: Three<'_>,
-        rates_rad_s: Three<'_>,
+        position_m: Vector3Argument<'_>,
+        velocity_m_s: Vector3Argument<'_>,
+        attitude_rad: Vector3Argument<'_>,
+        rates_rad_s: Vector3Argument<'_>,
     ) -> PyResult<Self> {
         Ok(PyState(State {
             position_m: vector(position_m.named("position_m")?),
@@ -50,35 +50,35 @@ impl PyState {
     fn __reduce__<'py>(
         &self,
         py: Python<'py>,
-    ) -> (Bound<'py, PyAny>, (Array<'py>, Array<'py>, Array<'py>, Array<'py>)) {
+    ) -> (Bound<'py, PyAny>, (NumpyArray<'py>, NumpyArray<'py>, NumpyArray<'py>, NumpyArray<'py>)) {
         let State { position_m, velocity_m_s, attitude_rad, rates_rad_s } = &self.0;
         let [x, v, eta, omega] = [position_m, velocity_m_s, attitude_rad, rates_rad_s].map(|part| array(py, part));
         (py.get_type::<PyState>().into_any(), (x, v, eta, omega))
     }
 
     #[getter]
-    fn position_m<'py>(&self, py: Python<'py>) -> Array<'py> {
+    fn position_m<'py>(&self, py: Python<'py>) -> NumpyArray<'py> {
         array(py, &self.0.position_m)
     }
 
     #[getter]
-    fn velocity_m_s<'py>(&self, py: Python<'py>) -> Array<'py> {
+    fn velocity_m_s<'py>(&self, py: Python<'py>) -> NumpyArray<'py> {
         array(py, &self.0.velocity_m_s)
     }
 
     #[getter]
-    fn attitude_rad<'py>(&self, py: Python<'py>) -> Array<'py> {
+    fn attitude_rad<'py>(&self, py: Python<'py>) -> NumpyArray<'py> {
         array(py, &self.0.attitude_rad)
     }
 
     #[getter]
-    fn rates_rad_s<'py>(&self, py: Python<'py>) -> Array<'py> {
+    fn rates_rad_s<'py>(&self, py: Python<'py>) -> NumpyArray<'py> {
         array(py, &self.0.rates_rad_s)
     }
 
     /// All twelve numbers in this order, as an optimiser or a neural network needs them.
     #[getter]
-    fn vector<'py>(&self, py: Python<'py>) -> Array<'py> {
+    fn vector<'py>(&self, py: Python<'py>) -> NumpyArray<'py> {
         numbers(&self.0).to_pyarray(py)
     }
 
@@ -103,7 +103,8 @@ pub(crate) fn numbers(state: &State) -> [f64; 12] {
 }
 
 /// Numbers of a setpoint, in the order of its constructor.
-type Numbers<'py> = (Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>, f32, f32, f32);
+type SetpointNumbers<'py> =
+    (NumpyArray<'py>, NumpyArray<'py>, NumpyArray<'py>, NumpyArray<'py>, NumpyArray<'py>, f32, f32, f32);
 
 /// Desired motion in the earth frame: position with four derivatives, heading with two.
 #[pyclass(name = "Setpoint", module = "afbc", frozen, from_py_object)]
@@ -115,23 +116,24 @@ impl PySetpoint {
     #[new]
     #[pyo3(
         signature = (
-            position_m=Given::Default(ZERO), velocity_m_s=Given::Default(ZERO), acceleration_m_s2=Given::Default(ZERO),
-            jerk_m_s3=Given::Default(ZERO), snap_m_s4=Given::Default(ZERO), yaw_rad=Given::Default(0.0),
-            yaw_rate_rad_s=Given::Default(0.0), yaw_acceleration_rad_s2=Given::Default(0.0)
+            position_m=CallArg::Default(ZERO), velocity_m_s=CallArg::Default(ZERO),
+            acceleration_m_s2=CallArg::Default(ZERO), jerk_m_s3=CallArg::Default(ZERO),
+            snap_m_s4=CallArg::Default(ZERO), yaw_rad=CallArg::Default(0.0),
+            yaw_rate_rad_s=CallArg::Default(0.0), yaw_acceleration_rad_s2=CallArg::Default(0.0)
         ),
         text_signature = "(position_m=..., velocity_m_s=..., acceleration_m_s2=..., jerk_m_s3=..., snap_m_s4=..., \
                           yaw_rad=0.0, yaw_rate_rad_s=0.0, yaw_acceleration_rad_s2=0.0)"
     )]
     #[expect(clippy::too_many_arguments, reason = "each by its name")]
     fn new(
-        position_m: Three<'_>,
-        velocity_m_s: Three<'_>,
-        acceleration_m_s2: Three<'_>,
-        jerk_m_s3: Three<'_>,
-        snap_m_s4: Three<'_>,
-        yaw_rad: Given<'_, f64>,
-        yaw_rate_rad_s: Given<'_, f64>,
-        yaw_acceleration_rad_s2: Given<'_, f64>,
+        position_m: Vector3Argument<'_>,
+        velocity_m_s: Vector3Argument<'_>,
+        acceleration_m_s2: Vector3Argument<'_>,
+        jerk_m_s3: Vector3Argument<'_>,
+        snap_m_s4: Vector3Argument<'_>,
+        yaw_rad: CallArg<'_, f64>,
+        yaw_rate_rad_s: CallArg<'_, f64>,
+        yaw_acceleration_rad_s2: CallArg<'_, f64>,
     ) -> PyResult<Self> {
         Ok(PySetpoint(Setpoint {
             position_m: vector(position_m.named("position_m")?),
@@ -145,7 +147,7 @@ impl PySetpoint {
         }))
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> (Bound<'py, PyAny>, Numbers<'py>) {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> (Bound<'py, PyAny>, SetpointNumbers<'py>) {
         let Setpoint { position_m, velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4, .. } = &self.0;
         let Setpoint { yaw_rad, yaw_rate_rad_s, yaw_acceleration_rad_s2, .. } = self.0;
         let [x, v, a, j, s] =
@@ -155,27 +157,27 @@ impl PySetpoint {
     }
 
     #[getter]
-    fn position_m<'py>(&self, py: Python<'py>) -> Array<'py> {
+    fn position_m<'py>(&self, py: Python<'py>) -> NumpyArray<'py> {
         array(py, &self.0.position_m)
     }
 
     #[getter]
-    fn velocity_m_s<'py>(&self, py: Python<'py>) -> Array<'py> {
+    fn velocity_m_s<'py>(&self, py: Python<'py>) -> NumpyArray<'py> {
         array(py, &self.0.velocity_m_s)
     }
 
     #[getter]
-    fn acceleration_m_s2<'py>(&self, py: Python<'py>) -> Array<'py> {
+    fn acceleration_m_s2<'py>(&self, py: Python<'py>) -> NumpyArray<'py> {
         array(py, &self.0.acceleration_m_s2)
     }
 
     #[getter]
-    fn jerk_m_s3<'py>(&self, py: Python<'py>) -> Array<'py> {
+    fn jerk_m_s3<'py>(&self, py: Python<'py>) -> NumpyArray<'py> {
         array(py, &self.0.jerk_m_s3)
     }
 
     #[getter]
-    fn snap_m_s4<'py>(&self, py: Python<'py>) -> Array<'py> {
+    fn snap_m_s4<'py>(&self, py: Python<'py>) -> NumpyArray<'py> {
         array(py, &self.0.snap_m_s4)
     }
 

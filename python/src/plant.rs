@@ -1,6 +1,6 @@
 //! The class `Plant`: the simulated vehicle, step by step.
 
-use crate::argument::{Array, Given, optional};
+use crate::argument::{ArgumentArray, CallArg, optional};
 use crate::error::error;
 use crate::motion::{PySetpoint, PyState};
 use crate::scenario::{ScenarioArgument, asked};
@@ -25,10 +25,10 @@ pub(crate) struct PyPlant {
 }
 
 /// Argument that must be a state.
-pub(crate) type StateArgument<'py> = Given<'py, Bound<'py, PyState>>;
+pub(crate) type StateArgument<'py> = CallArg<'py, Bound<'py, PyState>>;
 
 /// Returns the time between steps of the argument `dt_s`.
-pub(crate) fn step_s(dt_s: &Given<'_, f64>) -> PyResult<f64> {
+pub(crate) fn step_s(dt_s: &CallArg<'_, f64>) -> PyResult<f64> {
     let dt_s = dt_s.named("dt_s")?;
     Settings::DT.range.check(dt_s).map_err(error)?;
     Ok(dt_s)
@@ -83,14 +83,14 @@ impl PyPlant {
     /// Makes the world of a scenario, by default "hover", for steps of `dt_s` [s].
     #[new]
     #[pyo3(
-        signature = (scenario=None, *, vehicle=None, seed=None, dt_s=Given::Default(0.001)),
+        signature = (scenario=None, *, vehicle=None, seed=None, dt_s=CallArg::Default(0.001)),
         text_signature = "(scenario=None, *, vehicle=None, seed=None, dt_s=0.001)"
     )]
     fn new(
-        scenario: Option<Given<'_, ScenarioArgument<'_>>>,
-        vehicle: Option<Given<'_, VehicleArgument<'_>>>,
-        seed: Option<Given<'_, u64>>,
-        dt_s: Given<'_, f64>,
+        scenario: Option<CallArg<'_, ScenarioArgument<'_>>>,
+        vehicle: Option<CallArg<'_, VehicleArgument<'_>>>,
+        seed: Option<CallArg<'_, u64>>,
+        dt_s: CallArg<'_, f64>,
     ) -> PyResult<Self> {
         let scenario = asked(scenario.as_ref(), "hover", vehicle.as_ref(), seed.as_ref())?;
         let dt_s = step_s(&dt_s)?;
@@ -100,7 +100,7 @@ impl PyPlant {
 
     /// Restarts the world, optionally with another seed or from another motion.
     #[pyo3(signature = (seed=None, state=None))]
-    fn reset(&mut self, seed: Option<Given<'_, u64>>, state: Option<StateArgument<'_>>) -> PyResult<()> {
+    fn reset(&mut self, seed: Option<CallArg<'_, u64>>, state: Option<StateArgument<'_>>) -> PyResult<()> {
         let state = optional(state.as_ref(), "state")?;
         let mut scenario = begun(&self.scenario, state.as_ref().map(Bound::get))?;
         scenario.seed = crate::argument::seed(seed.as_ref())?.unwrap_or(scenario.seed);
@@ -110,7 +110,7 @@ impl PyPlant {
     }
 
     /// Moves the vehicle by one step with these commanded rotor speeds [rad/s], shape (rotors,).
-    fn step(&mut self, speeds_rad_s: Given<'_, Array>) -> PyResult<()> {
+    fn step(&mut self, speeds_rad_s: CallArg<'_, ArgumentArray>) -> PyResult<()> {
         let rotors = self.scenario.rotors.len();
         let speeds = speeds_rad_s.named("speeds_rad_s")?.shaped("speeds_rad_s", [Some(rotors)])?;
         self.world.advance(&commands(&speeds)?);

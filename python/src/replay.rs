@@ -1,6 +1,6 @@
 //! The function `replay`, which runs the estimator over recorded flights.
 
-use crate::argument::Given;
+use crate::argument::CallArg;
 use crate::error::error;
 use crate::work::watched;
 use afbc_replay::EstimatorStart;
@@ -12,7 +12,7 @@ use std::path::PathBuf;
 /// Runs the estimator over a recorded flight, a ULog of PX4 or of this firmware. Returns its estimate beside the log's,
 /// in the columns of `sitl replay`'s CSV file. NaN marks missing values.
 #[pyfunction]
-pub(crate) fn replay<'py>(py: Python<'py>, log: Given<'py, PathBuf>) -> PyResult<Bound<'py, PyDict>> {
+pub(crate) fn replay<'py>(py: Python<'py>, log: CallArg<'py, PathBuf>) -> PyResult<Bound<'py, PyDict>> {
     let log = log.named("log")?;
     let replayed = watched(py, None, None, |_| {
         let recording = afbc_replay::read(&log).map_err(|error| error.to_string())?;

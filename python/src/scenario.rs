@@ -1,8 +1,8 @@
 //! The class `Scenario` and the function `scenarios`.
 
-use crate::argument::{Argument, Array, Given, finite, optional, wrong};
+use crate::argument::{Argument, ArgumentArray, CallArg, finite, optional, wrong};
 use crate::error::error;
-use crate::source::Source;
+use crate::source::PickledFile;
 use crate::vehicle::{PyVehicle, VehicleArgument};
 use afbc::Profile;
 use afbc_campaign::subject;
@@ -21,19 +21,19 @@ use std::path::PathBuf;
 #[pyclass(name = "Scenario", module = "afbc", frozen)]
 pub(crate) struct PyScenario {
     pub(crate) scenario: Scenario,
-    source: Source,
+    source: PickledFile,
     /// Changes made by `replace`, in order.
-    changes: Vec<Change>,
+    changes: Vec<ScenarioChange>,
 }
 
 /// Start and length [s] of a piece of a path, and its coefficients.
-type Piece<'py> = (f64, f64, Bound<'py, PyArray2<f64>>);
+type PathPiece<'py> = (f64, f64, Bound<'py, PyArray2<f64>>);
 
 /// A change by `replace`: vehicle, seed, length [s].
-type Change = (Option<Py<PyVehicle>>, Option<u64>, Option<f64>);
+type ScenarioChange = (Option<Py<PyVehicle>>, Option<u64>, Option<f64>);
 
 /// Data that `pickle` keeps of a scenario.
-type Kept = (String, String, String, Vec<Change>);
+type PickledScenario = (String, String, String, Vec<ScenarioChange>);
 
 /// A scenario, or the name or path of one.
 #[derive(Clone)]
@@ -64,10 +64,10 @@ impl ScenarioArgument<'_> {
 /// Returns the scenario of the argument `scenario`, by default the built-in one called `usual`, with the vehicle and
 /// seed replaced if given.
 pub(crate) fn asked(
-    scenario: Option<&Given<'_, ScenarioArgument<'_>>>,
+    scenario: Option<&CallArg<'_, ScenarioArgument<'_>>>,
     usual: &str,
-    vehicle: Option<&Given<'_, VehicleArgument<'_>>>,
-    seed: Option<&Given<'_, u64>>,
+    vehicle: Option<&CallArg<'_, VehicleArgument<'_>>>,
+    seed: Option<&CallArg<'_, u64>>,
 ) -> PyResult<Scenario> {
     let scenario = optional(scenario, "scenario")?.unwrap_or_else(|| ScenarioArgument::Path(usual.into()));
     let vehicle = crate::vehicle::given(vehicle)?;
@@ -94,13 +94,13 @@ pub(crate) fn changed(
 }
 
 /// Makes the scenario of this source.
-fn of(source: Source) -> PyResult<PyScenario> {
+fn of(source: PickledFile) -> PyResult<PyScenario> {
     let scenario = afbc_scenario::parse(&source.file, &source.text, &source.name).map_err(error)?;
     Ok(PyScenario { scenario, source, changes: Vec::new() })
 }
 
 impl PyScenario {
-    fn changed(&self, py: Python<'_>, change: Change) -> PyResult<Self> {
+    fn changed(&self, py: Python<'_>, change: ScenarioChange) -> PyResult<Self> {
         let (vehicle, seed, duration_s) = &change;
         let vehicle = vehicle.as_ref().map(|vehicle| &vehicle.get().vehicle);
         let scenario = changed(self.scenario.clone(), vehicle, *seed, *duration_s)?;
@@ -109,7 +109,7 @@ impl PyScenario {
     }
 }
 
-fn copied(py: Python<'_>, (vehicle, seed, duration_s): &Change) -> Change {
+fn copied(py: Python<'_>, (vehicle, seed, duration_s): &ScenarioChange) -> ScenarioChange {
     (vehicle.as_ref().map(|vehicle| vehicle.clone_ref(py)), *seed, *duration_s)
 }
 
@@ -120,28 +120,28 @@ pub(crate) fn _scenario(
     file: String,
     text: String,
     name: String,
-    changes: Vec<Change>,
+    changes: Vec<ScenarioChange>,
 ) -> PyResult<PyScenario> {
-    let scenario = of(Source { file, text, name })?;
+    let scenario = of(PickledFile { file, text, name })?;
     changes.into_iter().try_fold(scenario, |scenario, change| scenario.changed(py, change))
 }
 
 #[pymethods]
 impl PyScenario {
     #[new]
-    fn new(name: Given<'_, PathBuf>) -> PyResult<Self> {
+    fn new(name: CallArg<'_, PathBuf>) -> PyResult<Self> {
         let path = name.named("name")?;
         // Reads as the command line does first, since its errors show the path as given.
         subject::scenario(&path).map_err(error)?;
         let text = |name: &str| afbc_scenario::built_in(name).map(|known| known.text);
-        of(Source::at(&path, "scenario", text).map_err(error)?)
+        of(PickledFile::at(&path, "scenario", text).map_err(error)?)
     }
 
     /// Reads the text of a scenario file (TOML).
     #[staticmethod]
     #[pyo3(signature = (text, name="scenario"))]
     fn from_toml(text: &str, name: &str) -> PyResult<Self> {
-        of(Source { file: name.into(), text: text.into(), name: name.into() })
+        of(PickledFile { file: name.into(), text: text.into(), name: name.into() })
     }
 
     /// Returns the scenario with another vehicle, seed or length.
@@ -149,9 +149,9 @@ impl PyScenario {
     fn replace(
         &self,
         py: Python<'_>,
-        vehicle: Option<Given<'_, VehicleArgument<'_>>>,
-        seed: Option<Given<'_, u64>>,
-        duration_s: Option<Given<'_, f64>>,
+        vehicle: Option<CallArg<'_, VehicleArgument<'_>>>,
+        seed: Option<CallArg<'_, u64>>,
+        duration_s: Option<CallArg<'_, f64>>,
     ) -> PyResult<Self> {
         let vehicle = match optional(vehicle.as_ref(), "vehicle")? {
             Some(VehicleArgument::Vehicle(vehicle)) => Some(vehicle.unbind()),
@@ -162,9 +162,9 @@ impl PyScenario {
         self.changed(py, (vehicle, seed, optional(duration_s.as_ref(), "duration_s")?))
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Kept)> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, PickledScenario)> {
         let (file, text, name) = self.source.clone().into_texts();
-        let changes: Vec<Change> = self.changes.iter().map(|change| copied(py, change)).collect();
+        let changes: Vec<ScenarioChange> = self.changes.iter().map(|change| copied(py, change)).collect();
         Ok((py.import("afbc._afbc")?.getattr("_scenario")?, (file, text, name, changes)))
     }
 
@@ -218,7 +218,7 @@ impl PyScenario {
     /// coefficients of x, y, z, yaw. The lowest power comes first, over the time since the piece's start. None for
     /// other trajectories.
     #[getter]
-    fn polynomials<'py>(&self, py: Python<'py>) -> PyResult<Option<Vec<Piece<'py>>>> {
+    fn polynomials<'py>(&self, py: Python<'py>) -> PyResult<Option<Vec<PathPiece<'py>>>> {
         let Trajectory::Polynomials(pieces) = &self.scenario.trajectory else { return Ok(None) };
         let piece = |piece: &PolynomialPiece| {
             let coefficients: Vec<f64> = piece.coefficients.iter().flatten().copied().collect();
@@ -230,7 +230,7 @@ impl PyScenario {
 
     /// Returns the reference at these times [s]: a column for each coordinate and derivative, named as in a flight's
     /// log.
-    fn reference<'py>(&self, py: Python<'py>, time_s: Given<'py, Array>) -> PyResult<Bound<'py, PyDict>> {
+    fn reference<'py>(&self, py: Python<'py>, time_s: CallArg<'py, ArgumentArray>) -> PyResult<Bound<'py, PyDict>> {
         let times_s = time_s.named("time_s")?.shaped("time_s", [None])?;
         times_s.iter().try_for_each(|time_s| finite("time_s", *time_s).map(drop))?;
         let at: Vec<Reference> = times_s.iter().map(|time_s| self.scenario.trajectory.at(*time_s)).collect();

@@ -5,7 +5,7 @@ use std::path::Path;
 
 /// The text of a file and its names.
 #[derive(Clone)]
-pub(crate) struct Source {
+pub(crate) struct PickledFile {
     /// Path of the file, to which paths in the text are relative.
     pub(crate) file: String,
     pub(crate) text: String,
@@ -13,7 +13,7 @@ pub(crate) struct Source {
     pub(crate) name: String,
 }
 
-impl Source {
+impl PickledFile {
     /// Reads a built-in file of this `kind` if `path` is a plain name known to `built_in`, or else the file at `path`.
     pub(crate) fn at(
         path: &Path,
@@ -22,12 +22,12 @@ impl Source {
     ) -> Result<Self, FileError> {
         let plain = path.to_str().filter(|text| !text.contains(['/', '\\', '.']));
         if let Some((name, text)) = plain.and_then(|name| Some((name, built_in(name)?))) {
-            return Ok(Source { file: format!("built-in {name}"), text: text.into(), name: name.into() });
+            return Ok(PickledFile { file: format!("built-in {name}"), text: text.into(), name: name.into() });
         }
         let text = afbc_files::read::text(path, kind)?;
         let file = std::path::absolute(path).unwrap_or_else(|_| path.into()).display().to_string();
         let name = path.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
-        Ok(Source { file, text, name })
+        Ok(PickledFile { file, text, name })
     }
 
     /// Returns file, text and name.

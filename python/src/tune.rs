@@ -1,6 +1,6 @@
 //! The function `tune`, which searches for gains.
 
-use crate::argument::{self, Given, SEEDS, optional};
+use crate::argument::{self, CallArg, SEEDS, optional};
 use crate::error::error;
 use crate::scenario::ScenarioArgument;
 use crate::vehicle::{self, VehicleArgument};
@@ -19,8 +19,8 @@ use pyo3::types::PyDict;
 #[pyfunction]
 #[pyo3(
     signature = (
-        law, scenarios=None, *, vehicle=None, budget=Given::Default(1000), seed=Given::Default(1),
-        step=Given::Default(search::STEP), flying=false, threads=None, progress=None
+        law, scenarios=None, *, vehicle=None, budget=CallArg::Default(1000), seed=CallArg::Default(1),
+        step=CallArg::Default(search::STEP), flying=false, threads=None, progress=None
     ),
     text_signature = "(law, scenarios=None, *, vehicle=None, budget=1000, seed=1, step=..., flying=False, \
                       threads=None, progress=None)"
@@ -28,14 +28,14 @@ use pyo3::types::PyDict;
 #[expect(clippy::too_many_arguments, reason = "each by its name")]
 pub(crate) fn tune<'py>(
     py: Python<'py>,
-    law: Given<'py, String>,
-    scenarios: Option<Given<'py, Vec<ScenarioArgument<'py>>>>,
-    vehicle: Option<Given<'py, VehicleArgument<'py>>>,
-    budget: Given<'py, u64>,
-    seed: Given<'py, u64>,
-    step: Given<'py, f64>,
+    law: CallArg<'py, String>,
+    scenarios: Option<CallArg<'py, Vec<ScenarioArgument<'py>>>>,
+    vehicle: Option<CallArg<'py, VehicleArgument<'py>>>,
+    budget: CallArg<'py, u64>,
+    seed: CallArg<'py, u64>,
+    step: CallArg<'py, f64>,
     flying: bool,
-    threads: Option<Given<'py, u64>>,
+    threads: Option<CallArg<'py, u64>>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let law = law.named("law")?;

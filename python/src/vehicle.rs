@@ -1,8 +1,8 @@
 //! The class `Vehicle` and the function `vehicles`.
 
-use crate::argument::{Argument, Given, wrong};
+use crate::argument::{Argument, CallArg, wrong};
 use crate::error::error;
-use crate::source::Source;
+use crate::source::PickledFile;
 use afbc_types::Parameters;
 use afbc_vehicles::{BUILT_IN, Vehicle};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 #[pyclass(name = "Vehicle", module = "afbc", frozen)]
 pub(crate) struct PyVehicle {
     pub(crate) vehicle: Vehicle,
-    source: Source,
+    source: PickledFile,
 }
 
 /// A vehicle, or the name or path of one.
@@ -45,17 +45,17 @@ impl VehicleArgument<'_> {
 }
 
 /// Returns the vehicle of the argument `vehicle`; none if it was not given.
-pub(crate) fn given(vehicle: Option<&Given<'_, VehicleArgument<'_>>>) -> PyResult<Option<Vehicle>> {
+pub(crate) fn given(vehicle: Option<&CallArg<'_, VehicleArgument<'_>>>) -> PyResult<Option<Vehicle>> {
     crate::argument::optional(vehicle, "vehicle")?.map(|vehicle| vehicle.vehicle()).transpose()
 }
 
 /// Returns the vehicle of the argument `vehicle`, by default the paper's.
-pub(crate) fn flown(vehicle: Option<&Given<'_, VehicleArgument<'_>>>) -> PyResult<Vehicle> {
+pub(crate) fn flown(vehicle: Option<&CallArg<'_, VehicleArgument<'_>>>) -> PyResult<Vehicle> {
     given(vehicle)?.map_or_else(|| afbc_scenario::vehicle_named(Path::new("paper")).map_err(error), Ok)
 }
 
 /// Makes the vehicle of this source.
-fn of(source: Source) -> PyResult<PyVehicle> {
+fn of(source: PickledFile) -> PyResult<PyVehicle> {
     let vehicle = afbc_vehicles::parse(&source.file, &source.text, &source.name).map_err(error)?;
     Ok(PyVehicle { vehicle, source })
 }
@@ -65,14 +65,14 @@ impl PyVehicle {
         // Reads as the command line does first, since its errors show the path as given.
         afbc_scenario::vehicle_named(path).map_err(error)?;
         let text = |name: &str| afbc_vehicles::built_in(name).map(|known| known.text);
-        of(Source::at(path, "vehicle", text).map_err(error)?)
+        of(PickledFile::at(path, "vehicle", text).map_err(error)?)
     }
 }
 
 #[pymethods]
 impl PyVehicle {
     #[new]
-    fn new(name: Given<'_, PathBuf>) -> PyResult<Self> {
+    fn new(name: CallArg<'_, PathBuf>) -> PyResult<Self> {
         PyVehicle::at(&name.named("name")?)
     }
 
@@ -80,7 +80,7 @@ impl PyVehicle {
     #[staticmethod]
     #[pyo3(signature = (text, name="vehicle"))]
     fn from_toml(text: &str, name: &str) -> PyResult<Self> {
-        of(Source { file: name.into(), text: text.into(), name: name.into() })
+        of(PickledFile { file: name.into(), text: text.into(), name: name.into() })
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String, String, String))> {
@@ -193,7 +193,7 @@ pub(crate) fn hash(name: &str) -> u64 {
 /// Restores a vehicle from the data that `pickle` kept.
 #[pyfunction]
 pub(crate) fn _vehicle(file: String, text: String, name: String) -> PyResult<PyVehicle> {
-    of(Source { file, text, name })
+    of(PickledFile { file, text, name })
 }
 
 /// Returns the names of the built-in vehicles.

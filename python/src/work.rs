@@ -16,12 +16,12 @@ const PERIOD: Duration = Duration::from_millis(50);
 
 /// Progress of the work, and a request to end it.
 #[derive(Default)]
-pub(crate) struct Watch {
+pub(crate) struct WorkProgress {
     done: AtomicU64,
     stop: AtomicBool,
 }
 
-impl Watch {
+impl WorkProgress {
     /// Adds `count` to the finished units of work.
     pub(crate) fn add(&self, count: u64) {
         self.done.fetch_add(count, Ordering::Relaxed);
@@ -82,9 +82,9 @@ pub(crate) fn watched<T: Send>(
     py: Python<'_>,
     threads: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
-    work: impl FnOnce(&Watch) -> T + Send,
+    work: impl FnOnce(&WorkProgress) -> T + Send,
 ) -> PyResult<T> {
-    let watch = Watch::default();
+    let watch = WorkProgress::default();
     let pool = threads_of(threads.unwrap_or(0))?;
     law::forget_error();
     let ended = thread::scope(|scope| {

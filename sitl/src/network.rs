@@ -14,7 +14,7 @@ const NAP: Duration = Duration::from_micros(200);
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Vehicle at a UDP or TCP port.
-pub(crate) struct Network {
+pub(crate) struct NetworkBoard {
     socket: Socket,
     /// End of the current millisecond.
     deadline: Option<Instant>,
@@ -25,7 +25,7 @@ enum Socket {
     Tcp(TcpStream),
 }
 
-impl Network {
+impl NetworkBoard {
     /// Opens a UDP socket that sends to `address` (HOST:PORT) and receives from there.
     ///
     /// # Errors
@@ -40,7 +40,7 @@ impl Network {
             Ok(socket)
         };
         let socket = connect().map_err(|error: io::Error| format!("udp:{address}: cannot be reached ({error})"))?;
-        Ok(Network { socket: Socket::Udp(socket), deadline: None })
+        Ok(NetworkBoard { socket: Socket::Udp(socket), deadline: None })
     }
 
     /// Connects to the TCP port of `address` (HOST:PORT).
@@ -56,7 +56,7 @@ impl Network {
             Ok(stream)
         };
         let stream = connect().map_err(|error: io::Error| format!("tcp:{address}: cannot be reached ({error})"))?;
-        Ok(Network { socket: Socket::Tcp(stream), deadline: None })
+        Ok(NetworkBoard { socket: Socket::Tcp(stream), deadline: None })
     }
 }
 
@@ -97,7 +97,7 @@ impl Socket {
     }
 }
 
-impl Autopilot for Network {
+impl Autopilot for NetworkBoard {
     fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), Error> {
         let deadline = *self.deadline.get_or_insert_with(Instant::now);
         let mut buffer = [0; 65_536];

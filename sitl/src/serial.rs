@@ -14,28 +14,28 @@ const NAP: Duration = Duration::from_micros(200);
 /// Longest time for the port to accept what is written.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(200);
 /// Number of kill commands sent at the end, since a frame may get lost.
-const FAREWELLS: usize = 3;
+const KILL_REPEATS: usize = 3;
 
 /// Board on a serial port, in real time. Dropping it stops the motors.
-pub(crate) struct Serial {
+pub(crate) struct SerialBoard {
     port: Box<dyn SerialPort>,
     /// End of the current millisecond.
     deadline: Option<Instant>,
     late_max: Duration,
 }
 
-impl Serial {
+impl SerialBoard {
     /// Opens the port `device` at `baud`, 8N1.
     ///
     /// # Errors
     /// If the port cannot be opened, with a message for the user.
     pub(crate) fn open(device: &str, baud: u32) -> Result<Self, String> {
-        Ok(Serial::new(serialport::new(device, baud).timeout(WRITE_TIMEOUT).open().map_err(no_port)?))
+        Ok(SerialBoard::new(serialport::new(device, baud).timeout(WRITE_TIMEOUT).open().map_err(no_port)?))
     }
 
     /// Uses a port that is already open.
     pub(crate) fn new(port: Box<dyn SerialPort>) -> Self {
-        Serial { port, deadline: None, late_max: Duration::ZERO }
+        SerialBoard { port, deadline: None, late_max: Duration::ZERO }
     }
 
     /// Returns the largest delay of this program behind real time, by which states were late.
@@ -62,7 +62,7 @@ impl Serial {
     }
 }
 
-impl Autopilot for Serial {
+impl Autopilot for SerialBoard {
     fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), Error> {
         let deadline = *self.deadline.get_or_insert_with(Instant::now);
         self.listen(deadline, hear).map_err(failed)?;
@@ -73,11 +73,11 @@ impl Autopilot for Serial {
     }
 }
 
-impl Drop for Serial {
+impl Drop for SerialBoard {
     fn drop(&mut self) {
         let mut station = Station::new();
         // Kill, since a vehicle refuses to disarm in the air.
-        (0..FAREWELLS).for_each(|_| station.command(VehicleCommand::Kill));
+        (0..KILL_REPEATS).for_each(|_| station.command(VehicleCommand::Kill));
         // A failure can no longer be reported. A vehicle without states descends by itself.
         let _ = self.port.write_all(&station.take());
         let _ = self.port.flush();
@@ -101,8 +101,8 @@ fn failed(error: io::Error) -> Error {
     Error::Autopilot(format!("the serial port failed ({error}); check the cable").into())
 }
 
-/// Tests over a pseudo-terminal. The board at its other end ticks once per exchange of [`Serial`], so a busy machine
-/// slows both ends alike and changes no result.
+/// Tests over a pseudo-terminal. The board at its other end ticks once per exchange of [`SerialBoard`], so a busy
+/// machine slows both ends alike and changes no result.
 #[cfg(all(test, unix))]
 #[allow(clippy::unwrap_used, reason = "tests")]
 mod tests {
@@ -129,17 +129,17 @@ mod tests {
 
     /// Port, and the board that ticks after each exchange.
     struct Wired<'a> {
-        serial: Serial,
+        serial: SerialBoard,
         board: &'a mut Board,
     }
 
     impl Board {
         /// Creates the board, and the port connected to it.
-        fn new() -> (Self, Serial) {
+        fn new() -> (Self, SerialBoard) {
             let (here, there) = TTYPort::pair().unwrap();
             let wire = there.try_clone_native().unwrap();
             let board = Board { host: Host::new().unwrap(), port: here, _wire: wire, armed: false };
-            (board, Serial::new(Box::new(there)))
+            (board, SerialBoard::new(Box::new(there)))
         }
 
         fn tick(&mut self) {

@@ -204,7 +204,7 @@ fn forged(manifest: &Path, command: &[&str]) {
     let digits = text.rfind("xxh64:").unwrap();
     text.replace_range(digits..digits + seal::OPEN.len(), seal::OPEN);
     let mut bytes = Vec::new();
-    let mut sealing = seal::Sealing::new(&mut bytes);
+    let mut sealing = seal::SealingWriter::new(&mut bytes);
     sealing.write_all(text.as_bytes()).unwrap();
     sealing.finish().unwrap();
     fs::write(manifest, bytes).unwrap();

@@ -2,8 +2,8 @@
 //! file and a store, every bit of the firmware's configuration stays the same.
 #![allow(clippy::unwrap_used, missing_docs)] // tests
 
-use afbc_files::Flash;
-use afbc_files::read::params::{Format, read, written};
+use afbc_files::FlashFile;
+use afbc_files::read::params::{ParameterFormat, read, written};
 use afbc_onboard::parameters::{Kept, ParameterTable, RecordChange};
 use afbc_onboard::{Configuration, Prepared};
 use afbc_store::{RecordName, Store, hash};
@@ -12,7 +12,7 @@ use afbc_vehicles::{BUILT_IN, Vehicle};
 use std::fs;
 use std::path::Path;
 
-fn kept(vehicle: &Vehicle, other: Configuration, format: Format) {
+fn kept(vehicle: &Vehicle, other: Configuration, format: ParameterFormat) {
     let original = vehicle.configuration().unwrap();
     let all = ParameterTable::new(original.clone());
     let text = written(format, &vehicle.name, all.iter().map(|it| (it.name, it.value, it.kind.number())));
@@ -20,7 +20,7 @@ fn kept(vehicle: &Vehicle, other: Configuration, format: Format) {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{}-{format:?}.store", vehicle.name));
     let _ = fs::remove_file(&path);
     let mut table = ParameterTable::new(other.clone());
-    let mut store = Store::open(Flash::open(&path).unwrap(), 0, hash(b"image")).unwrap();
+    let mut store = Store::open(FlashFile::open(&path).unwrap(), 0, hash(b"image")).unwrap();
     store.make_room().unwrap();
     for entry in read("a.params", &text).unwrap() {
         let name = RecordName::new(&entry.name).unwrap();
@@ -30,7 +30,7 @@ fn kept(vehicle: &Vehicle, other: Configuration, format: Format) {
     assert_eq!(table.check(), Ok(()));
     drop(store);
     let (mut found, mut notices) = (ParameterTable::new(other), Vec::new());
-    let mut store = Store::open(Flash::known(&path).unwrap(), 0, hash(b"image")).unwrap();
+    let mut store = Store::open(FlashFile::open_existing(&path).unwrap(), 0, hash(b"image")).unwrap();
     Kept::NOW.load(&mut found, &mut store, |notice| notices.push(notice)).unwrap();
     assert_eq!(notices, []);
     // Debug output shows every bit except those of NaN, which does not occur.
@@ -51,8 +51,8 @@ fn from_a_vehicles_file_through_parameters_and_store_nothing_changes() {
         other.settings.bumpless = !other.settings.bumpless;
         other.estimation.gyro_noise_rad_s_rthz *= 2.0;
         other.gains.z.gamma += 0.1;
-        kept(vehicle, other.clone(), Format::Qgc);
-        kept(vehicle, other, Format::Mavproxy);
+        kept(vehicle, other.clone(), ParameterFormat::Qgc);
+        kept(vehicle, other, ParameterFormat::Mavproxy);
     }
 }
 
@@ -62,10 +62,10 @@ fn from_a_vehicles_file_through_parameters_and_store_nothing_changes() {
 fn a_store_in_a_file_is_whole_and_belongs_to_one_program() {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("shared.store");
     let _ = fs::remove_file(&path);
-    let mut store = Store::open(Flash::open(&path).unwrap(), 0, 1).unwrap();
+    let mut store = Store::open(FlashFile::open(&path).unwrap(), 0, 1).unwrap();
     store.make_room().unwrap();
     store.set(RecordName::new("A").unwrap(), 0, Some(7)).unwrap();
-    assert_eq!(Flash::known(&path).unwrap_err().to_string(), "in use by another program");
+    assert_eq!(FlashFile::open_existing(&path).unwrap_err().to_string(), "in use by another program");
     drop(store);
     // The write was cut in the middle: the second half of the record is missing.
     let mut bytes = fs::read(&path).unwrap();
@@ -74,13 +74,13 @@ fn a_store_in_a_file_is_whole_and_belongs_to_one_program() {
     let record = bytes.get(begin..end).unwrap().to_vec();
     bytes.get_mut(end..end + 14).unwrap().copy_from_slice(record.get(..14).unwrap());
     fs::write(&path, bytes).unwrap();
-    let mut store = Store::open(Flash::known(&path).unwrap(), 0, 1).unwrap();
+    let mut store = Store::open(FlashFile::open_existing(&path).unwrap(), 0, 1).unwrap();
     assert_eq!(store.found().damaged, 1);
     assert_eq!(store.get(RecordName::new("A").unwrap()).unwrap(), Some((0, 7)));
     store.make_room().unwrap();
     store.set(RecordName::new("A").unwrap(), 0, Some(8)).unwrap();
     drop(store);
-    let mut store = Store::open(Flash::known(&path).unwrap(), 0, 1).unwrap();
+    let mut store = Store::open(FlashFile::open_existing(&path).unwrap(), 0, 1).unwrap();
     assert_eq!((store.found().damaged, store.get(RecordName::new("A").unwrap()).unwrap()), (0, Some((0, 8))));
 }
 
@@ -91,7 +91,7 @@ fn a_parameter_under_two_names_has_one_of_its_values() {
     let kept = Kept { renamed: &[("V_WEIGHT", "V_MASS")], ..Kept::NOW };
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("renamed.store");
     let _ = fs::remove_file(&path);
-    let mut store = Store::open(Flash::open(&path).unwrap(), 0, 1).unwrap();
+    let mut store = Store::open(FlashFile::open(&path).unwrap(), 0, 1).unwrap();
     store.make_room().unwrap();
     for (name, value) in [("V_WEIGHT", 0.47_f32), ("V_MASS", 0.5), ("A_Z_THETAMAX", 0.01)] {
         store.set(RecordName::new(name).unwrap(), kept.edition, Some(value.to_bits())).unwrap();

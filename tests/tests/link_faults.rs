@@ -118,7 +118,7 @@ const FOREVER: i64 = i64::MAX;
 // --- Expected results. ---
 
 #[derive(Clone, Copy, Debug)]
-enum Then {
+enum Expected {
     /// Continues to fly within this distance of the reference \[m\].
     Flies(f64),
     /// Coasts and then continues to fly. The distance from the reference stays within the first value, and within the
@@ -147,20 +147,20 @@ struct Case {
     /// Requests after the request to arm.
     requests: &'static [(i64, VehicleCommand)],
     end_ms: i64,
-    then: Then,
+    expected: Expected,
 }
 
-const fn case(name: &'static str, flight: Flight, faults: &'static [Fault], end_ms: i64, then: Then) -> Case {
-    Case { name, flight, faults, requests: &[], end_ms, then }
+const fn case(name: &'static str, flight: Flight, faults: &'static [Fault], end_ms: i64, expected: Expected) -> Case {
+    Case { name, flight, faults, requests: &[], end_ms, expected }
 }
 
 const fn asked(requests: &'static [(i64, VehicleCommand)], case: Case) -> Case {
     Case { requests, ..case }
 }
 
+use Expected::{Flies, GivesUp, Lands, Recovers, Refuses, Resumes, Stays, Stops};
 use Flight::{Hover, Paper};
 use Of::{Answers, Commands, Downlink, Rotors, Setpoints, States, Uplink};
-use Then::{Flies, GivesUp, Lands, Recovers, Refuses, Resumes, Stays, Stops};
 use VehicleCommand::{Arm, Disarm, Kill};
 use What::{
     Delay, Drop, DropSome, Flip, FlipSome, HoldBack, Jitter, KeepEach, Noise, Replay, Reverse, Truncate, Twice,
@@ -468,7 +468,7 @@ fn wrong(case: &Case, seen: &Seen) -> Vec<String> {
     let modes: Vec<_> = seen.modes.iter().map(|(_, mode, _)| *mode).collect();
     let coasted = modes.contains(&Mode::Coasting);
     let (last_ms, last_mode, _) = *seen.modes.last().expect("one at least");
-    match case.then {
+    match case.expected {
         Flies(within_m) => {
             must("it keeps flying".into(), modes == [Mode::Disarmed, Mode::Flying]);
             must(format!("within {within_m} m"), seen.worst_m <= within_m);
@@ -493,7 +493,7 @@ fn wrong(case: &Case, seen: &Seen) -> Vec<String> {
                 "it coasts, descends, disarms".into(),
                 modes.ends_with(&[Mode::Coasting, Mode::Descending, Mode::Disarmed]),
             );
-            let lands = matches!(case.then, Lands(_));
+            let lands = matches!(case.expected, Lands(_));
             must("it disarms on the ground, or in the air".into(), seen.touched_down_before == lands);
             must(
                 format!("it lands at no more than {within_m_s} m/s"),
@@ -535,8 +535,8 @@ fn check(cases: &[Case]) {
         );
         let wrong = wrong(case, &seen);
         if !wrong.is_empty() {
-            let Case { name, faults, then, .. } = case;
-            let _ = writeln!(failures, "{name}, {faults:?}: expected {then:?}: {wrong:?}: {seen:.3?}");
+            let Case { name, faults, expected, .. } = case;
+            let _ = writeln!(failures, "{name}, {faults:?}: expected {expected:?}: {wrong:?}: {seen:.3?}");
         }
     }
     assert!(failures.is_empty(), "\n{failures}");
@@ -552,9 +552,9 @@ fn every_case_ends_as_it_should() {
 /// ones it descends, and it flies on when states have been back for a second.
 #[test]
 fn an_outage_may_come_at_any_time() {
-    let outage = |start_ms: i64, length_ms: i64, end_ms: i64, then: Then| {
+    let outage = |start_ms: i64, length_ms: i64, end_ms: i64, expected: Expected| {
         let faults = vec![(States, start_ms..start_ms + length_ms, Drop)].leak();
-        case("an outage in the paper's flight", Paper, faults, start_ms + end_ms, then)
+        case("an outage in the paper's flight", Paper, faults, start_ms + end_ms, expected)
     };
     let cases: Vec<_> = (500..58_000)
         .step_by(5_100)

@@ -1,7 +1,7 @@
 //! ESC telemetry, from the plant's rotors to stations, the notch filter and the detection of rotor failures.
 
 use afbc::Profile;
-use afbc_campaign::random::{Random, Seen};
+use afbc_campaign::random::{FeedbackSource, RandomFlights};
 use afbc_flight_core::Mode;
 use afbc_guidance::FlightMode;
 use afbc_hil::{Autopilot, Error, Host, MessagePeriods, Station, firmware, fly};
@@ -280,8 +280,8 @@ impl Autopilot for Heard {
 /// raise no alarm.
 #[test]
 fn no_drawn_flight_raises_an_alarm() {
-    for seen in [Seen::Mocap, Seen::Outdoor] {
-        let drawn = Random { seeds: 1..3, flights: 6, seen, vehicles: vehicles() }.draw().unwrap();
+    for seen in [FeedbackSource::Mocap, FeedbackSource::Outdoor] {
+        let drawn = RandomFlights { seeds: 1..3, flights: 6, seen, vehicles: vehicles() }.draw().unwrap();
         let (mut flown, mut lost) = (0, Vec::new());
         for (flight, listens) in drawn.into_iter().zip(LISTENS.into_iter().cycle()) {
             let mut scenario = flight.scenario;

@@ -8,13 +8,13 @@ use afbc_scenario::case::Case;
 use afbc_scenario::paper::scenario;
 use core::ops::ControlFlow;
 use pil::budget::TICK_INSTRUCTIONS_MAX;
-use pil::{Emulator, Image, Twins};
+use pil::{Emulator, FirmwareImage, LockstepPair};
 use std::io::Write as _;
 
 /// Returns the emulator. Returns none, with a message on the terminal, if the test must be skipped. Under CI nothing
 /// may be skipped.
 fn emulator_or_skip() -> Option<Emulator> {
-    match Image::Pil.find().and_then(|image| Emulator::start(&image)) {
+    match FirmwareImage::Pil.find().and_then(|image| Emulator::start(&image)) {
         Ok(emulator) => Some(emulator),
         Err(error) if error.is_missing() && std::env::var_os("CI").is_none() => {
             // println! would not do, since the test harness captures it.
@@ -28,12 +28,12 @@ fn emulator_or_skip() -> Option<Emulator> {
 #[test]
 fn the_papers_flight_is_the_hosts_bit_for_bit() {
     let Some(emulator) = emulator_or_skip() else { return };
-    let mut twins = Twins::new(emulator, Host::new().expect("in range"));
+    let mut lockstep = LockstepPair::new(emulator, Host::new().expect("in range"));
     let paper = scenario(PlantModel::Simplified, Case::DEFAULT).expect("in range");
-    let end = fly(&paper, &mut Station::new(), &mut twins, MessagePeriods::LOCKSTEP, |_| ControlFlow::Continue(()));
+    let end = fly(&paper, &mut Station::new(), &mut lockstep, MessagePeriods::LOCKSTEP, |_| ControlFlow::Continue(()));
     assert_eq!(end.expect("flown"), LoopEnd { lost: None, interrupted: false, disarmed: true });
 
-    let comparison = twins.comparison();
+    let comparison = lockstep.comparison();
     println!("{comparison:#?}");
     assert!(comparison.armed_ticks > 60_000, "{comparison:?}");
     assert!(comparison.bits > 60_000 * 8 * 93, "every tick sends rotor commands: {comparison:?}");

@@ -7,7 +7,7 @@ use afbc_plant::instruments::{BarometerModel, FailureKind, ImuModel, InstrumentF
 use afbc_scenario::{Scenario, built_in};
 use core::ops::ControlFlow;
 use pil::budget::{ESTIMATING_INSTRUCTIONS_MAX, ESTIMATING_INSTRUCTIONS_MEAN};
-use pil::{Emulator, Image, Twins};
+use pil::{Emulator, FirmwareImage, LockstepPair};
 use std::io::Write as _;
 use std::thread;
 
@@ -41,9 +41,9 @@ fn flights() -> Vec<Scenario> {
 }
 
 /// Returns board and host. Returns none, with a message, if the emulator or its image is missing; fails under CI.
-fn twins_or_skip() -> Option<Twins> {
-    match Image::Pil.find().and_then(|image| Emulator::start(&image)) {
-        Ok(emulator) => Some(Twins::new(emulator, Host::new().expect("in range"))),
+fn lockstep_or_skip() -> Option<LockstepPair> {
+    match FirmwareImage::Pil.find().and_then(|image| Emulator::start(&image)) {
+        Ok(emulator) => Some(LockstepPair::new(emulator, Host::new().expect("in range"))),
         Err(error) if error.is_missing() && std::env::var_os("CI").is_none() => {
             // println! would not do, since the test harness captures it.
             let _ = writeln!(std::io::stderr(), "SKIPPED, nothing was tested: {error}");
@@ -55,9 +55,9 @@ fn twins_or_skip() -> Option<Twins> {
 
 /// Flies a scenario on board and host and compares them.
 fn compare(scenario: &Scenario) {
-    let Some(mut twins) = twins_or_skip() else { return };
+    let Some(mut lockstep) = lockstep_or_skip() else { return };
     let mut off_m: f64 = 0.0;
-    let end = fly(scenario, &mut Station::new(), &mut twins, MessagePeriods::LOCKSTEP, |sample| {
+    let end = fly(scenario, &mut Station::new(), &mut lockstep, MessagePeriods::LOCKSTEP, |sample| {
         // The vehicle starts away from the reference.
         let distance_m =
             if sample.time_s < 5.0 { 0.0 } else { (sample.motion.position_m - sample.reference.position_m).norm() };
@@ -65,7 +65,7 @@ fn compare(scenario: &Scenario) {
         ControlFlow::Continue(())
     });
     assert_eq!(end.expect("flown"), LoopEnd { lost: None, interrupted: false, disarmed: true }, "{}", scenario.name);
-    let comparison = twins.comparison();
+    let comparison = lockstep.comparison();
     println!("{}: at most {off_m:.3} m off, {comparison:?}", scenario.name);
     assert!(comparison.armed_ticks as f64 > 1e3 * scenario.duration_s, "{comparison:?}");
     assert_eq!(
@@ -88,10 +88,11 @@ fn what_is_left_of_the_sensors_is_the_hosts_bit_for_bit() {
     scenario.duration_s = 9.0;
     let fault = |failure, start_s| InstrumentFault { failure, start_s, end_s: 9.0, rise_s: 0.0 };
     scenario.instrument_faults = vec![fault(FailureKind::ImuDead, 3.0), fault(FailureKind::TrackerLost, 6.0)];
-    let Some(mut twins) = twins_or_skip() else { return };
-    let end = fly(&scenario, &mut Station::new(), &mut twins, MessagePeriods::LOCKSTEP, |_| ControlFlow::Continue(()));
+    let Some(mut lockstep) = lockstep_or_skip() else { return };
+    let end =
+        fly(&scenario, &mut Station::new(), &mut lockstep, MessagePeriods::LOCKSTEP, |_| ControlFlow::Continue(()));
     let lost = end.expect("flown").lost.expect("nobody knows the attitude");
-    let comparison = twins.comparison();
+    let comparison = lockstep.comparison();
     assert!(lost.time_s > 8.0 && comparison.armed_ticks > 8_000, "{lost:?}, {comparison:?}");
     println!("{comparison:?}");
     assert_eq!((comparison.first_difference, comparison.differing_bits), (None, 0), "{comparison:?}");

@@ -5,7 +5,7 @@ use crate::check::check;
 use crate::fly::images;
 use crate::machine::{EarlyRevision, Machine, Signal};
 use crate::steady::{SteadyPin, floating};
-use crate::wire::Wire;
+use crate::wire::UartWire;
 use afbc_mavlink::telemetry::Telemetry;
 use afbc_mavlink::{Address, Decoder, Downlink};
 use rigless::emulator::{AccessKind, Driver, Host, Settled, Start, Stop, run};
@@ -41,7 +41,7 @@ const TICK: u64 = 1_000_000;
 const START_UP: u64 = 100_000_000;
 
 /// Observations from outside.
-struct Seen {
+struct BootObserver {
     /// Times at which the watchdog was fed \[ns\].
     feeds: Vec<u64>,
     /// Number of samples, for each motor, in which its pin carried a pulse.
@@ -55,7 +55,7 @@ struct Seen {
     floating: Vec<SteadyPin>,
 }
 
-impl<M: Machine> Driver<M> for Seen {
+impl<M: Machine> Driver<M> for BootObserver {
     fn on_settled(&mut self, _: &mut Session<M>, _: &mut dyn Host, settled: Settled) {
         if let Settled::Access { access, value } = settled
             && (access.kind, access.address, value) == (AccessKind::Write, M::WATCHDOG, FEED)
@@ -133,10 +133,10 @@ fn check_early_revision<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> 
 pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
     check_early_revision::<M>(image)?;
     let mut board = M::built()?;
-    let wire = Wire::default();
+    let wire = UartWire::default();
     check(board.attach_link(wire.clone()), "the link is wired")?;
     let (feeds, pulses, floating) = (Vec::new(), vec![0; M::MOTORS.len()], Vec::new());
-    let seen = Seen { feeds, pulses, looks: 0, wrong: Vec::new(), store: 0, floating };
+    let seen = BootObserver { feeds, pulses, looks: 0, wrong: Vec::new(), store: 0, floating };
     let images = images::<M>(image, &[])?;
     let finished = run(Session::new(board, 0, VirtualNanos(LOOK_FROM))?, &Start::new(&images), seen)?;
 
@@ -144,7 +144,7 @@ pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
         println!("the models say: {} {}: {}", told.instance, told.register, told.reason);
     }
 
-    let Seen { feeds, pulses, looks, wrong, store, floating } = &finished.driver;
+    let BootObserver { feeds, pulses, looks, wrong, store, floating } = &finished.driver;
     let bytes = wire.take();
     let (mut messages, mut heartbeats, mut battery_mv) = (0, 0, None);
     Decoder::new(STATION).feed(&bytes, |_, message: Downlink| {

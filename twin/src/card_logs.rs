@@ -7,7 +7,7 @@ use std::path::Path;
 
 /// Log found on a board's storage.
 #[derive(Debug)]
-pub struct CardLog {
+pub struct StorageLog {
     pub name: String,
     pub bytes: usize,
     /// Total duration of the log's dropout records [ms].
@@ -17,7 +17,7 @@ pub struct CardLog {
 }
 
 /// Walks through the records of a log (PX4 User Guide, "ULog File Format"): length, kind, content.
-fn walk(name: String, log: &[u8]) -> CardLog {
+fn walk(name: String, log: &[u8]) -> StorageLog {
     // A file's header has 16 bytes.
     let (mut rest, mut missing_ms) = (log.get(16..).unwrap_or_default(), 0);
     while let Some(([low, high, kind], behind)) = rest.split_first_chunk() {
@@ -27,11 +27,11 @@ fn walk(name: String, log: &[u8]) -> CardLog {
         }
         rest = behind;
     }
-    CardLog { name, bytes: log.len(), missing_ms, rest: rest.len() }
+    StorageLog { name, bytes: log.len(), missing_ms, rest: rest.len() }
 }
 
 /// Writes the stored logs into a folder, and returns their descriptions.
-pub fn save(storage: &dyn LogStorage, folder: &Path) -> Result<Vec<CardLog>, Box<dyn Error>> {
+pub fn save(storage: &dyn LogStorage, folder: &Path) -> Result<Vec<StorageLog>, Box<dyn Error>> {
     fs::create_dir_all(folder)?;
     let mut saved = Vec::new();
     for (name, bytes) in storage.logs()? {

@@ -3,11 +3,11 @@
 //! sector holds.
 
 use crate::check::check;
-use crate::kept::Changes;
+use crate::fault_injection::FaultTarget;
 use crate::machine::{Machine, quiet_usb};
-use crate::random::Random;
-use crate::trouble::Patient;
-use crate::wire::Wire;
+use crate::parameter_flash::ParameterFlash;
+use crate::random::Xorshift;
+use crate::wire::UartWire;
 use afbc_mavlink::{Address, Decoder, Downlink, FRAME_MAX, ParameterName, ParameterRequest, Encoder, Uplink};
 use rigless::emulator::{AccessKind, Driver, Host, Settled, Start, Stop, run};
 use rigless::image::Image;
@@ -62,10 +62,10 @@ enum Pending {
 }
 
 /// Run in which power cuts are simulated: at each cut, the flash content is kept, and the run goes on.
-struct Cut {
+struct PowerCutRun {
     during: During,
-    wire: Wire,
-    random: Random,
+    wire: UartWire,
+    random: Xorshift,
     /// Mean time between two cuts during an erase [ns].
     erase_apart_ns: u64,
     pending: Option<Pending>,
@@ -73,17 +73,17 @@ struct Cut {
     since_ns: u64,
     next_ns: u64,
     is_set: bool,
-    kept: Vec<Kept>,
+    kept: Vec<FlashAtCut>,
 }
 
 /// Flash content at a power cut.
-struct Kept {
+struct FlashAtCut {
     at_ns: u64,
     in_erase: bool,
     bytes: Vec<u8>,
 }
 
-impl Cut {
+impl PowerCutRun {
     fn note(&mut self, address: u64, value: u64, now_ns: u64) {
         if address == CR2 && value & START != 0 {
             self.pending = Some(Pending::Erase(MatekH743::STORE + (value >> SECTOR_AT & 7) * SECTOR));
@@ -146,7 +146,7 @@ impl Cut {
             None => (),
         }
         let in_erase = matches!(self.pending, Some(Pending::Erase(_)));
-        self.kept.push(Kept { at_ns: now_ns, in_erase, bytes });
+        self.kept.push(FlashAtCut { at_ns: now_ns, in_erase, bytes });
         Ok(())
     }
 
@@ -156,7 +156,7 @@ impl Cut {
     }
 }
 
-impl Driver<MatekH743> for Cut {
+impl Driver<MatekH743> for PowerCutRun {
     fn on_settled(&mut self, session: &mut Session<MatekH743>, host: &mut dyn Host, settled: Settled) {
         let now_ns = match settled {
             Settled::Access { access, value } => {
@@ -204,11 +204,11 @@ impl Driver<MatekH743> for Cut {
 }
 
 /// Run that starts the board with the flash content of each cut, and reads the parameters each time.
-struct Starts {
-    wire: Wire,
-    random: Random,
+struct RestartRun {
+    wire: UartWire,
+    random: Xorshift,
     decoder: Decoder<Downlink>,
-    left: std::vec::IntoIter<Kept>,
+    left: std::vec::IntoIter<FlashAtCut>,
     /// Time of the cut, and time of the start after it [ns].
     cut_ns: u64,
     started_ns: u64,
@@ -218,11 +218,11 @@ struct Starts {
     found: Vec<(u64, [Option<f32>; 2])>,
 }
 
-impl Starts {
+impl RestartRun {
     /// Starts the board with the next flash content, and with noise in all memories. Returns `None` after the last
     /// content.
     fn next(&mut self, session: &mut Session<MatekH743>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
-        let Kept { at_ns, bytes, .. } = self.left.next()?;
+        let FlashAtCut { at_ns, bytes, .. } = self.left.next()?;
         for (address, cells) in (MatekH743::STORE..).step_by(8).zip(bytes.as_chunks::<8>().0) {
             let value = u64::from_le_bytes(*cells);
             if host.read(address, Width::W64).ok()? != value {
@@ -240,7 +240,7 @@ impl Starts {
     }
 }
 
-impl Driver<MatekH743> for Starts {
+impl Driver<MatekH743> for RestartRun {
     fn on_stop(&mut self, session: &mut Session<MatekH743>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
         quiet_usb(session, stop.at);
         if self.started_ns == 0 {
@@ -274,14 +274,14 @@ fn padded(name: &str) -> ParameterName {
     std::array::from_fn(|at| name.as_bytes().get(at).copied().unwrap_or(0))
 }
 
-fn say(wire: &Wire, messages: &[Uplink]) {
+fn say(wire: &UartWire, messages: &[Uplink]) {
     let mut sender = Encoder::new(STATION);
     for message in messages {
         wire.send(sender.send(message, &mut [0; FRAME_MAX]));
     }
 }
 
-fn board(wire: &Wire) -> Result<Box<MatekH743>, Box<dyn Error>> {
+fn board(wire: &UartWire) -> Result<Box<MatekH743>, Box<dyn Error>> {
     let mut board = Box::new(MatekH743::new()?);
     check(board.attach_link(wire.clone()), "the link is wired")?;
     Ok(board)
@@ -292,12 +292,12 @@ fn flash(bytes: Vec<u8>) -> Result<Image, Box<dyn Error>> {
 }
 
 /// Starts the board with each flash content, and returns the time of each cut and the values after it.
-fn ask(image: &Image, left: Vec<Kept>, seed: u64) -> Result<Vec<(u64, [Option<f32>; 2])>, Box<dyn Error>> {
-    let wire = Wire::default();
+fn ask(image: &Image, left: Vec<FlashAtCut>, seed: u64) -> Result<Vec<(u64, [Option<f32>; 2])>, Box<dyn Error>> {
+    let wire = UartWire::default();
     let session = Session::new(board(&wire)?, 0, VirtualNanos(MS))?;
-    let starts = Starts {
+    let starts = RestartRun {
         wire,
-        random: Random::new(seed, "starts"),
+        random: Xorshift::new(seed, "starts"),
         decoder: Decoder::new(STATION),
         left: left.into_iter(),
         cut_ns: 0,
@@ -309,7 +309,7 @@ fn ask(image: &Image, left: Vec<Kept>, seed: u64) -> Result<Vec<(u64, [Option<f3
 }
 
 /// Keeps about this many of the cuts, evenly spread.
-fn thinned(kept: Vec<Kept>, cuts: u64) -> Vec<Kept> {
+fn thinned(kept: Vec<FlashAtCut>, cuts: u64) -> Vec<FlashAtCut> {
     let (all, cuts) = (kept.len(), usize::try_from(cuts).unwrap_or(usize::MAX).clamp(1, kept.len().max(1)));
     let is_left = |at: usize| (at + 1) * cuts / all > at * cuts / all;
     kept.into_iter().enumerate().filter(|(at, _)| is_left(*at)).map(|(_, kept)| kept).collect()
@@ -321,19 +321,19 @@ pub fn cut_all(image: &Path, seed: u64, cuts: u64) -> Result<(), Box<dyn Error>>
     let image = Image::read(image, None)?;
     let (name, old, new) = WRITTEN;
     for (during, what) in [(During::Write, "a parameter is written"), (During::Erase, "a start erases")] {
-        let mut before = Changes::new()?;
+        let mut before = ParameterFlash::new()?;
         before.set(OTHER.0, OTHER.1)?;
         // A sector that is nearly full makes the start copy and erase.
         for change in 0..if during == During::Erase { 500 } else { 0 } {
             before.set(name, 1.0 + change as f32 * 1e-3)?;
         }
         before.set(name, old)?;
-        let wire = Wire::default();
+        let wire = UartWire::default();
         let session = Session::new(board(&wire)?, 0, VirtualNanos(MS))?;
-        let cut = Cut {
+        let cut = PowerCutRun {
             during,
             wire,
-            random: Random::new(seed, what),
+            random: Xorshift::new(seed, what),
             erase_apart_ns: 1_000 * MS / cuts.max(1),
             pending: None,
             since_ns: 0,

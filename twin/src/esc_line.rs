@@ -1,7 +1,7 @@
 //! Motor controllers with KISS telemetry on the board's UART. A controller answers when the telemetry bit of a DSHOT
 //! frame on its pin asks for it.
 
-use crate::wire::Wire;
+use crate::wire::UartWire;
 use afbc_drivers::esc_telemetry::EscReading;
 
 /// Magnetic poles of the motors, as in the vehicle's defaults.
@@ -18,12 +18,12 @@ pub fn voltage_cv(motor: usize) -> u16 {
 
 /// Motor controllers on the telemetry UART.
 pub struct Escs {
-    wire: Wire,
+    wire: UartWire,
     asked: Vec<usize>,
 }
 
 impl Escs {
-    pub fn new(wire: Wire) -> Self {
+    pub fn new(wire: UartWire) -> Self {
         Escs { wire, asked: Vec::new() }
     }
 

@@ -3,10 +3,10 @@
 
 use crate::check::check;
 use crate::esc_line::voltage_cv;
-use crate::hands::Climb;
-use crate::led::{FRAME_NS, Hand, Hover, Next, Vehicle};
 use crate::machine::Machine;
+use crate::piloted::{FRAME_NS, PilotDecision, PilotedHover, PilotedVehicle, StickPilot};
 use crate::pins::ANSWERS;
+use crate::stick_pilots::ClimbPilot;
 use std::collections::VecDeque;
 use std::error::Error;
 use std::path::Path;
@@ -25,7 +25,7 @@ const APART_MS: u64 = 4;
 
 /// Compares reported speeds and voltages with the plant's.
 #[derive(Debug, Default)]
-struct Listens {
+struct TelemetryCheck {
     on_lines: bool,
     since_ms: Option<u64>,
     /// Recent speeds of the rotors \[rad/s\].
@@ -35,8 +35,8 @@ struct Listens {
     most_rad_s: f64,
 }
 
-impl Hand for Listens {
-    fn lead(&mut self, vehicle: &mut Vehicle, now_ms: u64) -> Result<Next, String> {
+impl StickPilot for TelemetryCheck {
+    fn move_sticks(&mut self, vehicle: &mut PilotedVehicle, now_ms: u64) -> Result<PilotDecision, String> {
         let since_ms = *self.since_ms.get_or_insert(now_ms);
         self.past.push_back(vehicle.pilot.rotor_speeds_rad_s().to_vec());
         if self.past.len() > OLD_MS {
@@ -64,13 +64,13 @@ impl Hand for Listens {
                 }
             }
         }
-        Ok(if now_ms > since_ms + LISTENED_MS { Next::Ends } else { Next::GoesOn })
+        Ok(if now_ms > since_ms + LISTENED_MS { PilotDecision::Ends } else { PilotDecision::GoesOn })
     }
 }
 
 /// Stops a rotor, and waits until the vehicle reports it.
 #[derive(Debug)]
-struct Stops {
+struct RotorStopTest {
     on_lines: bool,
     rotor: usize,
     late_ms: u64,
@@ -79,8 +79,8 @@ struct Stops {
     told_ms: Option<u64>,
 }
 
-impl Hand for Stops {
-    fn lead(&mut self, vehicle: &mut Vehicle, now_ms: u64) -> Result<Next, String> {
+impl StickPilot for RotorStopTest {
+    fn move_sticks(&mut self, vehicle: &mut PilotedVehicle, now_ms: u64) -> Result<PilotDecision, String> {
         let stops_ms = *self.began_ms.get_or_insert(now_ms) + 500 + self.late_ms;
         let says = format!("rotor {} has stopped", self.rotor + 1);
         // A controller that answers every frame shows a wrong speed before the rotor has stopped.
@@ -97,16 +97,16 @@ impl Hand for Stops {
         }
         self.told_ms = vehicle.pilot.heard().iter().find(|(_, text)| is_said(text)).map(|(ms, _)| ms - stops_ms);
         let is_over = self.told_ms.is_some() || now_ms > stops_ms + 2 * TOLD_MS;
-        Ok(if is_over { Next::Ends } else { Next::GoesOn })
+        Ok(if is_over { PilotDecision::Ends } else { PilotDecision::GoesOn })
     }
 }
 
 /// Flies with motor controllers that answer, and stops each rotor in flight.
 pub fn fly<M: Machine>(image: &Path, scenario: &Path, on_lines: bool) -> Result<(), Box<dyn Error>> {
     let listens = if on_lines { ANSWERS } else { "DSHOT_TEL_CFG" };
-    let hover = Hover::<M>::of(image, scenario, &[(listens, 1.0)], Climb::default())?;
-    let hand = Listens { on_lines, ..Listens::default() };
-    let Listens { messages, most_rad_s, .. } = hover.goes_on(FRAME_NS, 0, hand)?.hand;
+    let hover = PilotedHover::<M>::of(image, scenario, &[(listens, 1.0)], ClimbPilot::default())?;
+    let stick_pilot = TelemetryCheck { on_lines, ..TelemetryCheck::default() };
+    let TelemetryCheck { messages, most_rad_s, .. } = hover.resume(FRAME_NS, 0, stick_pilot)?.stick_pilot;
     println!(
         "{messages} messages ESC_STATUS, at most {most_rad_s:.1} rad/s beside the rotors' speeds of the last 60 ms"
     );
@@ -114,8 +114,8 @@ pub fn fly<M: Machine>(image: &Path, scenario: &Path, on_lines: bool) -> Result<
     let mut all_ms = Vec::new();
     for rotor in 0..hover.vehicle().pilot.throttles().len() {
         for late_ms in (0..STOPS).map(|nth| nth * APART_MS) {
-            let hand = Stops { on_lines, rotor, late_ms, began_ms: None, told_ms: None };
-            let told_ms = hover.goes_on(FRAME_NS, 0, hand)?.hand.told_ms;
+            let stick_pilot = RotorStopTest { on_lines, rotor, late_ms, began_ms: None, told_ms: None };
+            let told_ms = hover.resume(FRAME_NS, 0, stick_pilot)?.stick_pilot.told_ms;
             all_ms.push(told_ms.ok_or_else(|| format!("rotor {rotor}: its stop is not told"))?);
         }
     }

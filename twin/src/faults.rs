@@ -1,13 +1,13 @@
 //! Injects faults at the pins in flight, all from the same instant of one flight, and judges how each flight ends.
 
-use crate::aloft::{Aloft, Link};
 use crate::check::check;
-use crate::fly::{Flight, TICK_NS};
+use crate::fault_injection::{FaultContext, FaultOutcome};
+use crate::fly::{TICK_NS, TwinFlight};
+use crate::hover_snapshot::{HoverSnapshot, LinkEnds};
 use crate::impairments::Impairments;
 use crate::machine::{Machine, quiet_usb};
-use crate::random::Random;
-use crate::table::{ROWS, Row};
-use crate::trouble::{Outcome, Trouble};
+use crate::random::Xorshift;
+use crate::table::{PinFault, ROWS};
 use rigless::emulator::{Driver, Host, Settled, Stop};
 use rigless::session::Session;
 use rigless::time::VirtualNanos;
@@ -23,12 +23,12 @@ const TOUCH_M_S: f64 = 2.0;
 const LANDS_MS: u64 = 45_000;
 
 /// Flight with a fault.
-struct Watched {
-    flight: Flight,
-    link: Link,
-    row: &'static Row,
+struct FaultFlight {
+    flight: TwinFlight,
+    link: LinkEnds,
+    row: &'static PinFault,
     impairments: Impairments,
-    random: Random,
+    random: Xorshift,
     begins_ns: u64,
     ends_ns: u64,
     /// Time at which an undecided flight counts as lost.
@@ -40,15 +40,15 @@ struct Watched {
     tilt_rad: f64,
     /// Downward speed at touch-down.
     touch_m_s: Option<f64>,
-    outcome: Option<Outcome>,
+    outcome: Option<FaultOutcome>,
 }
 
-impl Watched {
-    fn new(flight: Flight, link: Link, now_ns: u64, row: &'static Row, seed: u64) -> Self {
-        let mut random = Random::new(seed, row.name);
+impl FaultFlight {
+    fn new(flight: TwinFlight, link: LinkEnds, now_ns: u64, row: &'static PinFault, seed: u64) -> Self {
+        let mut random = Xorshift::new(seed, row.name);
         let begins_ns = now_ns + BEGINS_NS[0] + random.below(BEGINS_NS[1] - BEGINS_NS[0]);
         let start_m = flight.pilot.motion().position_m.into();
-        Watched {
+        FaultFlight {
             flight,
             link,
             row,
@@ -80,15 +80,15 @@ impl Watched {
         }
         let touched_hard = self.touch_m_s.is_some_and(|touch_m_s| touch_m_s > TOUCH_M_S);
         self.outcome = if self.tilt_rad > 1.5 || touched_hard || self.off_m > 50.0 {
-            Some(Outcome::Lost)
+            Some(FaultOutcome::Lost)
         } else if self.touch_m_s.is_some() && !pilot.armed() {
-            Some(Outcome::Lands)
+            Some(FaultOutcome::Lands)
         } else if now_ns < self.ends_ns {
             None
         } else if (z - start_z).abs() < 2.0 && self.off_m < OFF_M && pilot.armed() {
-            Some(Outcome::FliesOn)
+            Some(FaultOutcome::FliesOn)
         } else if now_ns > self.last_ns {
-            Some(Outcome::Lost)
+            Some(FaultOutcome::Lost)
         } else {
             None
         };
@@ -96,7 +96,7 @@ impl Watched {
     }
 }
 
-impl<M: Machine> Driver<M> for Watched {
+impl<M: Machine> Driver<M> for FaultFlight {
     fn on_settled(&mut self, session: &mut Session<M>, host: &mut dyn Host, settled: Settled) {
         self.flight.on_settled(session, host, settled);
         let (at, instructions) = match settled {
@@ -106,8 +106,8 @@ impl<M: Machine> Driver<M> for Watched {
         };
         let Some(since_ns) = at.0.checked_sub(self.begins_ns) else { return };
         let before = self.impairments;
-        (self.row.act)(&mut Trouble {
-            patient: session,
+        (self.row.act)(&mut FaultContext {
+            target: session,
             host,
             link: &self.link,
             impairments: &mut self.impairments,
@@ -138,13 +138,13 @@ impl<M: Machine> Driver<M> for Watched {
 }
 
 /// Flies one fault, and returns whether the outcome is at least as good as expected.
-fn fly<M: Machine>(aloft: &Aloft<M>, row: &'static Row, seed: u64) -> Result<bool, Box<dyn Error>> {
-    let finished = aloft.resume(|flight, link, now_ns| Watched::new(flight, link, now_ns, row, seed))?;
+fn fly<M: Machine>(hover: &HoverSnapshot<M>, row: &'static PinFault, seed: u64) -> Result<bool, Box<dyn Error>> {
+    let finished = hover.resume(|flight, link, now_ns| FaultFlight::new(flight, link, now_ns, row, seed))?;
     let session = &finished.session;
-    let Watched { flight, begins_ns, off_m, tilt_rad, touch_m_s, outcome, .. } = finished.driver;
+    let FaultFlight { flight, begins_ns, off_m, tilt_rad, touch_m_s, outcome, .. } = finished.driver;
     let begins_ms = begins_ns / TICK_NS;
     let heard: Vec<_> = flight.pilot.heard().iter().filter(|(ms, _)| *ms >= begins_ms).collect();
-    let outcome = outcome.unwrap_or(Outcome::Lost);
+    let outcome = outcome.unwrap_or(FaultOutcome::Lost);
     let expected = row.expected(M::IMUS.len());
     let is_well = outcome >= expected;
     let touch = touch_m_s.map_or(String::new(), |touch_m_s| format!(", touches the ground at {touch_m_s:.1} m/s"));
@@ -174,14 +174,14 @@ fn fly<M: Machine>(aloft: &Aloft<M>, row: &'static Row, seed: u64) -> Result<boo
 /// Flies all faults, or those whose names begin with one of `names`. Fails if an outcome is worse than expected. With
 /// `in_turn`, each seed flies only one fault, the next seed the next one.
 pub fn fly_all<M: Machine>(
-    aloft: &Aloft<M>,
+    hover: &HoverSnapshot<M>,
     seeds: std::ops::Range<u64>,
     names: &[&str],
     in_turn: bool,
 ) -> Result<(), Box<dyn Error>> {
     let (mut flown, mut failed) = (0, Vec::new());
-    let is_wanted = |row: &&Row| names.is_empty() || names.iter().any(|name| row.name.starts_with(name));
-    let (rows, left_out): (Vec<&'static Row>, Vec<_>) =
+    let is_wanted = |row: &&PinFault| names.is_empty() || names.iter().any(|name| row.name.starts_with(name));
+    let (rows, left_out): (Vec<&'static PinFault>, Vec<_>) =
         ROWS.iter().filter(is_wanted).partition(|row| row.imus <= M::IMUS.len());
     for row in left_out {
         println!("left out {}, {}: the board has no such part", row.name, row.what);
@@ -190,7 +190,7 @@ pub fn fly_all<M: Machine>(
         let turn = (seed as usize).checked_rem(rows.len()).unwrap_or_default();
         for (_, row) in rows.iter().enumerate().filter(|(place, _)| !in_turn || *place == turn) {
             flown += 1;
-            if !fly(aloft, row, seed)? {
+            if !fly(hover, row, seed)? {
                 failed.push(format!("{} with seed {seed}", row.name));
             }
         }

@@ -14,7 +14,7 @@ pub const PATIENCE_MS: u64 = 60_000;
 const END: u32 = 20_000;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Step {
+enum FetchStep {
     Lists,
     Begins,
     Ends,
@@ -27,7 +27,7 @@ enum Step {
 /// Ground station's state.
 pub struct Fetch {
     decoder: Decoder<LogMessage>,
-    step: Step,
+    step: FetchStep,
     /// Start of the step, and time of the last request [ms].
     since_ms: u64,
     asked_ms: u64,
@@ -42,7 +42,7 @@ impl Fetch {
     pub fn new(decoder: Decoder<LogMessage>) -> Self {
         Fetch {
             decoder,
-            step: Step::Lists,
+            step: FetchStep::Lists,
             since_ms: 0,
             asked_ms: 0,
             entries: Vec::new(),
@@ -53,11 +53,11 @@ impl Fetch {
 
     /// True when all downloads are complete and nothing has been erased yet.
     pub fn has_all(&self) -> bool {
-        self.step == Step::Erases && self.asked_ms == 0
+        self.step == FetchStep::Erases && self.asked_ms == 0
     }
 
     pub fn is_done(&self) -> bool {
-        self.step == Step::Done
+        self.step == FetchStep::Done
     }
 
     fn size(&self) -> u32 {
@@ -70,7 +70,7 @@ impl Fetch {
         [if part == 0 { 0 } else { self.size() - length }, length]
     }
 
-    fn go_to(&mut self, step: Step, now_ms: u64) {
+    fn go_to(&mut self, step: FetchStep, now_ms: u64) {
         (self.step, self.since_ms, self.asked_ms) = (step, now_ms, 0);
     }
 
@@ -80,16 +80,16 @@ impl Fetch {
         self.decoder.feed(bytes, |_, message| messages.push(message));
         for message in messages {
             match (self.step, message) {
-                (Step::Lists, LogMessage::Entry(entry)) => {
+                (FetchStep::Lists, LogMessage::Entry(entry)) => {
                     if usize::from(entry.log) == self.entries.len() && entry.count > 0 {
                         self.entries.push(entry);
                     }
                     if self.entries.len() == usize::from(entry.count) {
-                        self.go_to(Step::Begins, now_ms);
+                        self.go_to(FetchStep::Begins, now_ms);
                     }
                 }
-                (Step::Begins | Step::Ends, LogMessage::Data(data)) => {
-                    let part = usize::from(self.step == Step::Ends);
+                (FetchStep::Begins | FetchStep::Ends, LogMessage::Data(data)) => {
+                    let part = usize::from(self.step == FetchStep::Ends);
                     let [offset, length] = self.span(part);
                     let held = &mut self.parts[part];
                     // Only data in order are kept; missing data are requested again.
@@ -99,13 +99,16 @@ impl Fetch {
                     if held.len() as u32 >= length {
                         self.took_ms[part] = now_ms - self.since_ms;
                         // Wait before the erase, so that the card can be compared first.
-                        self.go_to(if part == 0 { Step::Ends } else { Step::Erases }, now_ms + 10 * part as u64);
+                        self.go_to(
+                            if part == 0 { FetchStep::Ends } else { FetchStep::Erases },
+                            now_ms + 10 * part as u64,
+                        );
                     }
                 }
-                (Step::ListsAgain, LogMessage::Entry(entry)) => {
+                (FetchStep::ListsAgain, LogMessage::Entry(entry)) => {
                     self.entries.retain(|_| entry.count > 0);
                     if self.entries.is_empty() {
-                        self.go_to(Step::Done, now_ms);
+                        self.go_to(FetchStep::Done, now_ms);
                     }
                 }
                 _ => {}
@@ -124,19 +127,19 @@ impl Fetch {
         }
         self.asked_ms = now_ms;
         let request = match self.step {
-            Step::Lists | Step::ListsAgain => LogRequest::List { first: 0, last: u16::MAX },
-            Step::Begins | Step::Ends => {
-                let part = usize::from(self.step == Step::Ends);
+            FetchStep::Lists | FetchStep::ListsAgain => LogRequest::List { first: 0, last: u16::MAX },
+            FetchStep::Begins | FetchStep::Ends => {
+                let part = usize::from(self.step == FetchStep::Ends);
                 let ([offset, length], held) = (self.span(part), self.parts[part].len() as u32);
                 LogRequest::Data { log: 0, offset: offset + held, bytes: length - held }
             }
-            Step::Erases => {
+            FetchStep::Erases => {
                 // An erase has no answer; only a new list shows its success.
-                self.go_to(Step::ListsAgain, now_ms);
+                self.go_to(FetchStep::ListsAgain, now_ms);
                 (self.since_ms, self.asked_ms) = (now_ms + AGAIN_MS, 1);
                 LogRequest::Erase
             }
-            Step::Done => return None,
+            FetchStep::Done => return None,
         };
         Some(Uplink::ServiceRequest(ServiceRequest::Log(request)))
     }

@@ -1,17 +1,17 @@
 //! Flies the image, as flashed, in lockstep with the plant. The instruments' readings appear in the registers of the
 //! board's sensors, motor commands are read from its pins, and a ground station is connected to its telemetry UART.
 
-use crate::card::CardTrouble;
-use crate::card_logs::{self, CardLog};
+use crate::card::CardFaults;
+use crate::card_logs::{self, StorageLog};
 use crate::check::check;
-use crate::kept::{self, PWM400};
 use crate::machine::{Machine, Signal, quiet_usb};
-use crate::pilot::Pilot;
+use crate::parameter_flash::{self, PWM400};
+use crate::pilot::GroundPilot;
 use crate::pins::MotorPins;
 use crate::same;
 use crate::ublox::{Generation, UbloxPeer};
 use crate::usb_ring::UsbRing;
-use crate::wire::Wire;
+use crate::wire::UartWire;
 use crate::world::at_the_place;
 use afbc_scenario::load;
 use rigless::emulator::{Driver, Host, Settled, Start, Stop, run};
@@ -27,7 +27,7 @@ const DROPOUTS_MS: u64 = 100;
 
 /// Receiver of the exact log on the second link.
 pub(crate) enum Hearer {
-    Uart(Wire),
+    Uart(UartWire),
     Usb(UsbRing),
 }
 
@@ -40,26 +40,26 @@ impl Hearer {
     }
 }
 
-pub(crate) struct Flight {
-    pub(crate) pilot: Pilot,
+pub(crate) struct TwinFlight {
+    pub(crate) pilot: GroundPilot,
     pub(crate) hearer: Option<Hearer>,
     /// u-blox receiver that replaces the board's own GNSS receiver.
     pub(crate) receiver: Option<UbloxPeer>,
     pub(crate) pins: MotorPins,
     /// Times at which the card's content is kept.
-    pub(crate) cuts: Option<Cuts>,
+    pub(crate) cuts: Option<PowerCutTimes>,
     /// Logs as they were before they were erased.
-    pub(crate) fetched: Option<Result<Vec<CardLog>, String>>,
+    pub(crate) fetched: Option<Result<Vec<StorageLog>, String>>,
 }
 
 /// Times at which the card's content is kept, as if the power were cut then.
-pub(crate) struct Cuts {
+pub(crate) struct PowerCutTimes {
     folder: PathBuf,
     at_ms: Vec<u64>,
 }
 
 /// Description of the flight.
-pub struct Order<'a> {
+pub struct FlightOptions<'a> {
     /// File of the scenario.
     pub scenario: &'a Path,
     /// Duration of the hover [ms].
@@ -73,7 +73,7 @@ pub struct Order<'a> {
     /// Folder for the logs of the memory card.
     pub card: Option<&'a Path>,
     /// Faults of the memory card.
-    pub card_trouble: CardTrouble,
+    pub card_faults: CardFaults,
     /// Free space of a nearly full card [kB].
     pub full_kb: Option<u64>,
     /// Times at which the card's content is kept, as if the power were cut then [ms].
@@ -83,8 +83,9 @@ pub struct Order<'a> {
 }
 
 /// Flies as ordered. If an exact log is kept, replays it, and fails unless the replay is the same to the last bit.
-pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Error>> {
-    let &Order { scenario, hover_ms, is_mission, receiver, log, card, card_trouble, full_kb, cuts_ms, fetches } = order;
+pub fn fly<M: Machine>(image: &Path, order: &FlightOptions<'_>) -> Result<(), Box<dyn Error>> {
+    let &FlightOptions { scenario, hover_ms, is_mission, receiver, log, card, card_faults, full_kb, cuts_ms, fetches } =
+        order;
     let scenario = load(scenario)?;
     let mut board = M::built()?;
     board.sense(&at_the_place());
@@ -92,7 +93,7 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
         board.insert_card();
     }
     if let Some(storage) = board.log_storage() {
-        storage.trouble(card_trouble);
+        storage.set_faults(card_faults);
         if let Some(kb) = full_kb {
             storage.fill(kb * 1024);
         }
@@ -101,22 +102,22 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
             storage.remove();
         }
     }
-    let wire = Wire::default();
+    let wire = UartWire::default();
     check(board.attach_link(wire.clone()), "the link is wired")?;
     let mut hearer = None;
     if log.is_some() {
-        let wire = Wire::default();
+        let wire = UartWire::default();
         let is_uart = board.attach_second_link(wire.clone());
         hearer = Some(if is_uart { Hearer::Uart(wire) } else { Hearer::Usb(UsbRing::find(image)?) });
     }
     let receiver = receiver.map(|generation| UbloxPeer::new(generation, M::RECEIVER));
     let pins = MotorPins::new(M::SIGNAL, scenario.rotors.len());
-    let pilot = Pilot::new(&scenario, wire)?.hovering(hover_ms);
-    let pilot = if is_mission { pilot.touring() } else { pilot };
+    let pilot = GroundPilot::new(&scenario, wire)?.hovering(hover_ms);
+    let pilot = if is_mission { pilot.with_mission() } else { pilot };
     let pilot = if card.is_some() { pilot.logging() } else { pilot };
     let pilot = if fetches { pilot.fetching() } else { pilot };
-    let cuts = card.map(|folder| Cuts { folder: folder.into(), at_ms: cuts_ms.to_vec() });
-    let flight = Flight { pilot, hearer, receiver, pins, cuts, fetched: None };
+    let cuts = card.map(|folder| PowerCutTimes { folder: folder.into(), at_ms: cuts_ms.to_vec() });
+    let flight = TwinFlight { pilot, hearer, receiver, pins, cuts, fetched: None };
     // About 75 bytes per tick are too much for a UART at the default rate.
     let to_log: &[_] = if log.is_some() { &[("LOG_PORT", 2.0), ("SER_TEL1_BAUD", 921_600.0)] } else { &[] };
     let images = images::<M>(image, to_log)?;
@@ -127,13 +128,13 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     }
     let unmapped: Vec<_> = finished.session.unmapped().iter().map(|access| access.address).collect();
     let refused = finished.session.refused().len();
-    let Flight { pilot, hearer, receiver, pins, fetched, .. } = finished.driver;
+    let TwinFlight { pilot, hearer, receiver, pins, fetched, .. } = finished.driver;
     match M::SIGNAL {
         Signal::Dshot600(_) => println!("{} frames of DSHOT600", pins.sent),
         Signal::Pwm400 => println!("{} ticks with PWM's pulses", pins.sent),
     }
     if let Some(receiver) = &receiver {
-        println!("{}", receiver.told());
+        println!("{}", receiver.summary());
     }
     // Checked at the end, so that log and card of a failed flight are kept too.
     let verdict = pilot.verdict();
@@ -157,7 +158,7 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
                 log.name, log.bytes, log.rest, log.missing_ms
             );
         }
-        let is_sound = card_trouble != CardTrouble::default()
+        let is_sound = card_faults != CardFaults::default()
             || full_kb.is_some()
             || logs.iter().all(|log| log.rest == 0 && log.missing_ms <= DROPOUTS_MS);
         check(!logs.is_empty() && is_sound, "a whole log of the flight is kept")?;
@@ -173,7 +174,7 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     check(finished.session.resets().is_empty(), "no reset")
 }
 
-impl Flight {
+impl TwinFlight {
     /// Reads the motor commands from PWM pulses, which the pins repeat, if the board uses PWM.
     pub(crate) fn hear_pulses<M: Machine>(&mut self, session: &mut Session<M>) {
         if M::SIGNAL == Signal::Pwm400 {
@@ -183,7 +184,7 @@ impl Flight {
     }
 }
 
-impl Flight {
+impl TwinFlight {
     /// Keeps the card's content if it is time to, and compares downloaded logs.
     fn look_at_card<M: Machine>(&mut self, session: &mut Session<M>, now_ms: u64) {
         let (Some(cuts), Some(storage)) = (&self.cuts, session.board_mut().log_storage()) else { return };
@@ -197,7 +198,7 @@ impl Flight {
             && let Some(fetch) = self.pilot.fetched()
         {
             let saved = card_logs::save(storage, &cuts.folder).and_then(|logs| {
-                let read = |log: &CardLog| std::fs::read(cuts.folder.join(&log.name));
+                let read = |log: &StorageLog| std::fs::read(cuts.folder.join(&log.name));
                 let bytes: Vec<_> = logs.iter().map(read).collect::<Result<_, _>>()?;
                 fetch.compare(&bytes).map(|()| logs)
             });
@@ -212,13 +213,13 @@ pub(crate) fn images<M: Machine>(image: &Path, parameters: &[(&str, f32)]) -> Re
     let kept: Vec<_> = pwm.into_iter().chain(parameters.iter().copied()).collect();
     let mut images = vec![Image::read(image, None)?];
     if !kept.is_empty() {
-        let kept = kept::parameters(&kept, M::STORE_WORD)?;
+        let kept = parameter_flash::parameters(&kept, M::STORE_WORD)?;
         images.push(Image::new(Path::new("parameters"), kept, Some(M::STORE))?);
     }
     Ok(images)
 }
 
-impl<M: Machine> Driver<M> for Flight {
+impl<M: Machine> Driver<M> for TwinFlight {
     fn on_settled(&mut self, session: &mut Session<M>, _: &mut dyn Host, settled: Settled) {
         if let Some(receiver) = &self.receiver {
             receiver.watch(&settled);

@@ -2,8 +2,8 @@
 //! change within a second. The GNSS receiver is the board's model, which sends NMEA; the other readings are passed on
 //! directly.
 
-use crate::pilot::Pilot;
-use crate::wire::Wire;
+use crate::pilot::GroundPilot;
+use crate::wire::UartWire;
 use crate::world::at_the_place;
 use afbc_drivers::nmea::NmeaDecoder;
 use afbc_drivers::ublox::DELAY_US;
@@ -21,10 +21,10 @@ use std::path::Path;
 
 /// Flies a scenario, with a mission if `is_mission` is set.
 pub fn fly(file: &Path, is_mission: bool) -> Result<(), Box<dyn Error>> {
-    let wire = Wire::default();
-    let pilot = Pilot::new(&load(file)?, wire.clone())?;
-    let mut pilot = if is_mission { pilot.touring() } else { pilot };
-    let (mut host, mut gnss) = (Host::new()?, Gnss::new());
+    let wire = UartWire::default();
+    let pilot = GroundPilot::new(&load(file)?, wire.clone())?;
+    let mut pilot = if is_mission { pilot.with_mission() } else { pilot };
+    let (mut host, mut gnss) = (Host::new()?, SimulatedGnss::new());
     let (mut now_ms, mut bytes) = (0, Vec::new());
     while let Some((mut readings, signals)) = pilot.advance(now_ms) {
         gnss.replace(&mut readings, &signals, now_ms);
@@ -38,7 +38,7 @@ pub fn fly(file: &Path, is_mission: bool) -> Result<(), Box<dyn Error>> {
 }
 
 /// GNSS receiver, its UART at 38,400 baud, and its driver.
-struct Gnss {
+struct SimulatedGnss {
     receiver: Receiver,
     decoder: NmeaDecoder,
     frame: FixFrame,
@@ -47,10 +47,10 @@ struct Gnss {
     last_ms: u64,
 }
 
-impl Gnss {
+impl SimulatedGnss {
     fn new() -> Self {
         let (receiver, decoder) = (Receiver::new(), NmeaDecoder::new());
-        Gnss { receiver, decoder, frame: FixFrame::NEW, began_ms: 0, last_ms: 0 }
+        SimulatedGnss { receiver, decoder, frame: FixFrame::NEW, began_ms: 0, last_ms: 0 }
     }
 
     /// Replaces the instruments' fix by the one that the receiver completes in this millisecond, if any.

@@ -18,7 +18,7 @@ const SAMPLED_NS: u64 = 80_000;
 
 /// Motor pins of a timer: address of their port's pull register, and number of the first pin.
 #[derive(Debug, PartialEq)]
-pub struct Lines {
+pub struct MotorPort {
     pub pulls: u64,
     pub first: u8,
 }
@@ -26,7 +26,7 @@ pub struct Lines {
 /// Answers of a timer's motor controllers.
 #[derive(Clone, Debug)]
 pub struct LineAnswers {
-    lines: &'static Lines,
+    lines: &'static MotorPort,
     /// Bits of each controller's next answer.
     bits: Vec<u32>,
     /// Times at which sampling and answers begin \[ns\], and number of bits sent so far.
@@ -35,12 +35,12 @@ pub struct LineAnswers {
 
 impl LineAnswers {
     /// Creates the controllers of this many motors, which stand still.
-    pub fn new(lines: &'static Lines, motors: usize) -> Self {
+    pub fn new(lines: &'static MotorPort, motors: usize) -> Self {
         LineAnswers { lines, bits: vec![line(0.0); motors], now: None }
     }
 
     /// Sets the speeds of the rotors \[rad/s\].
-    pub fn turn(&mut self, speeds_rad_s: &[f64]) {
+    pub fn set_rotor_speeds(&mut self, speeds_rad_s: &[f64]) {
         for (bits, speed_rad_s) in self.bits.iter_mut().zip(speeds_rad_s) {
             *bits = line(*speed_rad_s);
         }

@@ -2,10 +2,10 @@
 
 use crate::card::{LogStorage, SdSlot};
 use crate::impairments::Impairments;
-use crate::line_answers::Lines;
+use crate::line_answers::MotorPort;
 use crate::steady::Steady::{Output, PulledUp};
 use crate::steady::SteadyPin;
-use crate::wire::Wire;
+use crate::wire::UartWire;
 use rigless::chip::nmea;
 use rigless::chip::uart::{Errors, Peer};
 use rigless::edge::Edge;
@@ -40,7 +40,7 @@ pub struct FrameTimer {
     /// Motors of the timer, counted from 0.
     pub motors: Range<usize>,
     /// Port of the motor pins, if motor controllers can answer there.
-    pub lines: Option<Lines>,
+    pub lines: Option<MotorPort>,
 }
 
 /// Baud rate divider of a UART, and its clock.
@@ -114,20 +114,20 @@ pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
     fn motors(&mut self) -> Vec<Actuator>;
 
     /// Connects a wire to the first link.
-    fn attach_link(&mut self, wire: Wire) -> bool {
+    fn attach_link(&mut self, wire: UartWire) -> bool {
         self.attach_host("serial1", Box::new(wire))
     }
 
     /// Connects a wire to the second link; returns false if that is on USB.
-    fn attach_second_link(&mut self, wire: Wire) -> bool;
+    fn attach_second_link(&mut self, wire: UartWire) -> bool;
 
     /// Connects a radio receiver to a UART, and returns its `RC_PORT`; `None` if there is no such UART.
-    fn attach_radio(&mut self, wire: Wire) -> Option<f32> {
+    fn attach_radio(&mut self, wire: UartWire) -> Option<f32> {
         self.attach_second_link(wire).then_some(2.0)
     }
 
     /// Connects a wire to the UART for motor controller telemetry, if there is one.
-    fn attach_escs(&mut self, wire: Wire) {
+    fn attach_escs(&mut self, wire: UartWire) {
         drop(wire);
     }
 
@@ -161,8 +161,8 @@ pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
 }
 
 /// Ports of the Matek H743's motor pins (RM0433, table 8, 11.4.4).
-const PORT_A: Lines = Lines { pulls: 0x5802_000C, first: 0 };
-const PORT_D: Lines = Lines { pulls: 0x5802_0C0C, first: 12 };
+const PORT_A: MotorPort = MotorPort { pulls: 0x5802_000C, first: 0 };
+const PORT_D: MotorPort = MotorPort { pulls: 0x5802_0C0C, first: 12 };
 
 impl Machine for MatekH743 {
     /// IWDG1_KR (RM0433, 45.4).
@@ -215,13 +215,13 @@ impl Machine for MatekH743 {
     }
 
     /// The second link is on USART1.
-    fn attach_second_link(&mut self, wire: Wire) -> bool {
+    fn attach_second_link(&mut self, wire: UartWire) -> bool {
         self.mcu.usart[0].attach(wire);
         true
     }
 
     /// Motor controller telemetry comes in on UART8.
-    fn attach_escs(&mut self, wire: Wire) {
+    fn attach_escs(&mut self, wire: UartWire) {
         self.mcu.usart[7].attach(wire);
     }
 
@@ -320,13 +320,13 @@ impl Machine for Pixracer {
     }
 
     /// The second link is on USART3.
-    fn attach_second_link(&mut self, wire: Wire) -> bool {
+    fn attach_second_link(&mut self, wire: UartWire) -> bool {
         self.mcu.usart[2].attach(wire);
         true
     }
 
     /// USART6, which the board reserves for a radio receiver.
-    fn attach_radio(&mut self, wire: Wire) -> Option<f32> {
+    fn attach_radio(&mut self, wire: UartWire) -> Option<f32> {
         self.mcu.usart[3].attach(wire);
         Some(0.0)
     }

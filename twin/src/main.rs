@@ -3,7 +3,6 @@
 //! Models and processor are those of `rigless`, which is independent of this project.
 #![forbid(unsafe_code)]
 
-mod aloft;
 mod boot;
 mod card;
 mod card_logs;
@@ -12,39 +11,40 @@ mod cuts;
 mod esc_line;
 mod escs;
 mod f405;
+mod fault_injection;
 mod faults;
 mod fetch;
 mod fly;
-mod hands;
 mod host;
+mod hover_snapshot;
 mod impairments;
-mod kept;
-mod led;
 mod line_answers;
 mod machine;
 mod machines;
+mod mission;
+mod parameter_flash;
 mod pilot;
+mod piloted;
 mod pins;
 mod radio;
 mod random;
 mod same;
 mod steady;
+mod stick_pilots;
 mod table;
-mod tour;
 mod transmitter;
-mod trouble;
 mod ublox;
 mod usb_ring;
 mod wire;
 mod world;
 
-use aloft::Aloft;
-use card::CardTrouble;
+use card::CardFaults;
 use clap::builder::PossibleValuesParser;
 use clap::{Arg, ArgAction, ArgMatches, Command, value_parser};
-use fly::Order;
+use fly::FlightOptions;
+use hover_snapshot::HoverSnapshot;
 use machines::MachineName;
-use radio::Order as RadioOrder;
+use radio::RadioOptions;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -212,18 +212,18 @@ fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
                 let mut times = matches.get_many::<u64>(name)?.copied();
                 Some([times.next()?, times.next()?])
             };
-            let card_trouble = CardTrouble { stall_ms: times("card-stall"), out_ms: times("card-out") };
+            let card_faults = CardFaults { stall_ms: times("card-stall"), out_ms: times("card-out") };
             let (is_mission, fetches) = (matches.get_flag("mission"), matches.get_flag("fetch"));
             let full_kb = matches.get_one("card-full").copied();
             let cuts_ms: Vec<u64> = matches.get_many("card-cut").into_iter().flatten().copied().collect();
-            let order = Order {
+            let order = FlightOptions {
                 scenario,
                 hover_ms: 1000 * number(matches, "hover")?,
                 is_mission,
                 receiver,
                 log,
                 card,
-                card_trouble,
+                card_faults,
                 full_kb,
                 cuts_ms: &cuts_ms,
                 fetches,
@@ -233,7 +233,7 @@ fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
         Some(("radio", matches)) => {
             let (image, scenario) = (path(matches, "image")?, path(matches, "scenario")?);
             let rates: Vec<u64> = matches.get_many("rate").into_iter().flatten().copied().collect();
-            let order = RadioOrder { scenario, rates: &rates, phases: number(matches, "phases")? };
+            let order = RadioOptions { scenario, rates: &rates, phases: number(matches, "phases")? };
             with_machine!(chosen(matches)?, M => radio::fly::<M>(image, &order))
         }
         Some(("escs", matches)) => {
@@ -249,7 +249,7 @@ fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
             let names: Vec<_> = matches.get_many::<String>("only").into_iter().flatten().map(String::as_str).collect();
             let in_turn = matches.get_flag("in-turn");
             with_machine!(chosen(matches)?, M => {
-                faults::fly_all(&Aloft::<M>::of(image, scenario, hover)?, seeds, &names, in_turn)
+                faults::fly_all(&HoverSnapshot::<M>::of(image, scenario, hover)?, seeds, &names, in_turn)
             })
         }
         Some(("cuts", matches)) => {

@@ -2,11 +2,11 @@
 
 use crate::check::check;
 use crate::fetch::{self, Fetch};
-use crate::tour::Tour;
-use crate::wire::Wire;
+use crate::mission::MissionProgress;
+use crate::wire::UartWire;
 use crate::world::Transducers;
 use afbc_flight_core::motor::{THROTTLE_MAX, THROTTLE_MIN};
-use afbc_ground::{Client, Patience};
+use afbc_ground::{Client, RetryPolicy};
 use afbc_mavlink::telemetry::EscStatus;
 use afbc_mavlink::{VehicleCommand, Datum, Decoder, Downlink, Height, MissionMessage, MissionType, Telemetry, Uplink};
 use afbc_onboard::Readings;
@@ -29,23 +29,23 @@ const PATIENCE_MS: [u64; 3] = [40_000, 15_000, 40_000];
 /// Time from disarming until the log's last blocks are written [ms].
 const REST_MS: u64 = 1_500;
 /// Longest time for the mission until it is disarmed [ms].
-const TOUR_MS: u64 = 160_000;
+const MISSION_MS: u64 = 160_000;
 /// Largest mean position error of the hover [m], and largest tilt in gusts [rad]. A mission may tilt more, since each
 /// leg begins with an acceleration.
 const OFF_M: f64 = 2.5;
 const TILT_RAD: f64 = 0.7;
-const TOUR_TILT_RAD: f64 = 0.9;
+const MISSION_TILT_RAD: f64 = 0.9;
 
 /// Time between two states from an external tracker [ms].
 const TRACKED_MS: u64 = 10;
 
 /// Phase of the flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Phase {
+enum FlightPhase {
     Wakes,
     Climbs,
     Hovers,
-    Tours,
+    Mission,
     Lands,
     Fetches,
     /// Disarmed, waiting for the log on the card to end.
@@ -54,7 +54,7 @@ enum Phase {
 }
 
 /// World around the vehicle, and ground station that commands the flight.
-pub struct Pilot {
+pub struct GroundPilot {
     world: World,
     transducers: Transducers,
     throttles: Vec<u16>,
@@ -62,9 +62,9 @@ pub struct Pilot {
     rotor_speeds_rad_s: Vec<f64>,
     stopped_rotor: Option<usize>,
     speed_max_rad_s: f32,
-    wire: Wire,
+    wire: UartWire,
     client: Client,
-    phase: Phase,
+    phase: FlightPhase,
     /// Current time, and start of the phase [ms].
     now_ms: u64,
     since_ms: u64,
@@ -79,7 +79,7 @@ pub struct Pilot {
     /// Duration of the hover [ms].
     hover_ms: u64,
     /// Mission that replaces the hover.
-    tour: Option<Tour>,
+    mission: Option<MissionProgress>,
     /// True to wait for the end of the log after the flight.
     logs: bool,
     /// Download of the logs after the flight.
@@ -93,10 +93,10 @@ pub struct Pilot {
     prints: bool,
 }
 
-impl Pilot {
+impl GroundPilot {
     /// Creates the world of a scenario, and a station at the other end of the wire.
-    pub fn new(scenario: &Scenario, wire: Wire) -> Result<Self, Box<dyn Error>> {
-        Ok(Pilot {
+    pub fn new(scenario: &Scenario, wire: UartWire) -> Result<Self, Box<dyn Error>> {
+        Ok(GroundPilot {
             world: World::released(scenario, 1e-3)?,
             transducers: Transducers::new(),
             throttles: vec![0; scenario.rotors.len()],
@@ -106,7 +106,7 @@ impl Pilot {
             speed_max_rad_s: 1000.0,
             wire,
             client: client(),
-            phase: Phase::Wakes,
+            phase: FlightPhase::Wakes,
             now_ms: 0,
             since_ms: 0,
             armed: false,
@@ -116,7 +116,7 @@ impl Pilot {
             longest_us: 0.0,
             late: 0,
             hover_ms: HOVER_MS,
-            tour: None,
+            mission: None,
             logs: false,
             fetch: None,
             tilt_rad: 0.0,
@@ -130,19 +130,19 @@ impl Pilot {
     /// Turns progress messages off.
     #[must_use]
     pub fn quiet(self) -> Self {
-        Pilot { prints: false, ..self }
+        GroundPilot { prints: false, ..self }
     }
 
     /// Returns a copy in the same world, on another wire, without progress messages and without received data.
-    pub fn again(&self, wire: Wire) -> Self {
-        Pilot {
+    pub fn again(&self, wire: UartWire) -> Self {
+        GroundPilot {
             world: self.world.clone(),
             transducers: self.transducers.clone(),
             throttles: self.throttles.clone(),
             rotor_speeds_rad_s: self.rotor_speeds_rad_s.clone(),
             wire,
             client: client(),
-            tour: None,
+            mission: None,
             error: None,
             escs: None,
             heard: Vec::new(),
@@ -155,26 +155,26 @@ impl Pilot {
     /// Sets the duration of the hover [ms].
     #[must_use]
     pub fn hovering(self, hover_ms: u64) -> Self {
-        Pilot { hover_ms, ..self }
+        GroundPilot { hover_ms, ..self }
     }
 
     /// Replaces the hover by a mission, from take-off to landing.
     #[must_use]
-    pub fn touring(self) -> Self {
-        Pilot { tour: Some(Tour::new()), ..self }
+    pub fn with_mission(self) -> Self {
+        GroundPilot { mission: Some(MissionProgress::new()), ..self }
     }
 
     /// Waits after the flight until the vehicle's log has ended.
     #[must_use]
     pub fn logging(self) -> Self {
-        Pilot { logs: true, ..self }
+        GroundPilot { logs: true, ..self }
     }
 
     /// Lists, downloads and erases the vehicle's logs after the flight.
     #[must_use]
     pub fn fetching(self) -> Self {
         let fetch = Some(Fetch::new(Decoder::new(Client::STATION)));
-        Pilot { fetch, hover_ms: self.hover_ms.min(SHORT_HOVER_MS), ..self }
+        GroundPilot { fetch, hover_ms: self.hover_ms.min(SHORT_HOVER_MS), ..self }
     }
 
     /// Returns the downloaded logs when all are complete and not yet erased.
@@ -219,7 +219,7 @@ impl Pilot {
 
     /// Returns the time in hover so far [ms].
     pub fn hovers_ms(&self) -> Option<u64> {
-        (self.phase == Phase::Hovers).then(|| self.now_ms - self.since_ms)
+        (self.phase == FlightPhase::Hovers).then(|| self.now_ms - self.since_ms)
     }
 
     /// Sets the motor commands; `None` keeps a motor's former command.
@@ -234,7 +234,7 @@ impl Pilot {
     pub fn advance(&mut self, now_ms: u64) -> Option<(Readings, Signals)> {
         let felt = self.watch(now_ms);
         self.supervise();
-        (self.error.is_none() && self.phase != Phase::Done).then_some(felt)
+        (self.error.is_none() && self.phase != FlightPhase::Done).then_some(felt)
     }
 
     /// Advances like `advance`, but sends no flight commands and never ends.
@@ -258,14 +258,14 @@ impl Pilot {
         if let Some(state) = view.state.filter(|_| self.world.readings().is_none() && now_ms % TRACKED_MS == 0) {
             self.say(&Uplink::State { sent_us: now_ms * 1000, state, sigmas: PoseSigmas::UNKNOWN });
         }
-        let signals = self.transducers.feel(&readings);
+        let signals = self.transducers.signals(&readings);
         self.talk();
         (readings, signals)
     }
 
     /// Prints a summary of the flight, and fails if it was not flown well.
     pub fn verdict(self) -> Result<(), Box<dyn Error>> {
-        let Pilot { error, off_m: (sum, count), tour, tilt_rad, now_ms, phase, .. } = self;
+        let GroundPilot { error, off_m: (sum, count), mission, tilt_rad, now_ms, phase, .. } = self;
         let (ticks_us, ticks) = self.ticks_us;
         println!(
             "armed ticks take {:.1} us on average, the longest {:.1} us; {} late or lost",
@@ -274,18 +274,18 @@ impl Pilot {
             self.late
         );
         let off_m = sum / count.max(1) as f64;
-        let how = match &tour {
-            Some(tour) => tour.told(),
+        let how = match &mission {
+            Some(mission) => mission.summary(),
             None => format!("hover off by {off_m:.2} m on average"),
         };
         println!("{:.1} s; {how}, largest tilt {tilt_rad:.2} rad", now_ms as f64 * 1e-3);
         if let Some(error) = error {
             return Err(error.into());
         }
-        check(phase == Phase::Done, "the flight ends")?;
-        if let Some(tour) = &tour {
-            tour.verdict()?;
-            return check(tilt_rad < TOUR_TILT_RAD, "it flies well");
+        check(phase == FlightPhase::Done, "the flight ends")?;
+        if let Some(mission) = &mission {
+            mission.verdict()?;
+            return check(tilt_rad < MISSION_TILT_RAD, "it flies well");
         }
         check(off_m < OFF_M && tilt_rad < TILT_RAD, "it flies well")
     }
@@ -305,15 +305,15 @@ impl Pilot {
         let now_ms = self.now_ms;
         let (armed, escs) = (&mut self.armed, &mut self.escs);
         let (ticks_us, longest_us, late) = (&mut self.ticks_us, &mut self.longest_us, &mut self.late);
-        let (tour, position_m) = (&mut self.tour, self.world.plant().motion().position_m.into());
-        if let Some(fetch) = self.fetch.as_mut().filter(|_| self.phase == Phase::Fetches) {
+        let (mission, position_m) = (&mut self.mission, self.world.plant().motion().position_m.into());
+        if let Some(fetch) = self.fetch.as_mut().filter(|_| self.phase == FlightPhase::Fetches) {
             fetch.hear(&bytes, now_ms);
         }
         self.client.hear(&bytes, |_, message| match message {
             Downlink::Heartbeat { armed: is_armed, .. } => *armed = *is_armed,
             Downlink::Telemetry(Telemetry::EscStatus(status)) => *escs = Some((now_ms, *status)),
             Downlink::Mission { message: MissionMessage::Reached(number), .. } => {
-                tour.iter_mut().for_each(|tour| tour.reach(*number, now_ms, position_m));
+                mission.iter_mut().for_each(|mission| mission.reach(*number, now_ms, position_m));
             }
             Downlink::Health(health) => {
                 if *armed {
@@ -329,10 +329,10 @@ impl Pilot {
             }
             self.heard.push((now_ms, text.text));
         }
-        if let (Some(tour), Some(end)) = (&mut self.tour, self.client.take_upload_end()) {
-            tour.end_upload(end);
+        if let (Some(mission), Some(end)) = (&mut self.mission, self.client.take_upload_end()) {
+            mission.end_upload(end);
         }
-        self.client.turn(now_ms);
+        self.client.update(now_ms);
         self.send();
     }
 
@@ -354,24 +354,24 @@ impl Pilot {
             println!("{:7.3} s: {:?}, {x:.2} {y:.2} {z:.2} m{errors}", self.now_ms as f64 * 1e-3, self.phase);
         }
         let after = match &self.fetch {
-            Some(_) => Phase::Fetches,
-            None if self.logs => Phase::Rests,
-            None => Phase::Done,
+            Some(_) => FlightPhase::Fetches,
+            None if self.logs => FlightPhase::Rests,
+            None => FlightPhase::Done,
         };
         let next = match self.phase {
-            Phase::Wakes => {
-                let is_ready = self.tour.as_ref().is_none_or(Tour::is_aboard);
+            FlightPhase::Wakes => {
+                let is_ready = self.mission.as_ref().is_none_or(MissionProgress::is_aboard);
                 if second && self.now_ms > 3000 {
                     if is_ready {
                         self.client.say(Uplink::Command(VehicleCommand::Arm));
                     } else {
-                        self.client.upload([(MissionType::MISSION, Tour::items())], Patience::ONCE);
+                        self.client.upload([(MissionType::MISSION, MissionProgress::items())], RetryPolicy::ONCE);
                     }
                     self.send();
                 }
-                self.armed.then_some(if self.tour.is_some() { Phase::Tours } else { Phase::Climbs })
+                self.armed.then_some(if self.mission.is_some() { FlightPhase::Mission } else { FlightPhase::Climbs })
             }
-            Phase::Climbs => {
+            FlightPhase::Climbs => {
                 if passed_ms == 0 {
                     self.start_m = [x, y, z];
                 }
@@ -379,43 +379,44 @@ impl Pilot {
                     let height = Height { metres: HEIGHT_M, above: Datum::Here };
                     self.say(&Uplink::Command(VehicleCommand::TakeOff(height)));
                 }
-                (z - self.start_m[2] > 0.6 * f64::from(HEIGHT_M)).then_some(Phase::Hovers)
+                (z - self.start_m[2] > 0.6 * f64::from(HEIGHT_M)).then_some(FlightPhase::Hovers)
             }
-            Phase::Hovers => {
+            FlightPhase::Hovers => {
                 if passed_ms > 3000 {
                     self.off_m.0 += (x - self.start_m[0]).hypot(y - self.start_m[1]).hypot(z - self.start_m[2] - 5.0);
                     self.off_m.1 += 1;
                 }
-                (passed_ms >= self.hover_ms).then_some(Phase::Lands)
+                (passed_ms >= self.hover_ms).then_some(FlightPhase::Lands)
             }
-            Phase::Tours => {
-                if passed_ms % 2000 == 0 && z < 0.5 && self.tour.as_ref().is_some_and(|tour| !tour.has_begun()) {
+            FlightPhase::Mission => {
+                if passed_ms % 2000 == 0 && z < 0.5 && self.mission.as_ref().is_some_and(|mission| !mission.has_begun())
+                {
                     self.say(&Uplink::Command(VehicleCommand::StartMission(0, None)));
                 }
                 (!self.armed).then_some(after)
             }
-            Phase::Lands => {
+            FlightPhase::Lands => {
                 if passed_ms % 2000 == 0 && self.armed {
                     self.say(&Uplink::Command(VehicleCommand::Land));
                 }
                 (!self.armed).then_some(after)
             }
-            Phase::Fetches => {
+            FlightPhase::Fetches => {
                 let now_ms = self.now_ms;
                 if let Some(request) = self.fetch.as_mut().and_then(|fetch| fetch.next(now_ms)) {
                     self.say(&request);
                 }
-                self.fetch.as_ref().is_none_or(Fetch::is_done).then_some(Phase::Done)
+                self.fetch.as_ref().is_none_or(Fetch::is_done).then_some(FlightPhase::Done)
             }
-            Phase::Rests => (passed_ms >= REST_MS).then_some(Phase::Done),
-            Phase::Done => None,
+            FlightPhase::Rests => (passed_ms >= REST_MS).then_some(FlightPhase::Done),
+            FlightPhase::Done => None,
         };
         let patience_ms = match self.phase {
-            Phase::Wakes => PATIENCE_MS[0],
-            Phase::Climbs => PATIENCE_MS[1],
-            Phase::Lands => PATIENCE_MS[2],
-            Phase::Tours => TOUR_MS,
-            Phase::Fetches => fetch::PATIENCE_MS,
+            FlightPhase::Wakes => PATIENCE_MS[0],
+            FlightPhase::Climbs => PATIENCE_MS[1],
+            FlightPhase::Lands => PATIENCE_MS[2],
+            FlightPhase::Mission => MISSION_MS,
+            FlightPhase::Fetches => fetch::PATIENCE_MS,
             _ => u64::MAX,
         };
         if let Some(next) = next {
@@ -423,7 +424,7 @@ impl Pilot {
         } else if passed_ms > patience_ms {
             self.error = Some(format!("{:?}: not within {} s", self.phase, patience_ms / 1000));
         }
-        if matches!(self.phase, Phase::Climbs | Phase::Hovers) && !self.armed {
+        if matches!(self.phase, FlightPhase::Climbs | FlightPhase::Hovers) && !self.armed {
             self.error = Some(format!("{:?}: it disarmed", self.phase));
         }
         if tilt_rad > 1.5 {
@@ -434,6 +435,6 @@ impl Pilot {
 
 fn client() -> Client {
     let mut client = Client::new(Client::STATION);
-    client.beat_every(Some(HEARTBEAT_MS));
+    client.set_heartbeat_period(Some(HEARTBEAT_MS));
     client
 }

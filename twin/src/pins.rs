@@ -47,7 +47,7 @@ enum Sampling {
 
 /// Frames of a timer's motors.
 #[derive(Clone, Debug)]
-struct Frames {
+struct TimerFrames {
     timer: &'static FrameTimer,
     sampling: Sampling,
     /// Time of the next sample \[ns\].
@@ -64,7 +64,7 @@ struct Frames {
 /// Motor pins of a board.
 #[derive(Clone, Debug)]
 pub struct MotorPins {
-    frames: Vec<Frames>,
+    frames: Vec<TimerFrames>,
     /// Newest command of each motor: 0, or 48 to 2047.
     throttles: Vec<Option<u16>>,
     /// Motors whose telemetry bit was set.
@@ -82,7 +82,7 @@ impl MotorPins {
             Signal::Dshot600(timers) => timers,
             Signal::Pwm400 => &[],
         };
-        let frames = timers.iter().filter(|timer| timer.motors.start < motors).map(|timer| Frames {
+        let frames = timers.iter().filter(|timer| timer.motors.start < motors).map(|timer| TimerFrames {
             timer,
             sampling: Sampling::Idle,
             look_ns: None,
@@ -112,10 +112,10 @@ impl MotorPins {
     }
 
     /// Sets the speeds of the rotors \[rad/s\].
-    pub fn turn(&mut self, speeds_rad_s: &[f64]) {
+    pub fn set_rotor_speeds(&mut self, speeds_rad_s: &[f64]) {
         for frames in &mut self.frames {
             let speeds_rad_s = speeds_rad_s.get(frames.timer.motors.start..).unwrap_or_default();
-            frames.answers.iter_mut().for_each(|answers| answers.turn(speeds_rad_s));
+            frames.answers.iter_mut().for_each(|answers| answers.set_rotor_speeds(speeds_rad_s));
         }
     }
 
@@ -132,7 +132,7 @@ impl MotorPins {
     /// Observes an access of the image, which may start a frame. Returns true if the time of the next sample has
     /// changed.
     pub fn watch(&mut self, access: &Access, value: u64, mcu: &mut dyn Mcu) -> bool {
-        let starts = |frames: &&mut Frames| {
+        let starts = |frames: &&mut TimerFrames| {
             (access.kind, access.address, value & 1) == (AccessKind::Write, frames.timer.stream, 1)
         };
         let Some(frames) = self.frames.iter_mut().find(starts) else { return false };
@@ -157,7 +157,7 @@ impl MotorPins {
 
     /// Returns the time of the next sample \[ns\].
     pub fn look_ns(&self) -> Option<u64> {
-        self.frames.iter().filter_map(Frames::next_ns).min()
+        self.frames.iter().filter_map(TimerFrames::next_ns).min()
     }
 
     /// Samples the pins for the bits of frames. Returns true if a frame is complete.
@@ -168,7 +168,7 @@ impl MotorPins {
                 frames.hold(mcu, at, true);
             }
         }
-        let due = |frames: &&mut Frames| frames.look_ns.is_some_and(|look_ns| at.0 >= look_ns);
+        let due = |frames: &&mut TimerFrames| frames.look_ns.is_some_and(|look_ns| at.0 >= look_ns);
         for frames in self.frames.iter_mut().filter(due) {
             let pins = pins.get(frames.timer.motors.clone()).unwrap_or_default();
             if frames.is_complete() {
@@ -221,7 +221,7 @@ impl MotorPins {
     }
 }
 
-impl Frames {
+impl TimerFrames {
     /// Samples the timer's pins; returns the time of the next sample.
     fn sample(&mut self, pins: &[Actuator], now_ns: u64, wrong: &mut Vec<String>) -> Option<u64> {
         let (first_ns, taken) = match self.sampling {

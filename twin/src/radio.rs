@@ -4,9 +4,9 @@
 
 use crate::check::check;
 use crate::fly::TICK_NS;
-use crate::hands::{Climb, Kill, Loss};
-use crate::led::{FRAME_NS, Hover, Led};
 use crate::machine::Machine;
+use crate::piloted::{FRAME_NS, PilotedFlight, PilotedHover};
+use crate::stick_pilots::{ClimbPilot, KillSwitchPilot, ReceiverLossPilot};
 use std::error::Error;
 use std::path::Path;
 
@@ -14,15 +14,15 @@ use std::path::Path;
 const KILL_NS: u64 = 20_000_000;
 
 /// Description of the flights: the scenario, the frame rates of the kill tests \[1/s\], and their number of phases.
-pub struct Order<'a> {
+pub struct RadioOptions<'a> {
     pub scenario: &'a Path,
     pub rates: &'a [u64],
     pub phases: u64,
 }
 
 /// Runs all flights by radio, and checks their results.
-pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Error>> {
-    let hover = Hover::<M>::of(image, order.scenario, &[("RC_MAP_KILL_SW", 7.0)], Climb::default())?;
+pub fn fly<M: Machine>(image: &Path, order: &RadioOptions<'_>) -> Result<(), Box<dyn Error>> {
+    let hover = PilotedHover::<M>::of(image, order.scenario, &[("RC_MAP_KILL_SW", 7.0)], ClimbPilot::default())?;
     let (shown, wrong) = hover.vehicle().transmitter.shown();
     println!("the transmitter shows {}", shown.join(", "));
     check(["place", "attitude", "mode"].iter().all(|it| shown.contains(it)) && wrong == 0, "telemetry comes back")?;
@@ -31,20 +31,21 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     for rate in order.rates {
         most_ns = most_ns.max(kill(&hover, *rate, order.phases)?);
     }
-    let Led { hand, .. } = hover.goes_on(FRAME_NS, 0, Loss::default())?;
-    println!("{}", hand.told());
+    let PilotedFlight { stick_pilot, .. } = hover.resume(FRAME_NS, 0, ReceiverLossPilot::default())?;
+    println!("{}", stick_pilot.summary());
     check(most_ns <= KILL_NS, "the motors stop within 20 ms")
 }
 
 /// Moves the kill switch at this many phases of a control period. Returns the longest time until the motors stopped
 /// \[ns\].
-fn kill<M: Machine>(hover: &Hover<M>, rate: u64, phases: u64) -> Result<u64, Box<dyn Error>> {
+fn kill<M: Machine>(hover: &PilotedHover<M>, rate: u64, phases: u64) -> Result<u64, Box<dyn Error>> {
     let mut took_ns = Vec::new();
     for phase in 0..phases {
         let late_ns = phase * TICK_NS / phases;
-        let Led { hand, vehicle, .. } = hover.goes_on(1_000_000_000 / rate, late_ns, Kill::default())?;
+        let PilotedFlight { stick_pilot, vehicle, .. } =
+            hover.resume(1_000_000_000 / rate, late_ns, KillSwitchPilot::default())?;
         let killed_ns = vehicle.transmitter.killed_ns.ok_or("the switch was not sent")?;
-        let stopped_ns = hand.stopped_ns.ok_or("the motors are not stopped")?;
+        let stopped_ns = stick_pilot.stopped_ns.ok_or("the motors are not stopped")?;
         took_ns.push((stopped_ns.saturating_sub(killed_ns), late_ns));
     }
     let ms = |ns: u64| ns as f64 * 1e-6;

@@ -2,16 +2,16 @@
 
 /// Generator: Marsaglia's xorshift.
 #[derive(Clone, Copy, Debug)]
-pub struct Random(u64);
+pub struct Xorshift(u64);
 
-impl Random {
+impl Xorshift {
     /// Creates a generator from a seed and the name of its use.
     pub fn new(seed: u64, name: &str) -> Self {
         let mix = name
             .bytes()
             .fold(seed ^ 0x9E37_79B9_7F4A_7C15, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3));
         // A state of zero would stay zero.
-        let mut random = Random(mix | 1);
+        let mut random = Xorshift(mix | 1);
         // The first numbers of similar seeds are alike, and are skipped.
         for _ in 0..16 {
             random.next();

@@ -1,8 +1,8 @@
 //! Replays a board's exact log on this machine, and compares every bit.
 
 use crate::check::check;
-use afbc_onboard::Configuration;
 use afbc_log::exact::{Frames, ReplayStep, Replayer};
+use afbc_onboard::Configuration;
 use std::error::Error;
 
 /// Replays a log of the image's default vehicle, and fails at the first tick that differs.

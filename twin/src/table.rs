@@ -1,21 +1,21 @@
 //! Table of the faults.
 
-use crate::trouble::{Outcome, Trouble};
+use crate::fault_injection::{FaultContext, FaultOutcome};
 use rigless::chip::uart::Rate;
 use rigless::time::VirtualNanos;
 
 /// Fault at a board's pins.
-pub struct Row {
+pub struct PinFault {
     pub name: &'static str,
     pub what: &'static str,
     /// Number of inertial sensors that a board needs for this fault.
     pub imus: usize,
     /// Worst acceptable outcome on a board with no, one and two inertial sensors.
-    expected: [Outcome; 3],
+    expected: [FaultOutcome; 3],
     /// Least time for which the flight is watched [ms].
     pub watch_ms: u64,
     /// Action of the fault, called from its start at every access and stop of the models.
-    pub act: fn(&mut Trouble<'_>),
+    pub act: fn(&mut FaultContext<'_>),
 }
 
 /// Indices of the inertial sensors.
@@ -30,46 +30,46 @@ const MS: u64 = 1_000_000;
 const fn row(
     name: &'static str,
     what: &'static str,
-    expected: Outcome,
+    expected: FaultOutcome,
     watch_ms: u64,
-    act: fn(&mut Trouble<'_>),
-) -> Row {
-    Row { name, what, imus: 1, expected: [expected; 3], watch_ms, act }
+    act: fn(&mut FaultContext<'_>),
+) -> PinFault {
+    PinFault { name, what, imus: 1, expected: [expected; 3], watch_ms, act }
 }
 
-impl Row {
+impl PinFault {
     /// Restricts the fault to boards with two inertial sensors.
     const fn of_two(self) -> Self {
-        Row { imus: 2, ..self }
+        PinFault { imus: 2, ..self }
     }
 
     /// Extends the fault to boards without sensors.
     const fn of_any(self) -> Self {
-        Row { imus: 0, ..self }
+        PinFault { imus: 0, ..self }
     }
 
     /// Sets the worst outcome for boards with one inertial sensor, which have no second one to switch to.
-    const fn with_one(self, expected: Outcome) -> Self {
+    const fn with_one(self, expected: FaultOutcome) -> Self {
         let [none, _, two] = self.expected;
-        Row { expected: [none, expected, two], ..self }
+        PinFault { expected: [none, expected, two], ..self }
     }
 
     /// Accepts the loss of a board without sensors, whose state comes over the link.
     const fn lost_without(self) -> Self {
         let [_, one, two] = self.expected;
-        Row { expected: [Outcome::Lost, one, two], ..self }
+        PinFault { expected: [FaultOutcome::Lost, one, two], ..self }
     }
 
     /// Returns the worst acceptable outcome on a board with this many inertial sensors.
-    pub fn expected(&self, imus: usize) -> Outcome {
+    pub fn expected(&self, imus: usize) -> FaultOutcome {
         self.expected[imus.min(2)]
     }
 }
 
-use Outcome::{FliesOn, Lands, Lost};
+use FaultOutcome::{FliesOn, Lands, Lost};
 
 /// All faults.
-pub const ROWS: &[Row] = &[
+pub const ROWS: &[PinFault] = &[
     row("none", "nothing", FliesOn, 3_000, |_| ()).of_any(),
     row("imu-1-silent", "the first IMU answers no more", FliesOn, 3_000, |t| t.impairments.imus[FIRST].silent = true)
         .with_one(Lost),
@@ -182,11 +182,11 @@ pub const ROWS: &[Row] = &[
         t.impairments.receiver.framing_errors = Rate::EVERY_WORD;
     }),
     row("telemetry-garbled", "every fiftieth byte to the vehicle is wrong", FliesOn, 4_000, |t| {
-        t.patient.garble_link(20_000)
+        t.target.garble_link(20_000)
     })
     .of_any(),
     row("telemetry-broken", "noise at full rate in place of the station", FliesOn, 3_000, |t| {
-        t.patient.garble_link(Rate::EVERY_WORD);
+        t.target.garble_link(Rate::EVERY_WORD);
         t.flood();
     })
     .of_any()
@@ -198,24 +198,24 @@ pub const ROWS: &[Row] = &[
     row("uart-storm-gnss", "the same of the GNSS receiver's UART", FliesOn, 3_000, |t| t.storm(GNSS)),
     row("reset", "a reset, as of the watchdog", Lost, 3_000, |t| {
         if t.looks == 0 {
-            t.patient.reset(t.at, t.instructions, t.host);
+            t.target.reset(t.at, t.instructions, t.host);
         }
     })
     .of_any(),
     row("brown-out", "the supply drops for a moment: the memory's content is random", Lost, 3_000, |t| {
         if t.looks == 0 {
-            t.patient.lose_memory(t.host, t.random);
-            t.patient.reset(t.at, t.instructions, t.host);
+            t.target.lose_memory(t.host, t.random);
+            t.target.reset(t.at, t.instructions, t.host);
         }
     })
     .of_any(),
 ];
 
-impl Trouble<'_> {
+impl FaultContext<'_> {
     /// Makes the next byte of an IMU random.
     fn garble(&mut self, chip: usize) {
         let mask = self.random.next() & 0xFF;
-        if let Some(place) = self.patient.imu(chip) {
+        if let Some(place) = self.target.imu(chip) {
             place.flip(mask);
         }
     }
@@ -223,14 +223,14 @@ impl Trouble<'_> {
     /// Inverts one random bit of the next byte of an IMU.
     fn flip_a_bit(&mut self, chip: usize) {
         let bit = self.random.below(8);
-        if let Some(place) = self.patient.imu(chip) {
+        if let Some(place) = self.target.imu(chip) {
             place.flip(1 << bit);
         }
     }
 
     /// Drops every third transfer of an IMU.
     fn drop_every_third(&mut self, chip: usize) {
-        if let Some(place) = self.patient.imu(chip)
+        if let Some(place) = self.target.imu(chip)
             && place.ended() > *self.kept + 2
         {
             *self.kept = place.ended();
@@ -261,7 +261,7 @@ impl Trouble<'_> {
             return;
         }
         *self.kept = self.since_ns + 5_000;
-        self.patient.raise(uart, self.host);
-        self.patient.stop_at(VirtualNanos(self.at.0 + 5_000));
+        self.target.raise(uart, self.host);
+        self.target.stop_at(VirtualNanos(self.at.0 + 5_000));
     }
 }

@@ -1,6 +1,6 @@
 //! Pilot's transmitter, with a CRSF receiver at a UART of the board.
 
-use crate::wire::Wire;
+use crate::wire::UartWire;
 use afbc_rc::{Channels, CrsfDecoder, CrsfFrame};
 use std::collections::BTreeSet;
 
@@ -17,8 +17,8 @@ pub const KILL: usize = 6;
 const NAMES: [(u8, &str); 4] = [(0x02, "place"), (0x08, "battery"), (0x1E, "attitude"), (0x21, "mode")];
 
 /// Transmitter, and the receiver's wire to the board.
-pub struct Transmitter {
-    wire: Wire,
+pub struct RcTransmitter {
+    wire: UartWire,
     pub channels: Channels,
     /// True while the receiver sends frames.
     pub is_heard: bool,
@@ -35,13 +35,13 @@ pub struct Transmitter {
     shown: BTreeSet<u8>,
 }
 
-impl Transmitter {
+impl RcTransmitter {
     /// Creates a transmitter with sticks centred, throttle down and all switches off.
-    pub fn new(wire: Wire, period_ns: u64, next_ns: u64) -> Self {
+    pub fn new(wire: UartWire, period_ns: u64, next_ns: u64) -> Self {
         let mut us = [1000; 16];
         us[..4].fill(1500);
         us[THROTTLE] = 1000;
-        Transmitter {
+        RcTransmitter {
             wire,
             channels: Channels::of(us),
             is_heard: true,
@@ -56,8 +56,8 @@ impl Transmitter {
     }
 
     /// Returns a transmitter with the same stick and switch positions, on another receiver's wire.
-    pub fn again(&self, wire: Wire, period_ns: u64, next_ns: u64) -> Self {
-        Transmitter { channels: self.channels, ..Transmitter::new(wire, period_ns, next_ns) }
+    pub fn again(&self, wire: UartWire, period_ns: u64, next_ns: u64) -> Self {
+        RcTransmitter { channels: self.channels, ..RcTransmitter::new(wire, period_ns, next_ns) }
     }
 
     /// Returns the time of the next frame \[ns\].

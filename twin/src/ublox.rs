@@ -22,7 +22,7 @@ use ublox_model::{Model, Truth};
 const JITTER_US: u64 = 50_000;
 
 #[derive(Debug)]
-struct Line {
+struct UbloxLine {
     model: Model,
     divider: Divider,
     /// Baud rate of the board's UART.
@@ -30,7 +30,7 @@ struct Line {
     sent_us: u64,
 }
 
-impl Line {
+impl UbloxLine {
     /// Returns a byte as it arrives at the other end of the line.
     fn carry(&self, byte: u8) -> u8 {
         // Baud rates within 2 % work together.
@@ -41,15 +41,15 @@ impl Line {
 
 /// u-blox receiver. Clones share one receiver.
 #[derive(Clone, Debug)]
-pub struct UbloxPeer(Arc<Mutex<Line>>);
+pub struct UbloxPeer(Arc<Mutex<UbloxLine>>);
 
 impl UbloxPeer {
     /// Creates a receiver at a UART with this divider.
     pub fn new(generation: Generation, divider: Divider) -> Self {
-        UbloxPeer(Arc::new(Mutex::new(Line { model: Model::new(generation), divider, baud: 0, sent_us: 0 })))
+        UbloxPeer(Arc::new(Mutex::new(UbloxLine { model: Model::new(generation), divider, baud: 0, sent_us: 0 })))
     }
 
-    fn with<T>(&self, change: impl FnOnce(&mut Line) -> T) -> T {
+    fn with<T>(&self, change: impl FnOnce(&mut UbloxLine) -> T) -> T {
         change(&mut self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
     }
 
@@ -102,7 +102,7 @@ impl UbloxPeer {
     }
 
     /// Returns the receiver's configuration as text.
-    pub fn told(&self) -> String {
+    pub fn summary(&self) -> String {
         self.with(|line| {
             let Model { baud, period_us, solves, nmea, dynamic_model, .. } = &line.model;
             format!(

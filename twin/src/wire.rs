@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex};
 
 /// Bytes on their way to and from the board.
 #[derive(Debug, Default)]
-struct Bytes {
+struct WireBytes {
     to_board: VecDeque<u8>,
     from_board: Vec<u8>,
     /// Time at which the last queued byte to the board was begun; `None` while bytes wait, and not stored in snapshots
@@ -19,10 +19,10 @@ struct Bytes {
 
 /// Wire whose bytes move at the pace of the board's UART. Clones share one wire.
 #[derive(Clone, Debug, Default)]
-pub struct Wire(Arc<Mutex<Bytes>>);
+pub struct UartWire(Arc<Mutex<WireBytes>>);
 
-impl Wire {
-    fn with<T>(&self, change: impl FnOnce(&mut Bytes) -> T) -> T {
+impl UartWire {
+    fn with<T>(&self, change: impl FnOnce(&mut WireBytes) -> T) -> T {
         change(&mut self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
     }
 
@@ -53,19 +53,19 @@ impl Wire {
     }
 }
 
-impl Store for Wire {
+impl Store for UartWire {
     fn store(&self, to: &mut Writer) -> Result<(), Error> {
         self.with(|wire| to.put(&(&wire.to_board, &wire.from_board)))
     }
 
     fn load(&mut self, from: &mut Reader) -> Result<(), Error> {
         let (to_board, from_board) = from.take()?;
-        self.with(|wire| *wire = Bytes { to_board, from_board, emptied_ns: None });
+        self.with(|wire| *wire = WireBytes { to_board, from_board, emptied_ns: None });
         Ok(())
     }
 }
 
-impl Peer for Wire {
+impl Peer for UartWire {
     fn receive(&mut self, word: u16, _: &mut Timeline<'_, '_>) {
         self.with(|wire| wire.from_board.push(word as u8));
     }

@@ -51,7 +51,7 @@ impl Transducers {
     }
 
     /// Updates the signals by the instruments' readings, and returns them.
-    pub fn feel(&mut self, readings: &Readings) -> Signals {
+    pub fn signals(&mut self, readings: &Readings) -> Signals {
         if let Some(imu) = &readings.imu {
             let [rates, force] = imu.value.map(frd);
             self.signals.angular_rate = rates.map(|rate| (rate.to_degrees() * 1e3).round() as i32);

@@ -141,23 +141,23 @@ pub struct Comparison {
     /// The scenario, with its contenders.
     pub scenario: Scenario,
     /// One entry for each of the scenario's contenders.
-    pub entries: Vec<Entry>,
+    pub entries: Vec<ContenderFlights>,
     /// Index of the contender that the others are compared with.
-    pub against: usize,
+    pub baseline: usize,
 }
 
 /// One contender's flights of one scenario.
 #[derive(Clone, Debug)]
-pub struct Entry {
+pub struct ContenderFlights {
     /// The flight with the scenario's own seed, including its log.
     pub first: ScenarioFlight,
     /// Results of all flights, beginning with the first.
-    pub flights: Vec<Outcome>,
+    pub flights: Vec<FlightOutcome>,
 }
 
 /// Result of one flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outcome {
+pub struct FlightOutcome {
     /// Seed of the flight's noise and weather.
     pub seed: u64,
     /// Time and reason of the vehicle's loss, if any.
@@ -211,14 +211,14 @@ pub const MEASURES: [Measure; 6] = [
     },
 ];
 
-impl Outcome {
+impl FlightOutcome {
     /// Returns the result of a flight of `scenario`.
     pub(crate) fn of(scenario: &Scenario, run: &FlightResult) -> Self {
-        Outcome { seed: scenario.seed, lost: run.lost, tripped: run.tripped, metrics: run.metrics }
+        FlightOutcome { seed: scenario.seed, lost: run.lost, tripped: run.tripped, metrics: run.metrics }
     }
 }
 
-impl Entry {
+impl ContenderFlights {
     /// Returns the contender.
     pub fn contender(&self) -> &Contender {
         &self.first.run.contender
@@ -231,7 +231,7 @@ impl Entry {
 
     /// Returns a figure of every flight. A lost vehicle counts as infinite, worse than any other.
     pub fn values(&self, value: impl Fn(&Metrics) -> f64) -> Vec<f64> {
-        let of = |flight: &Outcome| if flight.lost.is_some() { f64::INFINITY } else { value(&flight.metrics) };
+        let of = |flight: &FlightOutcome| if flight.lost.is_some() { f64::INFINITY } else { value(&flight.metrics) };
         self.flights.iter().map(of).collect()
     }
 
@@ -257,17 +257,17 @@ impl Entry {
 impl Comparison {
     /// Sets the contender that the others are compared with: the one called `name`, else AFBC, else the first.
     #[must_use]
-    pub fn against(mut self, name: Option<&str>) -> Self {
+    pub fn with_baseline(mut self, name: Option<&str>) -> Self {
         let place = |name| self.entries.iter().position(|entry| entry.contender().name == name);
-        self.against = name.and_then(place).or_else(|| place(ControllerKind::Afbc.name())).unwrap_or_default();
+        self.baseline = name.and_then(place).or_else(|| place(ControllerKind::Afbc.name())).unwrap_or_default();
         self
     }
 
     /// Returns a contender's median root mean square distance divided by backstepping's; none if either median is a
     /// lost flight.
-    pub fn ratio(&self, entry: &Entry) -> Option<f64> {
-        let distance = |entry: &Entry| entry.median(DISTANCE.value).map(|median| median.value);
-        let classical = |entry: &&Entry| entry.contender().kind() == ControllerKind::Backstepping;
+    pub fn ratio(&self, entry: &ContenderFlights) -> Option<f64> {
+        let distance = |entry: &ContenderFlights| entry.median(DISTANCE.value).map(|median| median.value);
+        let classical = |entry: &&ContenderFlights| entry.contender().kind() == ControllerKind::Backstepping;
         let ratio = distance(entry)? / distance(self.entries.iter().find(classical)?)?;
         // Flights that end before errors count give 0/0.
         Some(ratio).filter(|ratio| ratio.is_finite())
@@ -279,9 +279,10 @@ impl Comparison {
     }
 
     /// True if `entry` has the smallest median of a figure among those that lost no vehicle.
-    pub fn is_best(&self, entry: &Entry, figure: &Measure) -> bool {
-        let median =
-            |entry: &Entry| entry.median(figure.value).filter(|_| entry.lost() == 0).map(|median| median.value);
+    pub fn is_best(&self, entry: &ContenderFlights, figure: &Measure) -> bool {
+        let median = |entry: &ContenderFlights| {
+            entry.median(figure.value).filter(|_| entry.lost() == 0).map(|median| median.value)
+        };
         median(entry).is_some_and(|own| self.entries.iter().filter_map(median).all(|other| own <= other))
     }
 }
@@ -315,24 +316,24 @@ pub fn fly_seeds(
         // Only the first flight is plotted. Logs of the others would only take memory.
         let run = FlightResult::fly(&scenario, contender, if number == 0 { log_every } else { u64::MAX })?;
         progress();
-        Ok((Outcome::of(&scenario, &run), (number == 0).then_some(run)))
+        Ok((FlightOutcome::of(&scenario, &run), (number == 0).then_some(run)))
     };
     let entry = |scenario: &Scenario, contender: &Contender, seeds: u64| {
-        let flown: Vec<(Outcome, Option<FlightResult>)> = (0..seeds.max(1))
+        let flown: Vec<(FlightOutcome, Option<FlightResult>)> = (0..seeds.max(1))
             .into_par_iter()
             .map(|number| outcome(scenario, contender, number))
             .collect::<Result<_, _>>()?;
         let flights = flown.iter().map(|(outcome, _)| *outcome).collect();
         let first =
             flown.into_iter().find_map(|(_, run)| Some(ScenarioFlight { scenario: scenario.clone(), run: run? }));
-        Ok(first.map(|first| Entry { first, flights }))
+        Ok(first.map(|first| ContenderFlights { first, flights }))
     };
     let compare = |(scenario, seeds): (Scenario, u64)| {
         let contenders = scenario.contenders.par_iter();
-        let entries: Vec<Option<Entry>> =
+        let entries: Vec<Option<ContenderFlights>> =
             contenders.map(|contender| entry(&scenario, contender, seeds)).collect::<Result<_, _>>()?;
         let entries = entries.into_iter().flatten().collect();
-        Ok(Comparison { scenario, entries, against: 0 }.against(None))
+        Ok(Comparison { scenario, entries, baseline: 0 }.with_baseline(None))
     };
     scenarios.into_par_iter().map(compare).collect()
 }

@@ -1,11 +1,11 @@
 //! Flies a campaign on many cores and merges its shards.
 
 use crate::error::Error;
-use crate::folder::{CampaignFolder, Rows, finished};
+use crate::folder::{CampaignFolder, ResultRows, finished};
 use crate::manifest::{Manifest, Shard};
 use crate::plan::Campaign;
-use crate::row::Row;
-use crate::summary::Summary;
+use crate::row::ResultRow;
+use crate::summary::CampaignSummary;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -24,7 +24,7 @@ pub fn fly(
     folder: &CampaignFolder,
     stop: &AtomicBool,
     progress: &(dyn Fn(u64) + Sync),
-) -> Result<Option<Summary>, Error> {
+) -> Result<Option<CampaignSummary>, Error> {
     match flown(campaign, folder, stop, progress) {
         Err(Error::Stopped) => Ok(None),
         summary => summary.map(Some),
@@ -37,16 +37,16 @@ fn flown(
     folder: &CampaignFolder,
     stop: &AtomicBool,
     progress: &(dyn Fn(u64) + Sync),
-) -> Result<Summary, Error> {
+) -> Result<CampaignSummary, Error> {
     // `stop` is also checked between rows, since reading and writing many flights takes time.
     let heard = |row| if stop.load(Ordering::Relaxed) { Err(Error::Stopped) } else { row };
     if let Some(rows) = folder.results()? {
-        let mut summary = Summary::new(folder.manifest());
+        let mut summary = CampaignSummary::new(folder.manifest());
         rows.map(heard).try_for_each(|row| row.map(|row| summary.add(&row)))?;
         return Ok(summary.finish());
     }
     fly_missing(campaign, folder, stop, progress)?;
-    let mut summary = Summary::new(folder.manifest());
+    let mut summary = CampaignSummary::new(folder.manifest());
     folder.write(folder.rows().map(heard).inspect(|row| row.iter().for_each(|row| summary.add(row))))?;
     Ok(summary.finish())
 }
@@ -67,14 +67,14 @@ fn fly_missing(
     // memory.
     // The iterator is fused, since every thread asks once more after the last flight. Threads finish flights in any
     // order, so rows are sorted by their place in the chunk.
-    let (jobs, begun) = (Mutex::new(jobs.fuse()), Mutex::new(BTreeMap::<u64, BTreeMap<usize, Vec<Row>>>::new()));
+    let (jobs, begun) = (Mutex::new(jobs.fuse()), Mutex::new(BTreeMap::<u64, BTreeMap<usize, Vec<ResultRow>>>::new()));
     let failed = AtomicBool::new(false);
     // A panic poisons the lock, and rayon passes the panic on when all threads have ended. No flight starts until then.
     let next = || match jobs.lock() {
         Ok(mut jobs) => jobs.next(),
         Err(_) => None,
     };
-    let gather = |chunk: u64, place: usize, rows: Vec<Row>| {
+    let gather = |chunk: u64, place: usize, rows: Vec<ResultRow>| {
         let Ok(mut begun) = begun.lock() else { return None };
         let flown = begun.entry(chunk).or_default();
         flown.insert(place, rows);
@@ -106,7 +106,7 @@ fn fly_missing(
 ///
 /// # Errors
 /// Shards of different campaigns, a missing, unfinished or duplicate shard, and files that cannot be read or written.
-pub fn merge(shards: &[PathBuf], out: &Path, force: bool) -> Result<(CampaignFolder, Summary), Error> {
+pub fn merge(shards: &[PathBuf], out: &Path, force: bool) -> Result<(CampaignFolder, CampaignSummary), Error> {
     let is_out =
         |shard: &&PathBuf| shard.canonicalize().is_ok_and(|shard| out.canonicalize().is_ok_and(|out| out == shard));
     if let Some(part) = shards.iter().find(is_out) {
@@ -138,14 +138,14 @@ pub fn merge(shards: &[PathBuf], out: &Path, force: bool) -> Result<(CampaignFol
     let whole = Manifest { shard: Shard::WHOLE, ..manifest };
     let contenders = whole.contenders.len();
     let folder = CampaignFolder::open(out, whole, force)?;
-    let mut summary = Summary::new(folder.manifest());
+    let mut summary = CampaignSummary::new(folder.manifest());
     // Flight `i` is in the shard at index `i` modulo the number of shards.
     let flights = (0..folder.manifest().flights).flat_map(|flight| core::iter::repeat_n(flight, contenders));
-    let mut rows: Vec<Rows> = parts.into_iter().map(|(_, rows)| rows).collect();
+    let mut rows: Vec<ResultRows> = parts.into_iter().map(|(_, rows)| rows).collect();
     let rows = flights.map(|flight| {
         let shard = rows.get_mut((flight % of) as usize).ok_or(Error::Missing(Vec::new()))?;
         match shard.next() {
-            Some(Ok(Row { flight: found, .. })) if found != flight => Err(shard.incomplete()),
+            Some(Ok(ResultRow { flight: found, .. })) if found != flight => Err(shard.incomplete()),
             None => Err(shard.incomplete()),
             Some(row) => row,
         }

@@ -6,10 +6,10 @@
 
 use crate::error::Error;
 use crate::manifest::Manifest;
-use crate::parquet::{OnDisk, Reader, Writer};
-use crate::row::Row;
-use afbc_files::seal::{self, Sealing};
-use afbc_files::{self as files, Folder as Place};
+use crate::parquet::{ReopenedFile, RowReader, RowWriter};
+use crate::row::ResultRow;
+use afbc_files::seal::{self, SealingWriter};
+use afbc_files::{self as files, Folder};
 use bytes::Bytes;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -34,13 +34,13 @@ const COMMAND: &str = "campaign";
 
 /// Folder with the results of one campaign or shard, locked against other programs.
 pub struct CampaignFolder {
-    place: Place,
+    folder: Folder,
     manifest: Manifest,
 }
 
 /// Contents of `campaign.json`.
 #[derive(Serialize, Deserialize)]
-struct Page<M> {
+struct CampaignFile<M> {
     #[serde(flatten)]
     manifest: M,
     checksum: String,
@@ -55,7 +55,7 @@ impl CampaignFolder {
     /// changed then.
     pub fn open(path: &Path, manifest: Manifest, force: bool) -> Result<Self, Error> {
         let name = manifest.name.clone();
-        Place::find(path, COMMAND, &name, force)?;
+        Folder::find(path, COMMAND, &name, force)?;
         let is_known = match found(&path.join(MANIFEST)) {
             Ok(Some(found)) if manifest.is_same(&found) => true,
             Ok(None) => false,
@@ -64,30 +64,30 @@ impl CampaignFolder {
             Ok(Some(_)) => return Err(Error::Changed(path.into())),
             Err(error) => return Err(error),
         };
-        let place = Place::open(path, COMMAND, &name, force)?;
-        place.add(&[MANIFEST, RESULTS, CHUNKS, "summary.json", "report.html"])?;
-        let folder = CampaignFolder { place, manifest };
-        if force && folder.results().is_err() {
+        let folder = Folder::open(path, COMMAND, &name, force)?;
+        folder.add(&[MANIFEST, RESULTS, CHUNKS, "summary.json", "report.html"])?;
+        let opened = CampaignFolder { folder, manifest };
+        if force && opened.results().is_err() {
             // The results are damaged or belong to another campaign.
-            fs::remove_file(path.join(RESULTS)).map_err(|source| folder.place.error(RESULTS, source))?;
+            fs::remove_file(path.join(RESULTS)).map_err(|source| opened.folder.error(RESULTS, source))?;
         }
         if !is_known {
-            let page = Page { manifest: &folder.manifest, checksum: seal::OPEN.into() };
-            folder.place_sealed(MANIFEST, |out| seal::json(out, &page))?;
+            let page = CampaignFile { manifest: &opened.manifest, checksum: seal::OPEN.into() };
+            opened.write_sealed(MANIFEST, |out| seal::json(out, &page))?;
         }
         // Sweeping is safe under the lock: no running program owns any of the temporary files.
-        files::sweep(&path.join(CHUNKS));
-        Ok(folder)
+        files::remove_temporary_files(&path.join(CHUNKS));
+        Ok(opened)
     }
 
     /// Returns the folder's path.
     pub fn path(&self) -> &Path {
-        self.place.path()
+        self.folder.path()
     }
 
     /// Returns the underlying folder, to write other files of the campaign into.
-    pub fn place(&self) -> &Place {
-        &self.place
+    pub fn output_folder(&self) -> &Folder {
+        &self.folder
     }
 
     /// Returns the paths of the two files with their own checksums: the manifest and all rows.
@@ -101,12 +101,12 @@ impl CampaignFolder {
     }
 
     /// Writes a file with its own checksum. Such a checksum locates damage better than the folder's.
-    fn place_sealed(
+    fn write_sealed(
         &self,
         name: &str,
         fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
     ) -> Result<(), files::Error> {
-        files::place(&self.path().join(name), fill).map_err(|source| self.place.error(name, source))
+        files::write_atomically(&self.path().join(name), fill).map_err(|source| self.folder.error(name, source))
     }
 
     /// Returns the number of all chunks.
@@ -150,15 +150,15 @@ impl CampaignFolder {
     }
 
     /// Reads and checks the rows of one chunk.
-    fn read_chunk(&self, chunk: u64) -> Result<Vec<Row>, Error> {
+    fn read_chunk(&self, chunk: u64) -> Result<Vec<ResultRow>, Error> {
         let path = self.chunk_path(chunk);
         let bytes = fs::read(&path).map_err(|error| unread(&path, error))?;
         seal::verify(&mut io::Cursor::new(&bytes)).map_err(|error| unread(&path, error))?;
-        let reader = Reader::new(Bytes::from(bytes)).map_err(|error| damaged(&path, error))?;
+        let reader = RowReader::new(Bytes::from(bytes)).map_err(|error| damaged(&path, error))?;
         if !self.manifest.is_same(reader.manifest()) {
             return Err(damaged(&path, "it belongs to another campaign"));
         }
-        let rows = reader.collect::<Result<Vec<Row>, _>>().map_err(|error| damaged(&path, error))?;
+        let rows = reader.collect::<Result<Vec<ResultRow>, _>>().map_err(|error| damaged(&path, error))?;
         let contenders = &self.manifest.contenders;
         let wanted = self.chunk(chunk).flat_map(|flight| contenders.iter().map(move |name| (flight, name)));
         if wanted.eq(rows.iter().map(|row| (row.flight, &row.contender))) {
@@ -169,16 +169,16 @@ impl CampaignFolder {
     }
 
     /// Writes the rows of one chunk.
-    pub(super) fn put_chunk(&self, chunk: u64, rows: impl Iterator<Item = Row>) -> Result<(), Error> {
+    pub(super) fn put_chunk(&self, chunk: u64, rows: impl Iterator<Item = ResultRow>) -> Result<(), Error> {
         let path = self.chunk_path(chunk);
         let written = fs::create_dir_all(self.path().join(CHUNKS))
-            .and_then(|()| files::place(&path, |out| write(out, &self.manifest, rows)));
+            .and_then(|()| files::write_atomically(&path, |out| write(out, &self.manifest, rows)));
         written.map_err(|source| files::Error::Write { path, source }.into())
     }
 
     /// Returns all rows, if they are already in one file.
-    pub fn results(&self) -> Result<Option<Rows>, Error> {
-        let rows = Rows::open(&self.path().join(RESULTS))?;
+    pub fn results(&self) -> Result<Option<ResultRows>, Error> {
+        let rows = ResultRows::open(&self.path().join(RESULTS))?;
         match rows {
             Some(rows) if !self.manifest.is_same(rows.manifest()) => Err(Error::Changed(self.path().into())),
             rows => Ok(rows),
@@ -186,7 +186,7 @@ impl CampaignFolder {
     }
 
     /// Returns the rows of all chunks, in order. Only 64 chunks are in memory at a time.
-    pub(super) fn rows(&self) -> impl Iterator<Item = Result<Row, Error>> {
+    pub(super) fn rows(&self) -> impl Iterator<Item = Result<ResultRow, Error>> {
         let chunks = self.chunks();
         (0..chunks).step_by(BATCH as usize).flat_map(move |first| {
             let batch = first..chunks.min(first + BATCH);
@@ -202,9 +202,9 @@ impl CampaignFolder {
     ///
     /// # Errors
     /// The first error among the rows, or of writing. No file is written then.
-    pub(super) fn write(&self, rows: impl Iterator<Item = Result<Row, Error>>) -> Result<(), Error> {
+    pub(super) fn write(&self, rows: impl Iterator<Item = Result<ResultRow, Error>>) -> Result<(), Error> {
         let mut failure = None;
-        let written = self.place_sealed(RESULTS, |out| {
+        let written = self.write_sealed(RESULTS, |out| {
             write(out, &self.manifest, rows.map_while(|row| row.map_err(|error| failure = Some(error)).ok()))?;
             // Without this error, an incomplete file would look complete.
             if failure.is_some() { Err(io::ErrorKind::InvalidData.into()) } else { Ok(()) }
@@ -227,27 +227,31 @@ fn found(path: &Path) -> Result<Option<Manifest>, Error> {
         bytes => bytes.map_err(|error| unread(path, error))?,
     };
     seal::verify(&mut io::Cursor::new(&bytes)).map_err(|error| unread(path, error))?;
-    let page: Page<Manifest> = serde_json::from_slice(&bytes).map_err(|error| damaged(path, error))?;
+    let page: CampaignFile<Manifest> = serde_json::from_slice(&bytes).map_err(|error| damaged(path, error))?;
     Ok(Some(page.manifest))
 }
 
 /// Returns the rows and the manifest of a finished folder.
-pub(super) fn finished(path: &Path) -> Result<Rows, Error> {
-    Rows::open(&path.join(RESULTS))?.ok_or_else(|| Error::Unfinished(path.into()))
+pub(super) fn finished(path: &Path) -> Result<ResultRows, Error> {
+    ResultRows::open(&path.join(RESULTS))?.ok_or_else(|| Error::Unfinished(path.into()))
 }
 
-fn write(out: &mut (dyn Write + Send), manifest: &Manifest, mut rows: impl Iterator<Item = Row>) -> io::Result<()> {
-    let mut writer = Writer::new(Sealing::new(out), manifest).map_err(io::Error::other)?;
+fn write(
+    out: &mut (dyn Write + Send),
+    manifest: &Manifest,
+    mut rows: impl Iterator<Item = ResultRow>,
+) -> io::Result<()> {
+    let mut writer = RowWriter::new(SealingWriter::new(out), manifest).map_err(io::Error::other)?;
     rows.try_for_each(|row| writer.push(row)).and_then(|()| writer.finish()).map_err(io::Error::other)?.finish()
 }
 
 /// Rows of one file; errors name the file.
-pub struct Rows {
+pub struct ResultRows {
     path: PathBuf,
-    rows: Reader<OnDisk>,
+    rows: RowReader<ReopenedFile>,
 }
 
-impl Rows {
+impl ResultRows {
     /// Verifies the checksum of the file at `path` and opens its rows. Returns none if there is no such file.
     fn open(path: &Path) -> Result<Option<Self>, Error> {
         let mut file = match File::open(path) {
@@ -256,8 +260,8 @@ impl Rows {
         };
         seal::verify(&mut file).map_err(|error| unread(path, error))?;
         let length = file.metadata().map_err(|error| unread(path, error))?.len();
-        let rows = Reader::new(OnDisk { path: path.into(), length }).map_err(|error| damaged(path, error))?;
-        Ok(Some(Rows { path: path.into(), rows }))
+        let rows = RowReader::new(ReopenedFile { path: path.into(), length }).map_err(|error| damaged(path, error))?;
+        Ok(Some(ResultRows { path: path.into(), rows }))
     }
 
     pub(super) fn manifest(&self) -> &Manifest {
@@ -270,8 +274,8 @@ impl Rows {
     }
 }
 
-impl Iterator for Rows {
-    type Item = Result<Row, Error>;
+impl Iterator for ResultRows {
+    type Item = Result<ResultRow, Error>;
 
     fn next(&mut self) -> Option<Self::Item> {
         Some(self.rows.next()?.map_err(|error| damaged(&self.path, error)))

@@ -3,7 +3,7 @@
 
 use crate::built_in::built_in;
 use crate::plan::{Campaign, Spread};
-use crate::row::{Column, FIGURES, Row};
+use crate::row::{FIGURES, ResultColumn, ResultRow};
 use afbc_files::seal::hash_of;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -54,7 +54,7 @@ impl fmt::Display for Shard {
 
 /// A drawn quantity.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Drawn {
+pub struct DrawnQuantity {
     /// Name, ending in the unit.
     pub name: String,
     /// Meaning in words.
@@ -81,7 +81,7 @@ pub struct Manifest {
     /// Names of the trajectories, which are flown in turn.
     pub trajectories: Vec<String>,
     /// Drawn quantities, in the order of the columns.
-    pub drawn: Vec<Drawn>,
+    pub drawn: Vec<DrawnQuantity>,
     /// The shard that these results cover.
     pub shard: Shard,
 }
@@ -91,7 +91,11 @@ impl Manifest {
     pub fn new(campaign: &Campaign, shard: Shard) -> Self {
         let drawn = |spread: &Spread| {
             let quantity = spread.quantity()?;
-            Some(Drawn { name: quantity.range.name.into(), meaning: quantity.meaning.into(), ends: spread.ends })
+            Some(DrawnQuantity {
+                name: quantity.range.name.into(),
+                meaning: quantity.meaning.into(),
+                ends: spread.ends,
+            })
         };
         Manifest {
             name: campaign.name.clone(),
@@ -107,14 +111,16 @@ impl Manifest {
     }
 
     /// Returns the columns of numbers: drawn quantities, then figures.
-    pub fn columns(&self) -> Vec<Column> {
-        let drawn = self.drawn.iter().map(|drawn| Column { name: drawn.name.clone(), meaning: drawn.meaning.clone() });
-        let figures = FIGURES.iter().map(|figure| Column { name: figure.name.into(), meaning: figure.meaning.into() });
+    pub fn columns(&self) -> Vec<ResultColumn> {
+        let drawn =
+            self.drawn.iter().map(|drawn| ResultColumn { name: drawn.name.clone(), meaning: drawn.meaning.clone() });
+        let figures =
+            FIGURES.iter().map(|figure| ResultColumn { name: figure.name.into(), meaning: figure.meaning.into() });
         drawn.chain(figures).collect()
     }
 
     /// Returns the value of `row` in the column `name`.
-    pub fn number(&self, row: &Row, name: &str) -> Option<f64> {
+    pub fn number(&self, row: &ResultRow, name: &str) -> Option<f64> {
         let drawn = self.drawn.iter().position(|drawn| drawn.name == name);
         let figure = || Some(self.drawn.len() + FIGURES.iter().position(|figure| figure.name == name)?);
         row.numbers.get(drawn.or_else(figure)?).copied().flatten()

@@ -1,7 +1,7 @@
 //! Writes and reads rows as Parquet files.
 
 use crate::manifest::Manifest;
-use crate::row::Row;
+use crate::row::ResultRow;
 use afbc_files::seal;
 use bytes::Bytes;
 use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
@@ -54,13 +54,13 @@ fn schema(manifest: &Manifest) -> Result<Arc<Type>> {
 }
 
 /// Writes rows in the given order.
-pub(super) struct Writer<W: Write + Send> {
+pub(super) struct RowWriter<W: Write + Send> {
     file: SerializedFileWriter<W>,
     group_rows: usize,
-    rows: Vec<Row>,
+    rows: Vec<ResultRow>,
 }
 
-impl<W: Write + Send> Writer<W> {
+impl<W: Write + Send> RowWriter<W> {
     /// Creates a file for the rows of `manifest`. The same rows give the same bytes.
     pub(super) fn new(out: W, manifest: &Manifest) -> Result<Self> {
         let external = |error: serde_json::Error| ParquetError::External(error.into());
@@ -83,10 +83,10 @@ impl<W: Write + Send> Writer<W> {
         let file = SerializedFileWriter::new(out, schema(manifest)?, Arc::new(properties))?;
         let [least, most] = GROUP_ROWS;
         let group_rows = (most / manifest.shard.of as usize).max(least);
-        Ok(Writer { file, group_rows, rows: Vec::new() })
+        Ok(RowWriter { file, group_rows, rows: Vec::new() })
     }
 
-    pub(super) fn push(&mut self, row: Row) -> Result<()> {
+    pub(super) fn push(&mut self, row: ResultRow) -> Result<()> {
         self.rows.push(row);
         if self.rows.len() == self.group_rows { self.flush() } else { Ok(()) }
     }
@@ -134,18 +134,18 @@ fn put<T: DataType>(
 }
 
 /// A file that is open only while it is being read. Keeping many chunks open would exceed the system's limit.
-pub(super) struct OnDisk {
+pub(super) struct ReopenedFile {
     pub(super) path: PathBuf,
     pub(super) length: u64,
 }
 
-impl Length for OnDisk {
+impl Length for ReopenedFile {
     fn len(&self) -> u64 {
         self.length
     }
 }
 
-impl ChunkReader for OnDisk {
+impl ChunkReader for ReopenedFile {
     type T = BufReader<File>;
 
     fn get_read(&self, start: u64) -> Result<Self::T> {
@@ -162,14 +162,14 @@ impl ChunkReader for OnDisk {
 }
 
 /// Reads rows in order. The file must be verified first, since the library may panic on damaged data.
-pub(super) struct Reader<R: ChunkReader + 'static> {
+pub(super) struct RowReader<R: ChunkReader + 'static> {
     file: SerializedFileReader<R>,
     manifest: Manifest,
     next_group: usize,
-    rows: std::vec::IntoIter<Row>,
+    rows: std::vec::IntoIter<ResultRow>,
 }
 
-impl<R: ChunkReader + 'static> Reader<R> {
+impl<R: ChunkReader + 'static> RowReader<R> {
     /// Opens the rows in `source`.
     pub(super) fn new(source: R) -> Result<Self> {
         let file = SerializedFileReader::new(source)?;
@@ -182,14 +182,14 @@ impl<R: ChunkReader + 'static> Reader<R> {
         if file.metadata().file_metadata().schema() != schema(&manifest)?.as_ref() {
             return Err(shape());
         }
-        Ok(Reader { file, manifest, next_group: 0, rows: Vec::new().into_iter() })
+        Ok(RowReader { file, manifest, next_group: 0, rows: Vec::new().into_iter() })
     }
 
     pub(super) fn manifest(&self) -> &Manifest {
         &self.manifest
     }
 
-    fn group(&self, index: usize) -> Result<Vec<Row>> {
+    fn group(&self, index: usize) -> Result<Vec<ResultRow>> {
         let group = self.file.get_row_group(index)?;
         let group = group.as_ref();
         let columns = self.manifest.columns().len();
@@ -204,7 +204,7 @@ impl<R: ChunkReader + 'static> Reader<R> {
         let numbers = (0..columns).map(|column| Ok(take::<DoubleType>(group, LABELS.len() + column)?.into_iter()));
         let mut numbers = numbers.collect::<Result<Vec<_>>>()?;
         let row = |flight: Option<i64>| {
-            Ok(Row {
+            Ok(ResultRow {
                 flight: flight.ok_or_else(shape)?.cast_unsigned(),
                 seed: seeds.next().flatten().ok_or_else(shape)?.cast_unsigned(),
                 contender: text(contenders.next().flatten().ok_or_else(shape)?)?,
@@ -218,8 +218,8 @@ impl<R: ChunkReader + 'static> Reader<R> {
     }
 }
 
-impl<R: ChunkReader + 'static> Iterator for Reader<R> {
-    type Item = Result<Row>;
+impl<R: ChunkReader + 'static> Iterator for RowReader<R> {
+    type Item = Result<ResultRow>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.rows.len() == 0 && self.next_group < self.file.num_row_groups() {

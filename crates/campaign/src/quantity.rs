@@ -21,11 +21,11 @@ pub struct Quantity {
     /// Name of another quantity without which this one has no effect.
     pub needs: Option<&'static str>,
     /// Applies the value to a flight.
-    apply: fn(&mut Assembly, f64),
+    apply: fn(&mut FlightAssembly, f64),
 }
 
 /// A flight under construction, while drawn values are applied to it.
-struct Assembly {
+struct FlightAssembly {
     scenario: Scenario,
     truth: Parameters<f64>,
     payload: Option<Payload>,
@@ -40,11 +40,11 @@ pub(super) fn apply<'a>(
     values: impl Iterator<Item = (&'a Quantity, f64)>,
 ) -> Result<Scenario, OutOfRange> {
     let truth = *scenario.environment.nominal();
-    let mut flight = Assembly { scenario, truth, payload: None };
+    let mut flight = FlightAssembly { scenario, truth, payload: None };
     for (quantity, value) in values {
         (quantity.apply)(&mut flight, value);
     }
-    let Assembly { mut scenario, truth, payload } = flight;
+    let FlightAssembly { mut scenario, truth, payload } = flight;
     let old = &scenario.environment;
     let payloads = old.payloads().iter().copied().chain(payload).collect();
     scenario.environment =
@@ -57,7 +57,7 @@ const fn quantity(
     min: f64,
     max: f64,
     meaning: &'static str,
-    apply: fn(&mut Assembly, f64),
+    apply: fn(&mut FlightAssembly, f64),
 ) -> Quantity {
     Quantity { range: Range::new(name, min, max), meaning, whole: false, needs: None, apply }
 }

@@ -9,7 +9,7 @@ use core::ops::ControlFlow;
 
 /// Result of one flight of one contender: a row of the results.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct ResultRow {
     /// Index of the flight.
     pub flight: u64,
     /// Seed of the flight's noise and weather.
@@ -28,7 +28,7 @@ pub struct Row {
 
 /// A column of numbers.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Column {
+pub struct ResultColumn {
     /// Name, ending in the unit.
     pub name: String,
     /// Meaning in words.
@@ -36,17 +36,17 @@ pub struct Column {
 }
 
 /// A figure of merit.
-pub struct Figure {
+pub struct FigureOfMerit {
     /// Name, ending in the unit.
     pub name: &'static str,
     /// Meaning in words.
     pub meaning: &'static str,
-    value: fn(&Tally) -> Option<f64>,
+    value: fn(&FlightSums) -> Option<f64>,
 }
 
 /// Sums over one flight.
 #[derive(Clone, Debug, Default)]
-struct Tally {
+struct FlightSums {
     lost: Option<Lost>,
     /// Time and reason of the monitor's trip, if any.
     tripped: Option<(f64, &'static str)>,
@@ -58,7 +58,7 @@ struct Tally {
     saturated: u64,
 }
 
-impl Tally {
+impl FlightSums {
     fn measured(&self, value: f64) -> Option<f64> {
         self.metrics.measured(value)
     }
@@ -69,13 +69,13 @@ impl Tally {
     }
 }
 
-const fn figure(name: &'static str, meaning: &'static str, value: fn(&Tally) -> Option<f64>) -> Figure {
-    Figure { name, meaning, value }
+const fn figure(name: &'static str, meaning: &'static str, value: fn(&FlightSums) -> Option<f64>) -> FigureOfMerit {
+    FigureOfMerit { name, meaning, value }
 }
 
 /// All figures of merit, in the order of the columns. Errors are evaluated from
 /// [`SETTLED_S`](afbc_sim::metrics::SETTLED_S) on.
-pub static FIGURES: [Figure; 21] = [
+pub static FIGURES: [FigureOfMerit; 21] = [
     figure("lost_at_s", "when the vehicle was lost", |o| o.lost.map(|lost| lost.time_s)),
     figure("tripped_at_s", "when the monitor switched to the fallback law", |o| o.tripped.map(|(time_s, _)| time_s)),
     figure("rmse_x_m", "root mean square error along x", |o| o.measured(o.metrics.rmse.x)),
@@ -116,15 +116,15 @@ impl Campaign {
     ///
     /// # Errors
     /// The first parameter, gain or setting out of range.
-    pub fn rows(&self, flight: u64) -> Result<Vec<Row>, OutOfRange> {
+    pub fn rows(&self, flight: u64) -> Result<Vec<ResultRow>, OutOfRange> {
         let draw = self.draw(flight);
         let scenario = self.with(flight, &draw)?;
         let trajectory = self.trajectory(flight).map(|trajectory| trajectory.name.as_str()).unwrap_or_default();
         let mut start = FlightStart::of(&scenario);
         let row = |contender: &Contender| {
-            let outcome = Tally::of(&mut start, contender)?;
+            let outcome = FlightSums::of(&mut start, contender)?;
             let figures = FIGURES.iter().map(|figure| (figure.value)(&outcome));
-            Ok(Row {
+            Ok(ResultRow {
                 flight,
                 seed: draw.seed,
                 contender: contender.name.clone(),
@@ -138,10 +138,10 @@ impl Campaign {
     }
 }
 
-impl Tally {
+impl FlightSums {
     /// Flies the contender and keeps only sums.
     fn of(start: &mut FlightStart, contender: &Contender) -> Result<Self, OutOfRange> {
-        let mut outcome = Tally::default();
+        let mut outcome = FlightSums::default();
         let mut metrics = Accumulator::default();
         outcome.lost = start.fly(contender, &mut |sample| {
             metrics.add(sample);

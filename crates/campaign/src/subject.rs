@@ -31,7 +31,7 @@ pub enum Subject {
 }
 
 /// A file that was found but not yet parsed.
-struct Found {
+struct FoundFile {
     kind: SubjectKind,
     /// The name as given.
     shown: String,
@@ -61,7 +61,7 @@ impl SubjectKind {
     }
 
     /// Returns the built-in object of another kind called `name`.
-    fn other(self, name: &str) -> Option<Found> {
+    fn other(self, name: &str) -> Option<FoundFile> {
         let all = [SubjectKind::Scenario, SubjectKind::Campaign, SubjectKind::Vehicle];
         all.into_iter().filter(|kind| *kind != self).find_map(|kind| kind.built_in(name))
     }
@@ -77,7 +77,7 @@ impl SubjectKind {
         }
     }
 
-    fn built_in(self, name: &str) -> Option<Found> {
+    fn built_in(self, name: &str) -> Option<FoundFile> {
         let text = match self {
             SubjectKind::Scenario => afbc_scenario::built_in(name)?.text,
             SubjectKind::Campaign => built_in::built_in(name)?.text,
@@ -85,7 +85,7 @@ impl SubjectKind {
         };
         let file = format!("built-in {name}");
         let [shown, name] = [name; 2].map(str::to_owned);
-        Some(Found { kind: self, shown, file, text: text.into(), name, folder: PathBuf::new() })
+        Some(FoundFile { kind: self, shown, file, text: text.into(), name, folder: PathBuf::new() })
     }
 
     fn similar(self, name: &str) -> Option<&'static str> {
@@ -110,7 +110,7 @@ impl SubjectKind {
     }
 }
 
-impl Found {
+impl FoundFile {
     /// Finds `path`. A plain name means a built-in object of this `kind`, else a file, else a built-in object of
     /// another kind.
     fn at(path: &Path, kind: SubjectKind) -> Result<Self, FileError> {
@@ -123,7 +123,7 @@ impl Found {
         }
         let text = afbc_files::read::text(path, kind.name())?;
         let shown = path.display().to_string();
-        Ok(Found {
+        Ok(FoundFile {
             kind: SubjectKind::of(&text).unwrap_or(kind),
             file: shown.clone(),
             shown,
@@ -135,7 +135,7 @@ impl Found {
 
     /// Returns the file if it is of this kind, or else an error that says how to fly it.
     fn only(self, kind: SubjectKind) -> Result<Self, FileError> {
-        let Found { kind: found, shown, .. } = &self;
+        let FoundFile { kind: found, shown, .. } = &self;
         let problem = match found {
             _ if *found == kind => return Ok(self),
             SubjectKind::Scenario => format!(
@@ -165,7 +165,7 @@ impl Found {
 /// # Errors
 /// The first error, as one line. A campaign or vehicle is also an error.
 pub fn scenario(path: &Path) -> Result<Scenario, FileError> {
-    Found::at(path, SubjectKind::Scenario)?.only(SubjectKind::Scenario)?.scenario()
+    FoundFile::at(path, SubjectKind::Scenario)?.only(SubjectKind::Scenario)?.scenario()
 }
 
 /// Reads and checks the campaign at `path`.
@@ -173,7 +173,7 @@ pub fn scenario(path: &Path) -> Result<Scenario, FileError> {
 /// # Errors
 /// The first error, as one line. A scenario or vehicle is also an error.
 pub fn campaign(path: &Path) -> Result<Campaign, FileError> {
-    Found::at(path, SubjectKind::Campaign)?.only(SubjectKind::Campaign)?.campaign()
+    FoundFile::at(path, SubjectKind::Campaign)?.only(SubjectKind::Campaign)?.campaign()
 }
 
 /// Reads and checks the scenario, campaign or vehicle at `path`.
@@ -181,7 +181,7 @@ pub fn campaign(path: &Path) -> Result<Campaign, FileError> {
 /// # Errors
 /// All mistakes, one line each.
 pub fn any(path: &Path) -> Result<Subject, FileError> {
-    let found = Found::at(path, SubjectKind::Scenario)?;
+    let found = FoundFile::at(path, SubjectKind::Scenario)?;
     match found.kind {
         SubjectKind::Scenario => found.scenario().map(Subject::Scenario),
         SubjectKind::Campaign => found.campaign().map(Subject::Campaign),

@@ -43,12 +43,12 @@ pub struct SuiteFlight {
     /// Tilt limit that every contender gets at least \[rad\]; none leaves the limits as they are.
     pub tilt_max_rad: Option<f64>,
     /// Published figures of this flight.
-    pub published: Vec<Published>,
+    pub published: Vec<PublishedFigure>,
 }
 
 /// A published figure.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Published {
+pub struct PublishedFigure {
     /// Name of the law that was flown.
     pub law: String,
     /// Root mean square distance from the reference \[m\].
@@ -95,7 +95,7 @@ impl Suite {
 /// # Errors
 /// The first mistake, as one line.
 pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Suite, FileError> {
-    afbc_files::read::document_with_heirs(file, text, SAMPLE, ("flight", &OWN), |mut root| {
+    afbc_files::read::document_with_inheritance(file, text, SAMPLE, ("flight", &OWN), |mut root| {
         let [name, description] = afbc_files::read::title(&mut root, name)?;
         let sources: Vec<Citation> = root.few_tables("source")?.into_iter().map(source).collect::<Result<_, _>>()?;
         let mut flights: Vec<SuiteFlight> = Vec::new();
@@ -185,7 +185,7 @@ fn flight(
     Ok(SuiteFlight { scenario, tilt_max_rad, published })
 }
 
-fn figure(mut table: Table<'_>, sources: &[Citation]) -> Result<Published, FileError> {
+fn figure(mut table: Table<'_>, sources: &[Citation]) -> Result<PublishedFigure, FileError> {
     let law = table.need_text("law", "say who flew")?.to_owned();
     let rms_m = table.need_number(&RMS)?;
     let name = table.need_text("source", "name one of the [[source]]")?;
@@ -193,5 +193,5 @@ fn figure(mut table: Table<'_>, sources: &[Citation]) -> Result<Published, FileE
     let source =
         source.ok_or_else(|| table.fault_at("source", format!("\"{name}\" is no [[source]] of this file; add it")))?;
     table.finish()?;
-    Ok(Published { law, rms_m, source })
+    Ok(PublishedFigure { law, rms_m, source })
 }

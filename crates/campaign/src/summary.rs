@@ -1,7 +1,7 @@
 //! Summary of all flights, accumulated row by row.
 
 use crate::manifest::Manifest;
-use crate::row::Row;
+use crate::row::ResultRow;
 use crate::statistics::Share;
 
 /// Number of equal intervals into which the range of a drawn quantity is divided.
@@ -11,14 +11,14 @@ const WORST: usize = 3;
 
 /// Numbers of all flights and of flights without a loss.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Count {
+pub struct SurvivalCount {
     /// All flights.
     pub flights: u64,
     /// Flights in which the vehicle was not lost.
     pub kept: u64,
 }
 
-impl Count {
+impl SurvivalCount {
     fn add(&mut self, kept: bool) {
         self.flights += 1;
         self.kept += u64::from(kept);
@@ -32,7 +32,7 @@ impl Count {
 
 /// One of the worst flights.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bad {
+pub struct WorstFlight {
     /// Index of the flight.
     pub flight: u64,
     /// Name of the flight's trajectory.
@@ -43,7 +43,7 @@ pub struct Bad {
     pub rmse_position_m: Option<f64>,
 }
 
-impl Bad {
+impl WorstFlight {
     /// Returns a sort key that grows with how bad the flight was. A loss ranks above any error, an early loss above a
     /// late one.
     fn badness(&self) -> (bool, f64) {
@@ -56,17 +56,17 @@ impl Bad {
 
 /// Results of one contender.
 #[derive(Clone, Debug)]
-pub struct Tally {
+pub struct ContenderSummary {
     /// Name of the contender.
     pub contender: String,
     /// Counts of all flights of the contender.
-    pub count: Count,
+    pub count: SurvivalCount,
     /// Number of flights in which the contender's monitor switched to the fallback law.
     pub tripped: u64,
     /// Counts for each trajectory, in the campaign's order.
-    pub by_trajectory: Vec<Count>,
+    pub by_trajectory: Vec<SurvivalCount>,
     /// Counts for each drawn quantity, in [`BINS`] equal parts of its interval.
-    pub by_draw: Vec<[Count; BINS]>,
+    pub by_draw: Vec<[SurvivalCount; BINS]>,
     /// Root mean square distances from the reference \[m\], sorted; infinite for lost flights.
     pub rmse_position_m: Vec<f64>,
     /// Largest distances from the reference \[m\], sorted; infinite for lost flights.
@@ -76,41 +76,41 @@ pub struct Tally {
     /// Fractions of steps with a rotor at its limit, sorted, of flights without a loss.
     pub saturated_ratio: Vec<f64>,
     /// The worst flights, beginning with the worst.
-    pub worst: Vec<Bad>,
+    pub worst: Vec<WorstFlight>,
 }
 
 /// Results of a campaign.
 #[derive(Clone, Debug)]
-pub struct Summary {
+pub struct CampaignSummary {
     /// Description of the campaign and shard.
     pub manifest: Manifest,
     /// Results of each contender, in the campaign's order.
-    pub tallies: Vec<Tally>,
+    pub tallies: Vec<ContenderSummary>,
 }
 
-impl Summary {
+impl CampaignSummary {
     /// Creates an empty summary.
     pub fn new(manifest: &Manifest) -> Self {
         // Allocated at once, since only these lists grow with the number of flights.
         let values = || Vec::with_capacity(manifest.shard.count(manifest.flights) as usize);
-        let tally = |contender: &String| Tally {
+        let tally = |contender: &String| ContenderSummary {
             contender: contender.clone(),
-            count: Count::default(),
+            count: SurvivalCount::default(),
             tripped: 0,
-            by_trajectory: vec![Count::default(); manifest.trajectories.len()],
-            by_draw: vec![[Count::default(); BINS]; manifest.drawn.len()],
+            by_trajectory: vec![SurvivalCount::default(); manifest.trajectories.len()],
+            by_draw: vec![[SurvivalCount::default(); BINS]; manifest.drawn.len()],
             rmse_position_m: values(),
             max_position_m: values(),
             mean_abs_du4_n: values(),
             saturated_ratio: values(),
             worst: Vec::new(),
         };
-        Summary { tallies: manifest.contenders.iter().map(tally).collect(), manifest: manifest.clone() }
+        CampaignSummary { tallies: manifest.contenders.iter().map(tally).collect(), manifest: manifest.clone() }
     }
 
     /// Adds one row.
-    pub fn add(&mut self, row: &Row) {
-        let Summary { manifest, tallies } = self;
+    pub fn add(&mut self, row: &ResultRow) {
+        let CampaignSummary { manifest, tallies } = self;
         let Some(tally) = tallies.iter_mut().find(|tally| tally.contender == row.contender) else { return };
         let number = |name| manifest.number(row, name);
         let kept = row.lost_reason.is_none();
@@ -132,7 +132,7 @@ impl Summary {
             tally.mean_abs_du4_n.extend(number("mean_abs_du4_n"));
             tally.saturated_ratio.extend(number("saturated_ratio"));
         }
-        let bad = Bad {
+        let bad = WorstFlight {
             flight: row.flight,
             trajectory: row.trajectory.clone(),
             lost: row.lost_reason.clone().map(|reason| (number("lost_at_s").unwrap_or_default(), reason)),
@@ -150,7 +150,7 @@ impl Summary {
     /// Sorts the values. To be called after the last row.
     pub fn finish(mut self) -> Self {
         for tally in &mut self.tallies {
-            let Tally { rmse_position_m, max_position_m, mean_abs_du4_n, saturated_ratio, .. } = tally;
+            let ContenderSummary { rmse_position_m, max_position_m, mean_abs_du4_n, saturated_ratio, .. } = tally;
             for values in [rmse_position_m, max_position_m, mean_abs_du4_n, saturated_ratio] {
                 values.sort_by(f64::total_cmp);
             }

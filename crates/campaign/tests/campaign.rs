@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "tests")]
 
 use afbc::Profile;
-use afbc_campaign::{self as campaign, Campaign, CampaignFolder, Manifest, Row, Shard};
+use afbc_campaign::{self as campaign, Campaign, CampaignFolder, Manifest, ResultRow, Shard};
 use afbc_sim::run::FlightResult;
 use std::collections::BTreeMap;
 use std::fs;
@@ -242,7 +242,7 @@ fn a_flight_flown_again_gives_the_figures_of_its_row() {
 }
 
 /// Returns all rows of the first `flights` flights.
-fn rows(campaign: &Campaign, flights: u64) -> Vec<Row> {
+fn rows(campaign: &Campaign, flights: u64) -> Vec<ResultRow> {
     (0..flights).flat_map(|flight| campaign.rows(flight).unwrap()).collect()
 }
 

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)]
 
 use afbc::Profile;
-use afbc_campaign::Versus;
+use afbc_campaign::PairedDifference;
 use afbc_campaign::compare::{self, Comparison, DISTANCE, MEASURES, SEEDS, usual_seeds};
 use afbc_campaign::statistics::{Median, SignedRank};
 use afbc_plant::{Deviations, MeasurementDropouts, RotorFault, Sensing};
@@ -112,11 +112,11 @@ fn differences_are_those_of_the_same_seeds() {
     let kinds = [ControllerKind::Pid, ControllerKind::Afbc, ControllerKind::Indi, ControllerKind::Backstepping];
     let flown = fly(under(Scenario { duration_s: 6.0, ..named("hardware") }, &kinds), 7);
     // The default contender to compare with is AFBC.
-    assert_eq!(flown.against, 1);
-    let flown = flown.against(Some("indi"));
-    assert_eq!((flown.against, flown.clone().against(Some("nobody")).against), (2, 1));
+    assert_eq!(flown.baseline, 1);
+    let flown = flown.with_baseline(Some("indi"));
+    assert_eq!((flown.baseline, flown.clone().with_baseline(Some("nobody")).baseline), (2, 1));
     for value in [DISTANCE.value, MEASURES[5].value] {
-        let versus = flown.versus(value);
+        let versus = flown.paired_differences(value);
         assert_eq!(versus[2], None, "not with itself");
         let mut tested = Vec::new();
         for (entry, versus) in flown.entries.iter().zip(&versus).filter(|(_, versus)| versus.is_some()) {
@@ -127,7 +127,7 @@ fn differences_are_those_of_the_same_seeds() {
                     value(&own.metrics) - value(&other.metrics)
                 })
                 .collect();
-            let Versus { seeds, difference, test, p_holm } = versus.unwrap();
+            let PairedDifference { seeds, difference, test, p_holm } = versus.unwrap();
             assert_eq!((seeds, Some(difference)), (7, Median::of(&differences)));
             assert_eq!(test, SignedRank::of(&differences));
             assert!(p_holm >= test.p);
@@ -139,7 +139,7 @@ fn differences_are_those_of_the_same_seeds() {
     }
     // A single seed gives no comparison.
     let single = fly(flown.scenario, 1);
-    assert!(single.versus(DISTANCE.value).iter().all(Option::is_none));
+    assert!(single.paired_differences(DISTANCE.value).iter().all(Option::is_none));
 }
 
 /// A lost vehicle ranks behind every vehicle that is not lost.
@@ -153,10 +153,10 @@ fn a_lost_vehicle_is_the_worst() {
     assert_eq!(flown.entries[0].lost(), 6);
     assert_eq!(flown.entries[0].median(DISTANCE.value), None);
     assert!(flown.is_best(&flown.entries[1], &DISTANCE) && !flown.is_best(&flown.entries[0], &DISTANCE));
-    let versus = flown.clone().against(Some("indi")).versus(DISTANCE.value)[0].unwrap();
+    let versus = flown.clone().with_baseline(Some("indi")).paired_differences(DISTANCE.value)[0].unwrap();
     assert_eq!((versus.test.effect, versus.difference.value), (1.0, f64::INFINITY));
     // Two lost vehicles are level.
     flown.entries[1] = flown.entries[0].clone();
-    let level = flown.versus(DISTANCE.value)[1].unwrap();
+    let level = flown.paired_differences(DISTANCE.value)[1].unwrap();
     assert_eq!((level.difference.value, level.test), (0.0, SignedRank { p: 1.0, effect: 0.0 }));
 }

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs)]
 
 use afbc_campaign::compare::standard_and_monitored;
-use afbc_campaign::random::{self, Change, DrawnFlight, Random, Seen};
+use afbc_campaign::random::{self, DrawnFlight, FeedbackSource, ModelMismatch, RandomFlights};
 use afbc_files::read::BuiltIn;
 use afbc_scenario::trajectory::{Reference, Trajectory};
 use afbc_vehicles::{BUILT_IN, Vehicle, built_in, parse};
@@ -37,11 +37,11 @@ fn own() -> Vec<Vehicle> {
     vec![paper("bare", bare), paper("weak", weak), paper("dragged", dragged), paper("large", large)]
 }
 
-fn random(seen: Seen, vehicles: Vec<Vehicle>) -> Random {
-    Random { seeds: 1..4, flights: 12, seen, vehicles }
+fn random(seen: FeedbackSource, vehicles: Vec<Vehicle>) -> RandomFlights {
+    RandomFlights { seeds: 1..4, flights: 12, seen, vehicles }
 }
 
-fn everywhere(seen: Seen) -> Vec<(Vehicle, Vec<DrawnFlight>)> {
+fn everywhere(seen: FeedbackSource) -> Vec<(Vehicle, Vec<DrawnFlight>)> {
     let vehicles = fleet().into_iter().chain(own());
     vehicles.map(|vehicle| (vehicle.clone(), random(seen, vec![vehicle]).draw().unwrap())).collect()
 }
@@ -49,10 +49,12 @@ fn everywhere(seen: Seen) -> Vec<(Vehicle, Vec<DrawnFlight>)> {
 /// A flight depends only on seed, vehicle and number, not on the other flights.
 #[test]
 fn a_flight_is_the_same_beside_any_others() {
-    let all = random(Seen::Truth, fleet()).draw().unwrap();
+    let all = random(FeedbackSource::Truth, fleet()).draw().unwrap();
     assert_eq!(all.len(), 3 * 6 * 12);
-    assert_eq!(all, random(Seen::Truth, fleet()).draw().unwrap());
-    let one = Random { seeds: 2..4, flights: 5, ..random(Seen::Truth, vec![fleet().remove(3)]) }.draw().unwrap();
+    assert_eq!(all, random(FeedbackSource::Truth, fleet()).draw().unwrap());
+    let one = RandomFlights { seeds: 2..4, flights: 5, ..random(FeedbackSource::Truth, vec![fleet().remove(3)]) }
+        .draw()
+        .unwrap();
     assert_eq!(one.len(), 2 * 5);
     assert!(one.iter().all(|flight| all.contains(flight)));
     let names: BTreeSet<_> = all.iter().map(|flight| &flight.scenario.name).collect();
@@ -67,7 +69,7 @@ fn a_flight_is_the_same_beside_any_others() {
 #[test]
 fn every_flight_is_valid_on_every_vehicle() {
     let contenders = standard_and_monitored();
-    for seen in [Seen::Truth, Seen::Mocap, Seen::Outdoor] {
+    for seen in [FeedbackSource::Truth, FeedbackSource::Mocap, FeedbackSource::Outdoor] {
         for vehicle in fleet().into_iter().chain(own()) {
             let name = vehicle.name.clone();
             for flight in random(seen, vec![vehicle]).under(&contenders, &[]).unwrap_or_else(|error| panic!("{error}"))
@@ -76,7 +78,7 @@ fn every_flight_is_valid_on_every_vehicle() {
                 assert_eq!(scenario.check(), Ok(()), "{}: {}", scenario.name, scenario.description);
                 assert_eq!(scenario.contenders.len(), contenders.len());
                 assert!(speed_m_s.is_finite() && scenario.name.starts_with(&name));
-                assert_eq!(scenario.instruments.imu.is_some(), seen != Seen::Truth);
+                assert_eq!(scenario.instruments.imu.is_some(), seen != FeedbackSource::Truth);
                 let tilts = scenario.contenders.iter().map(|contender| contender.settings.limits.tilt_max_rad);
                 assert!(tilts.zip(&contenders).all(|(tilt, own)| tilt >= 1.2 || own.kind().in_cascade()));
             }
@@ -88,7 +90,7 @@ fn every_flight_is_valid_on_every_vehicle() {
 #[test]
 fn what_is_drawn_is_what_flies() {
     let (mut paths, mut changes) = (BTreeSet::new(), BTreeSet::new());
-    for (vehicle, flights) in everywhere(Seen::Truth) {
+    for (vehicle, flights) in everywhere(FeedbackSource::Truth) {
         for DrawnFlight { path, change, scenario, .. } in flights {
             paths.insert(path);
             changes.insert(change.kind());
@@ -99,43 +101,43 @@ fn what_is_drawn_is_what_flies() {
             assert_eq!(stated, &vehicle);
             assert_eq!(scenario.sensing.noise.position_m, 0.001);
             match change {
-                Change::Nothing => assert!(calm && intact && whole),
-                Change::Wind(wind_m_s) => {
+                ModelMismatch::Nothing => assert!(calm && intact && whole),
+                ModelMismatch::Wind(wind_m_s) => {
                     assert!(wind_m_s.amax() <= 4.0 && wind_m_s.z == 0.0);
                     assert_eq!((scenario.realism.wind.steady_m_s, intact, whole), (wind_m_s, true, true));
                 }
-                Change::Turbulence(turbulence) => {
+                ModelMismatch::Turbulence(turbulence) => {
                     assert_eq!((scenario.realism.wind.turbulence, intact, whole), (Some(turbulence), true, true));
                 }
-                Change::Payload { share, ahead_m, left_m, .. } => {
+                ModelMismatch::Payload { share, ahead_m, left_m, .. } => {
                     let [payload] = scenario.environment.payloads() else { panic!("one payload") };
                     assert!((payload.mass_kg / vehicle.parameters.mass_kg - share).abs() < 1e-12 && share <= 0.25);
                     assert!(ahead_m.abs().max(left_m.abs()) <= 0.3 * vehicle.parameters.arm_m);
                     assert!(calm && whole);
                 }
-                Change::Mass(factor) => {
+                ModelMismatch::Mass(factor) => {
                     assert!((0.85..=1.2).contains(&factor));
                     assert_eq!((scenario.environment.changes()[0].factor, calm, whole), (factor, true, true));
                 }
-                Change::Rotor { rotor, efficiency } => {
+                ModelMismatch::Rotor { rotor, efficiency } => {
                     let fault = scenario.realism.rotors.faults[0];
                     assert_eq!((fault.rotor, fault.efficiency, calm, intact), (rotor, efficiency, true, true));
                     assert!((1..=vehicle.rotors.len()).contains(&usize::from(rotor)));
                     assert!((0.65..=1.0).contains(&efficiency));
                 }
-                Change::Drag(factor) => {
+                ModelMismatch::Drag(factor) => {
                     let area = |drag: Option<afbc_plant::Drag>| drag.map_or(0.0, |drag| drag.area_m2.z);
                     let ratio = area(scenario.realism.drag) - factor * area(stated.realism.drag);
                     assert!(ratio.abs() < 1e-12 && (0.5..=2.0).contains(&factor) && calm && intact && whole);
                 }
-                Change::Older(age_s) => {
+                ModelMismatch::Older(age_s) => {
                     assert!((0.0..=0.012).contains(&age_s));
                     assert_eq!(scenario.sensing.delay_s, age_s);
                 }
             }
         }
     }
-    assert_eq!((paths.len(), changes.len()), (4, Change::KINDS.len()));
+    assert_eq!((paths.len(), changes.len()), (4, ModelMismatch::KINDS.len()));
 }
 
 /// At every millisecond, the thrust for acceleration leaves two fifths of the thrust beyond the weight, the thrust
@@ -143,7 +145,7 @@ fn what_is_drawn_is_what_flies() {
 /// 15 % of thrust beyond the weight on every vehicle that has it.
 #[test]
 fn no_flight_asks_for_more_than_the_vehicle_can_do() {
-    for (vehicle, flights) in everywhere(Seen::Truth) {
+    for (vehicle, flights) in everywhere(FeedbackSource::Truth) {
         let count = vehicle.rotors.len() as f64;
         let g = vehicle.parameters.gravity_m_s2;
         let intact_m_s2 = count * vehicle.force_max_n / vehicle.parameters.mass_kg;
@@ -151,9 +153,9 @@ fn no_flight_asks_for_more_than_the_vehicle_can_do() {
         for DrawnFlight { change, scenario, acceleration_m_s2, .. } in &flights {
             let thrust_m_s2 = intact_m_s2
                 * match change {
-                    Change::Payload { share, .. } => 1.0 / (1.0 + share),
-                    Change::Mass(factor) => 1.0 / factor,
-                    Change::Rotor { efficiency, .. } => *efficiency,
+                    ModelMismatch::Payload { share, .. } => 1.0 / (1.0 + share),
+                    ModelMismatch::Mass(factor) => 1.0 / factor,
+                    ModelMismatch::Rotor { efficiency, .. } => *efficiency,
                     _ => 1.0,
                 };
             let what = format!("{}: {}", scenario.name, scenario.description);
@@ -205,7 +207,7 @@ fn fastest_rad_s(trajectory: &Trajectory) -> f64 {
 /// flights begin in the air.
 #[test]
 fn flights_on_the_estimate_begin_on_the_ground_where_they_can() {
-    for (vehicle, flights) in everywhere(Seen::Mocap) {
+    for (vehicle, flights) in everywhere(FeedbackSource::Mocap) {
         for DrawnFlight { path, stands, scenario, .. } in flights {
             assert_eq!(stands, vehicle.realism.contact.is_some() && ["waypoints", "hover"].contains(&path));
             assert_eq!(scenario.flight_core, stands);
@@ -218,7 +220,7 @@ fn flights_on_the_estimate_begin_on_the_ground_where_they_can() {
             assert_eq!(scenario.trajectory.at(0.0).position_m, scenario.initial.position_m);
         }
     }
-    let outdoors = random(Seen::Outdoor, fleet()).draw().unwrap();
+    let outdoors = random(FeedbackSource::Outdoor, fleet()).draw().unwrap();
     assert!(outdoors.iter().all(|flight| !flight.stands && flight.scenario.initial.position_m.z == 10.0));
 }
 
@@ -226,7 +228,7 @@ fn flights_on_the_estimate_begin_on_the_ground_where_they_can() {
 #[test]
 fn flights_are_flown_and_judged() {
     let afbc = standard_and_monitored().remove(0);
-    let random = Random { flights: 6, seeds: 1..2, ..random(Seen::Truth, vec![fleet().remove(0)]) };
+    let random = RandomFlights { flights: 6, seeds: 1..2, ..random(FeedbackSource::Truth, vec![fleet().remove(0)]) };
     let flown = random::fly(random.under(&[afbc], &[]).unwrap(), &|| ()).unwrap();
     assert_eq!(flown.len(), 6);
     for flown in &flown {

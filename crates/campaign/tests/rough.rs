@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
 use afbc::Profile;
-use afbc_campaign::rough::{self, CLASSES, FlownRough, Judgement, MIXTURE, Rough, RoughFlight, Venue};
+use afbc_campaign::rough::{self, CLASSES, FlownRoughFlight, Judgement, MIXTURE, RoughFlight, RoughFlights, Venue};
 use afbc_plant::instruments::{FailureKind, ImuModel};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_sim::flight::Lost;
@@ -18,15 +18,16 @@ fn law() -> Contender {
     Contender::of(ControllerKind::Afbc, Profile::Flight).monitored()
 }
 
-fn rough(seeds: core::ops::Range<u64>, flights: u64) -> Rough {
-    Rough { seeds, flights, duration_s: None, vehicles: vehicles() }
+fn rough(seeds: core::ops::Range<u64>, flights: u64) -> RoughFlights {
+    RoughFlights { seeds, flights, duration_s: None, vehicles: vehicles() }
 }
 
 #[test]
 fn a_flight_is_a_function_of_seed_vehicle_class_and_number() {
     let all = rough(1..3, 2).draw(&law()).unwrap();
     assert_eq!(all.len(), 2 * 2 * vehicles().len() * (CLASSES.len() + 1));
-    let iris = Rough { vehicles: vec![afbc_vehicles::built_in("iris").unwrap().read().unwrap()], ..rough(2..3, 1) };
+    let iris =
+        RoughFlights { vehicles: vec![afbc_vehicles::built_in("iris").unwrap().read().unwrap()], ..rough(2..3, 1) };
     for alone in iris.draw(&law()).unwrap() {
         let beside = all.iter().find(|flight| flight.scenario.name == alone.scenario.name).unwrap();
         assert_eq!(beside, &alone);
@@ -64,7 +65,7 @@ fn no_vehicle_is_told_what_is_drawn() {
 /// Returns a flight in which nothing is drawn.
 fn nothing(vehicle: &str, place: Venue) -> RoughFlight {
     let vehicles = vehicles().into_iter().filter(|own| own.name == vehicle).collect();
-    let drawn = Rough { vehicles, ..rough(1..20, 1) }.draw(&law()).unwrap();
+    let drawn = RoughFlights { vehicles, ..rough(1..20, 1) }.draw(&law()).unwrap();
     drawn.into_iter().find(|flight| flight.class == "nothing" && flight.place == place).unwrap()
 }
 
@@ -72,7 +73,7 @@ fn nothing(vehicle: &str, place: Venue) -> RoughFlight {
 #[test]
 fn each_class_is_drawn_within_its_bounds() {
     let hummingbird = vec![afbc_vehicles::built_in("hummingbird").unwrap().read().unwrap()];
-    let all = Rough { vehicles: hummingbird, ..rough(1..3, 60) }.draw(&law()).unwrap();
+    let all = RoughFlights { vehicles: hummingbird, ..rough(1..3, 60) }.draw(&law()).unwrap();
     for class in &CLASSES {
         let sizes: Vec<f64> = all.iter().filter(|flight| flight.class == class.name).map(size).collect();
         let [low, high] = bounds(class.name);
@@ -178,13 +179,13 @@ fn bounds(class: &str) -> [f64; 2] {
 #[test]
 fn every_class_flies_and_has_its_row() {
     let paper = vec![afbc_vehicles::built_in("paper").unwrap().read().unwrap()];
-    let short = Rough { vehicles: paper, duration_s: Some(10.0), ..rough(1..2, 1) };
+    let short = RoughFlights { vehicles: paper, duration_s: Some(10.0), ..rough(1..2, 1) };
     let flown = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| rough::fly(short.draw(&law()).unwrap(), &|| ())).unwrap()
     };
     let (one, many) = (flown(1), flown(4));
-    let bits = |flown: &[FlownRough]| -> Vec<u64> {
+    let bits = |flown: &[FlownRoughFlight]| -> Vec<u64> {
         flown.iter().flat_map(|it| [it.judgement.nees.to_bits(), it.judgement.within.to_bits()]).collect()
     };
     assert_eq!(bits(&one), bits(&many));
@@ -206,7 +207,7 @@ fn every_class_flies_and_has_its_row() {
 fn rows_are_those_counted_by_hand() {
     let lost = Some(Lost { time_s: 9.0, reason: "tilted beyond 90 degrees" });
     let judged = |nees, within, valid| Judgement { looks: 100, valid, nees, within, ..Judgement::default() };
-    let of = |class: &'static str, judgement| FlownRough {
+    let of = |class: &'static str, judgement| FlownRoughFlight {
         flight: RoughFlight { class, ..nothing("iris", Venue::Indoors) },
         judgement,
     };

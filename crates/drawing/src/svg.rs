@@ -31,7 +31,7 @@ pub struct SvgStyle<'a> {
 impl Drawing {
     /// Returns the drawing as an SVG file.
     pub fn svg(&self, style: &SvgStyle<'_>) -> String {
-        let writer = Writer::new(style, &self.shapes);
+        let writer = SvgWriter::new(style, &self.shapes);
         let mut body = format!("<rect width=\"100%\" height=\"100%\" fill=\"{}\"/>\n", hex(PAPER));
         body += &writer.clips();
         for shape in &self.shapes {
@@ -69,7 +69,7 @@ fn dark(variants: &[[Rgb; 2]], body: &str) -> String {
 }
 
 /// Writes shapes in the unit of the file.
-struct Writer {
+struct SvgWriter {
     /// Distinct clip boxes. Shapes refer to a box by its index.
     boxes: Vec<[f64; 4]>,
     /// Units of the file per unit of the drawing.
@@ -79,7 +79,7 @@ struct Writer {
     halo: String,
 }
 
-impl Writer {
+impl SvgWriter {
     fn new(style: &SvgStyle<'_>, shapes: &[Shape]) -> Self {
         let mut boxes: Vec<[f64; 4]> = Vec::new();
         for shape in shapes {
@@ -99,7 +99,7 @@ impl Writer {
         } else {
             String::new()
         };
-        Writer { boxes, steps, decimals, halo }
+        SvgWriter { boxes, steps, decimals, halo }
     }
 
     /// Formats a coordinate in the unit of the file.

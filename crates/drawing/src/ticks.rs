@@ -7,12 +7,12 @@ use core::ops::RangeInclusive;
 pub struct Ticks {
     /// Values of the ticks.
     pub at: Vec<f64>,
-    form: Form,
+    form: LabelFormat,
 }
 
 /// Number format of an axis's labels.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Form {
+enum LabelFormat {
     /// The same number of decimals for all labels, enough to tell them apart.
     Decimals(usize),
     /// Without trailing zeros: each label has the decimals that it needs.
@@ -39,7 +39,7 @@ impl Ticks {
     pub fn linear(low: f64, high: f64, most: usize) -> Self {
         let rough = libm::log10((high - low) / most.max(1) as f64);
         if !rough.is_finite() {
-            return Ticks { at: Vec::new(), form: Form::Decimals(0) };
+            return Ticks { at: Vec::new(), form: LabelFormat::Decimals(0) };
         }
         let step = |n: i32| FACTORS.get(n.rem_euclid(3) as usize).unwrap_or(&1.0) * power_of_ten(n.div_euclid(3));
         // The tolerance counts an end that is itself a multiple, in spite of rounding.
@@ -58,7 +58,7 @@ impl Ticks {
         let ((first, _), count) = (ends(n), count(n) as usize);
         let decimals = usize::try_from(-n.div_euclid(3)).unwrap_or(0);
         let is_large = low.abs().max(high.abs()) >= 1e5 || decimals > DECIMALS;
-        let form = if is_large { Form::Scientific } else { Form::Decimals(decimals) };
+        let form = if is_large { LabelFormat::Scientific } else { LabelFormat::Decimals(decimals) };
         // The next wider step may leave a single tick. Keep this step then, and leave out some of its ticks.
         let places = (0..count).step_by(count.div_ceil(most.max(2)));
         Ticks { at: places.map(|place| (first + place as f64) * step(n)).collect(), form }
@@ -76,15 +76,15 @@ impl Ticks {
         };
         let (fine, coarse) = (within(&FACTORS), within(&[1.0]));
         let is_plain = fine.iter().all(|tick| PLAIN.contains(tick));
-        let form = |other: Form| if is_plain { Form::Short } else { other };
+        let form = |other: LabelFormat| if is_plain { LabelFormat::Short } else { other };
         match (fine.len(), coarse.len()) {
             (0..=1, _) => Ticks::linear(low, high, most),
             (fine_count, coarse_count) if fine_count <= most || coarse_count < 2 => {
-                Ticks { at: fine, form: form(Form::Scientific) }
+                Ticks { at: fine, form: form(LabelFormat::Scientific) }
             }
             (_, coarse_count) => {
                 let at = coarse.into_iter().step_by(coarse_count.div_ceil(most.max(1))).collect();
-                Ticks { at, form: form(Form::Power) }
+                Ticks { at, form: form(LabelFormat::Power) }
             }
         }
     }
@@ -97,10 +97,10 @@ impl Ticks {
     /// Formats a number in the axis's label format.
     pub fn label(&self, value: f64) -> String {
         match self.form {
-            Form::Decimals(decimals) => label(value, decimals),
-            Form::Short => short(&label(value, 1 + DECIMALS)).into(),
-            Form::Scientific => scientific(value),
-            Form::Power => format!("10{}", raised(libm::round(libm::log10(value)) as i32)),
+            LabelFormat::Decimals(decimals) => label(value, decimals),
+            LabelFormat::Short => short(&label(value, 1 + DECIMALS)).into(),
+            LabelFormat::Scientific => scientific(value),
+            LabelFormat::Power => format!("10{}", raised(libm::round(libm::log10(value)) as i32)),
         }
     }
 }

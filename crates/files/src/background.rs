@@ -8,18 +8,18 @@ use std::time::{Duration, Instant};
 /// Writes to a file, a pipe or a terminal in its own thread, so that a slow disk or a stalled reader delays nobody
 /// else.
 #[derive(Debug)]
-pub struct BackgroundWriter(Arc<Shared>);
+pub struct BackgroundWriter(Arc<SharedQueue>);
 
 #[derive(Debug)]
-struct Shared {
-    state: Mutex<State>,
+struct SharedQueue {
+    state: Mutex<QueueState>,
     changed: Condvar,
     /// Largest number of bytes in the queue, including those being written.
     room: usize,
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct QueueState {
     waiting: Vec<u8>,
     /// Number of bytes that are being written.
     writing: usize,
@@ -36,7 +36,7 @@ impl BackgroundWriter {
     /// # Errors
     /// If the system cannot start the thread.
     pub fn new(out: impl Write + Send + 'static, room: usize) -> io::Result<Self> {
-        let shared = Arc::new(Shared { state: Mutex::default(), changed: Condvar::new(), room });
+        let shared = Arc::new(SharedQueue { state: Mutex::default(), changed: Condvar::new(), room });
         let writer = Arc::clone(&shared);
         thread::Builder::new().name("writer".into()).spawn(move || writer.write(out))?;
         Ok(BackgroundWriter(shared))
@@ -56,7 +56,7 @@ impl BackgroundWriter {
 
     /// Waits until there is room for this many bytes, writing has failed or the writer is closed.
     pub fn wait_for_room(&self, bytes: usize) {
-        let full = |state: &mut State| state.goes_on() && !state.has_room(bytes, self.0.room);
+        let full = |state: &mut QueueState| state.goes_on() && !state.has_room(bytes, self.0.room);
         drop(self.0.changed.wait_while(self.0.lock(), full));
     }
 
@@ -114,8 +114,8 @@ impl Drop for BackgroundWriter {
     }
 }
 
-impl Shared {
-    fn lock(&self) -> MutexGuard<'_, State> {
+impl SharedQueue {
+    fn lock(&self) -> MutexGuard<'_, QueueState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -123,7 +123,7 @@ impl Shared {
     fn write(&self, mut out: impl Write) {
         let mut bytes = Vec::new();
         loop {
-            let idle = |state: &mut State| state.waiting.is_empty() && !state.is_closed;
+            let idle = |state: &mut QueueState| state.waiting.is_empty() && !state.is_closed;
             let waited = self.changed.wait_while(self.lock(), idle);
             let mut state = waited.unwrap_or_else(PoisonError::into_inner);
             if state.waiting.is_empty() {
@@ -149,7 +149,7 @@ impl Shared {
     }
 }
 
-impl State {
+impl QueueState {
     fn goes_on(&self) -> bool {
         self.failure.is_none() && !self.is_closed
     }

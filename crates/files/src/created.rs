@@ -13,7 +13,7 @@ pub(crate) fn remember(path: &Path) {
     CREATED.lock().unwrap_or_else(PoisonError::into_inner).push(path);
 }
 
-/// Removes every file that [`Output::create`](crate::Output::create) has created, whatever its content. For an
+/// Removes every file that [`OutputFile::create`](crate::OutputFile::create) has created, whatever its content. For an
 /// interrupted command: it leaves nothing behind, so that the same command can be given again.
 pub fn remove_created() {
     remove(|_| true);

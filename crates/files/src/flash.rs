@@ -1,6 +1,6 @@
 //! Flash memory simulated in a file.
 
-use crate::place::place;
+use crate::atomic::write_atomically;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 use embedded_storage::nor_flash::{check_erase, check_read, check_write};
 use std::fs::{File, OpenOptions, TryLockError};
@@ -19,16 +19,16 @@ const SECTORS: usize = 2;
 /// A write is on the disk before it returns, unless the flash writes [in the background](Self::in_background). A killed
 /// program leaves the same state in the file as a power cut leaves in a chip.
 #[derive(Debug)]
-pub struct Flash {
+pub struct FlashFile {
     /// Content of the file, including queued writes. The file is locked, so nobody else changes it.
     bytes: Vec<u8>,
-    disk: Disk,
+    disk: FlashBacking,
 }
 
 #[derive(Debug)]
-enum Disk {
+enum FlashBacking {
     File(File),
-    Background(Writer),
+    Background(FlashWriter),
 }
 
 /// Largest number of writes queued for a slow disk. Setting a parameter takes a few writes, and a ground station may
@@ -37,7 +37,7 @@ const WAITING_MAX: usize = 4096;
 
 /// Background thread that writes in order, each write on the disk before the next. It ends when everything is written.
 #[derive(Debug)]
-struct Writer {
+struct FlashWriter {
     queue: Option<SyncSender<(u32, Vec<u8>)>>,
     failure: FlashFailure,
     thread: Option<JoinHandle<()>>,
@@ -45,10 +45,10 @@ struct Writer {
 
 /// The error that stopped background writing. Nothing is written after a failure.
 #[derive(Clone, Debug, Default)]
-pub struct FlashFailure(Arc<Mutex<Failure>>);
+pub struct FlashFailure(Arc<Mutex<FlashFailureState>>);
 
 #[derive(Debug, Default)]
-struct Failure {
+struct FlashFailureState {
     has_failed: bool,
     untold: Option<io::Error>,
 }
@@ -59,12 +59,12 @@ impl FlashFailure {
         self.lock().untold.take().map(FlashError::File)
     }
 
-    fn lock(&self) -> MutexGuard<'_, Failure> {
+    fn lock(&self) -> MutexGuard<'_, FlashFailureState> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Writer {
+impl FlashWriter {
     /// Starts a thread that writes with `put`.
     fn new(mut put: impl FnMut(u32, &[u8]) -> io::Result<()> + Send + 'static) -> io::Result<Self> {
         let (queue, waiting) = sync_channel::<(u32, Vec<u8>)>(WAITING_MAX);
@@ -73,12 +73,12 @@ impl Writer {
         let thread = thread::Builder::new().name("flash".into()).spawn(move || {
             for (offset, bytes) in waiting {
                 if let Err(error) = put(offset, &bytes) {
-                    *told.lock() = Failure { has_failed: true, untold: Some(error) };
+                    *told.lock() = FlashFailureState { has_failed: true, untold: Some(error) };
                     break;
                 }
             }
         })?;
-        Ok(Writer { queue: Some(queue), failure, thread: Some(thread) })
+        Ok(FlashWriter { queue: Some(queue), failure, thread: Some(thread) })
     }
 
     /// Queues a write; never waits.
@@ -91,7 +91,7 @@ impl Writer {
     }
 }
 
-impl Drop for Writer {
+impl Drop for FlashWriter {
     fn drop(&mut self) {
         self.queue = None;
         // The thread returns no result.
@@ -99,7 +99,7 @@ impl Drop for Writer {
     }
 }
 
-/// Error of a [`Flash`].
+/// Error of a [`FlashFile`].
 #[derive(Debug)]
 pub enum FlashError {
     /// The address is outside the file, or not aligned.
@@ -129,7 +129,7 @@ impl NorFlashError for FlashError {
     }
 }
 
-impl Flash {
+impl FlashFile {
     /// Opens the file at `path`, or creates it with both sectors erased. The file is locked against other programs.
     ///
     /// # Errors
@@ -138,16 +138,16 @@ impl Flash {
         if !path.exists() {
             // Creates the whole file at once: a program killed here leaves no file of the wrong size, which would be
             // refused later.
-            place(path, |out| out.write_all(&[0xFF; SECTORS * SECTOR]))?;
+            write_atomically(path, |out| out.write_all(&[0xFF; SECTORS * SECTOR]))?;
         }
-        Flash::known(path)
+        FlashFile::open_existing(path)
     }
 
     /// Opens the file at `path`, which must exist.
     ///
     /// # Errors
-    /// The same as for [`Flash::open`].
-    pub fn known(path: &Path) -> io::Result<Self> {
+    /// The same as for [`FlashFile::open`].
+    pub fn open_existing(path: &Path) -> io::Result<Self> {
         let mut file = OpenOptions::new().read(true).write(true).open(path)?;
         file.try_lock().map_err(|error| match error {
             TryLockError::WouldBlock => io::Error::new(io::ErrorKind::WouldBlock, "in use by another program"),
@@ -160,7 +160,7 @@ impl Flash {
         }
         let mut bytes = vec![0; SECTORS * SECTOR];
         file.read_exact(&mut bytes)?;
-        Ok(Flash { bytes, disk: Disk::File(file) })
+        Ok(FlashFile { bytes, disk: FlashBacking::File(file) })
     }
 
     /// Writes in the background from now on, so that no write waits for the disk. Dropping the flash waits until
@@ -170,17 +170,17 @@ impl Flash {
     /// If the system cannot start the thread.
     pub fn in_background(self) -> io::Result<(Self, FlashFailure)> {
         let writer = match self.disk {
-            Disk::File(mut file) => Writer::new(move |offset, bytes| put(&mut file, offset, bytes))?,
-            Disk::Background(writer) => writer,
+            FlashBacking::File(mut file) => FlashWriter::new(move |offset, bytes| put(&mut file, offset, bytes))?,
+            FlashBacking::Background(writer) => writer,
         };
         let failure = writer.failure.clone();
-        Ok((Flash { disk: Disk::Background(writer), ..self }, failure))
+        Ok((FlashFile { disk: FlashBacking::Background(writer), ..self }, failure))
     }
 
     fn put(&mut self, offset: u32, bytes: &[u8]) -> io::Result<()> {
         match &mut self.disk {
-            Disk::File(file) => put(file, offset, bytes)?,
-            Disk::Background(writer) => writer.put(offset, bytes)?,
+            FlashBacking::File(file) => put(file, offset, bytes)?,
+            FlashBacking::Background(writer) => writer.put(offset, bytes)?,
         }
         let held = self.bytes.iter_mut().skip(offset as usize);
         held.zip(bytes).for_each(|(held, byte)| *held = *byte);
@@ -194,11 +194,11 @@ fn put(file: &mut File, offset: u32, bytes: &[u8]) -> io::Result<()> {
     file.sync_data()
 }
 
-impl ErrorType for Flash {
+impl ErrorType for FlashFile {
     type Error = FlashError;
 }
 
-impl ReadNorFlash for Flash {
+impl ReadNorFlash for FlashFile {
     const READ_SIZE: usize = 1;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
@@ -213,7 +213,7 @@ impl ReadNorFlash for Flash {
     }
 }
 
-impl NorFlash for Flash {
+impl NorFlash for FlashFile {
     const WRITE_SIZE: usize = 4;
     const ERASE_SIZE: usize = SECTOR;
 
@@ -243,13 +243,13 @@ mod tests {
 
     /// Returns a flash with a test disk, the channel that controls the disk and the writes it has received. The disk
     /// takes one write per `true` and fails on `false`.
-    fn slow() -> (Flash, Sender<bool>, Receiver<Written>) {
+    fn slow() -> (FlashFile, Sender<bool>, Receiver<Written>) {
         let ((go, wait), (put, taken)) = (channel(), channel());
-        let writer = Writer::new(move |offset, bytes: &[u8]| match wait.recv() {
+        let writer = FlashWriter::new(move |offset, bytes: &[u8]| match wait.recv() {
             Ok(true) => put.send((offset, bytes.to_vec())).map_err(io::Error::other),
             _ => Err(io::ErrorKind::StorageFull.into()),
         });
-        let flash = Flash { bytes: vec![0xFF; SECTORS * SECTOR], disk: Disk::Background(writer.unwrap()) };
+        let flash = FlashFile { bytes: vec![0xFF; SECTORS * SECTOR], disk: FlashBacking::Background(writer.unwrap()) };
         (flash, go, taken)
     }
 

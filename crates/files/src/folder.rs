@@ -1,8 +1,8 @@
 //! An output folder that belongs to one command.
 
+use crate::atomic::{HIDDEN, remove_temporary_files, write_atomically};
 use crate::error::Error;
-use crate::place::{HIDDEN, place, sweep};
-use crate::seal::{self, Hashing};
+use crate::seal::{self, HashingWriter};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File, TryLockError};
@@ -74,7 +74,7 @@ impl Folder {
         // Checks again: another program may have written into the folder before it was locked.
         let folder = Folder { _lock: Some(lock), ..Folder::find(path, command, name, force)? };
         // Only under the lock: no running program owns any of the temporary files.
-        sweep(path);
+        remove_temporary_files(path);
         folder.add::<&str>(&[])?;
         Ok(folder)
     }
@@ -209,12 +209,12 @@ impl Folder {
         let (command, name) = (self.command.clone(), self.name.clone());
         let marker = Marker { command, name, own, checksum: seal::OPEN.into() };
         let path = self.path.join(MARKER);
-        place(&path, |out| seal::json(out, &marker)).map_err(|source| Error::Write { path, source })
+        write_atomically(&path, |out| seal::json(out, &marker)).map_err(|source| Error::Write { path, source })
     }
 
     /// Lets `fill` write a file under a temporary name, then renames the file. A failed or interrupted run leaves the
     /// previous file. Once a file has its final name it is on the disk, even after a power cut.
-    pub fn place(
+    pub fn write(
         &self,
         name: &str,
         fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
@@ -222,12 +222,12 @@ impl Folder {
         let path = self.path.join(name);
         let mut hash = String::new();
         let hashed = |out: &mut (dyn Write + Send)| {
-            let mut out = Hashing::new(out);
+            let mut out = HashingWriter::new(out);
             fill(&mut out)?;
             hash = out.finish();
             Ok(())
         };
-        place(&path, hashed).map_err(|source| Error::Write { path: path.clone(), source })?;
+        write_atomically(&path, hashed).map_err(|source| Error::Write { path: path.clone(), source })?;
         self.change(|own| {
             own.files.insert(name.into());
             own.hashes.insert(name.into(), hash);

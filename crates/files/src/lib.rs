@@ -4,20 +4,20 @@
 //! replace files of others. There are also writers in the background and flash simulated in a file.
 #![forbid(unsafe_code)]
 
+mod atomic;
 mod background;
 mod created;
 mod error;
 mod flash;
 mod folder;
 mod output;
-mod place;
 pub mod read;
 pub mod seal;
 
+pub use atomic::{CheckedFile, remove_temporary_files, write_atomically};
 pub use background::BackgroundWriter;
 pub use created::{remove_created, remove_empty};
 pub use error::Error;
-pub use flash::{Flash, FlashError, FlashFailure};
+pub use flash::{FlashError, FlashFailure, FlashFile};
 pub use folder::Folder;
-pub use output::Output;
-pub use place::{Disk, place, sweep};
+pub use output::OutputFile;

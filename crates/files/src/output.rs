@@ -1,29 +1,29 @@
 //! Single files that commands write.
 
+use crate::atomic::{write_atomically, write_new};
 use crate::created::remember;
 use crate::error::Error;
-use crate::place::{fresh, place};
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// A single file that a command is going to write. An existing file is never replaced, unless with `--force`.
 #[derive(Clone, Debug)]
-pub struct Output {
+pub struct OutputFile {
     path: PathBuf,
     option: &'static str,
     /// Whether to replace an existing file; none if the command has no `--force`.
     force: Option<bool>,
 }
 
-impl Output {
+impl OutputFile {
     /// Checks that the file named by `option` does not exist yet, and that its folder does. Creates and changes
     /// nothing.
     ///
     /// # Errors
     /// If the file exists, or cannot be created.
     pub fn new(path: &Path, option: &'static str) -> Result<Self, Error> {
-        Output { path: path.into(), option, force: None }.checked()
+        OutputFile { path: path.into(), option, force: None }.checked()
     }
 
     /// Checks like [`new`](Self::new), for a command with `--force`: with `force`, an existing file will be replaced.
@@ -31,7 +31,7 @@ impl Output {
     /// # Errors
     /// The same as for [`new`](Self::new).
     pub fn forcible(path: &Path, option: &'static str, force: bool) -> Result<Self, Error> {
-        Output { path: path.into(), option, force: Some(force) }.checked()
+        OutputFile { path: path.into(), option, force: Some(force) }.checked()
     }
 
     fn checked(self) -> Result<Self, Error> {
@@ -75,8 +75,9 @@ impl Output {
     ///
     /// # Errors
     /// If the file cannot be written, or has appeared meanwhile.
-    pub fn place(&self, fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>) -> Result<(), Error> {
-        let placed = if self.force == Some(true) { place(&self.path, fill) } else { fresh(&self.path, fill) };
+    pub fn write(&self, fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>) -> Result<(), Error> {
+        let placed =
+            if self.force == Some(true) { write_atomically(&self.path, fill) } else { write_new(&self.path, fill) };
         placed.map_err(|error| self.unwritten(&error))
     }
 

@@ -23,17 +23,17 @@ fn digits(tail: &[u8]) -> Option<usize> {
 }
 
 /// Writer that seals its data, which must contain [`OPEN`] near the end.
-pub struct Sealing<W> {
+pub struct SealingWriter<W> {
     out: W,
     hash: XxHash64,
     /// Last bytes so far, held back since they may contain the tag.
     held: Vec<u8>,
 }
 
-impl<W: Write> Sealing<W> {
+impl<W: Write> SealingWriter<W> {
     /// Creates a writer that seals the data and writes them to `out`.
     pub fn new(out: W) -> Self {
-        Sealing { out, hash: XxHash64::with_seed(0), held: Vec::new() }
+        SealingWriter { out, hash: XxHash64::with_seed(0), held: Vec::new() }
     }
 
     /// Fills in the checksum and writes the rest.
@@ -46,7 +46,7 @@ impl<W: Write> Sealing<W> {
     }
 }
 
-impl<W: Write> Write for Sealing<W> {
+impl<W: Write> Write for SealingWriter<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.held.extend_from_slice(bytes);
         // Writes in large pieces, since each time the held bytes are moved.
@@ -66,7 +66,7 @@ impl<W: Write> Write for Sealing<W> {
 
 /// Writes `value`, whose last field contains [`OPEN`], and seals it.
 pub fn json(out: &mut dyn Write, value: &impl serde::Serialize) -> io::Result<()> {
-    let mut out = Sealing::new(out);
+    let mut out = SealingWriter::new(out);
     serde_json::to_writer_pretty(&mut out, value)?;
     writeln!(out)?;
     out.finish()
@@ -77,7 +77,7 @@ pub fn json(out: &mut dyn Write, value: &impl serde::Serialize) -> io::Result<()
 /// # Errors
 /// If it cannot be read.
 pub fn hash_of_file(path: &Path) -> io::Result<String> {
-    let mut out = Hashing::new(io::sink());
+    let mut out = HashingWriter::new(io::sink());
     io::copy(&mut File::open(path)?, &mut out)?;
     Ok(out.finish())
 }
@@ -85,21 +85,21 @@ pub fn hash_of_file(path: &Path) -> io::Result<String> {
 /// Returns a hash of everything that decides a result, computed over its JSON. Numbers are exact. Infinity, for an
 /// event without end, is written as null, like no other number.
 pub fn hash_of(decides: &impl serde::Serialize) -> String {
-    let mut out = Hashing::new(io::sink());
+    let mut out = HashingWriter::new(io::sink());
     let written = serde_json::to_writer(&mut out, decides);
     debug_assert!(written.is_ok(), "nothing in it cannot be written");
     format!("{:016x}", out.hash.finish())
 }
 
 /// Writer that passes its data on and hashes them.
-pub(crate) struct Hashing<W> {
+pub(crate) struct HashingWriter<W> {
     out: W,
     hash: XxHash64,
 }
 
-impl<W> Hashing<W> {
+impl<W> HashingWriter<W> {
     pub(crate) fn new(out: W) -> Self {
-        Hashing { out, hash: XxHash64::with_seed(0) }
+        HashingWriter { out, hash: XxHash64::with_seed(0) }
     }
 
     /// Returns the hash in the format of [`hash_of_file`].
@@ -108,7 +108,7 @@ impl<W> Hashing<W> {
     }
 }
 
-impl<W: Write> Write for Hashing<W> {
+impl<W: Write> Write for HashingWriter<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let written = self.out.write(bytes)?;
         self.hash.write(bytes.get(..written).unwrap_or_default());
@@ -161,7 +161,7 @@ mod tests {
         bytes.extend_from_slice(OPEN.as_bytes());
         bytes.extend(std::iter::repeat_n(b'.', after));
         let mut out = Vec::new();
-        let mut sealing = Sealing::new(&mut out);
+        let mut sealing = SealingWriter::new(&mut out);
         bytes.chunks(piece).for_each(|piece| sealing.write_all(piece).unwrap());
         sealing.finish().unwrap();
         out

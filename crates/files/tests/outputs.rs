@@ -1,7 +1,7 @@
 //! Writing never replaces files of others, in folders or as single files.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
-use afbc_files::{Error, Folder, Output};
+use afbc_files::{Error, Folder, OutputFile};
 use std::fs;
 use std::io;
 use std::os::unix::fs::symlink;
@@ -42,23 +42,23 @@ fn nothing_is_replaced_unless_by_force() {
         let path = folder.join(name);
         make(&path);
         let before = (fs::symlink_metadata(&path).unwrap().file_type(), fs::read(&path).ok());
-        for error in [Output::new(&path, "--it"), Output::forcible(&path, "--it", false)] {
+        for error in [OutputFile::new(&path, "--it"), OutputFile::forcible(&path, "--it", false)] {
             let error = error.unwrap_err().to_string();
             assert!(error.contains("exists already; choose another file for --it, or "), "{error}");
         }
         assert_eq!((fs::symlink_metadata(&path).unwrap().file_type(), fs::read(&path).ok()), before);
-        let forced = Output::forcible(&path, "--it", true).unwrap();
+        let forced = OutputFile::forcible(&path, "--it", true).unwrap();
         // A failure leaves the file as it was.
-        forced.place(|_| Err(io::ErrorKind::StorageFull.into())).unwrap_err();
+        forced.write(|_| Err(io::ErrorKind::StorageFull.into())).unwrap_err();
         assert_eq!((fs::symlink_metadata(&path).unwrap().file_type(), fs::read(&path).ok()), before);
         assert!(matches!(forced.create(), Err(Error::Exists { .. })), "logs are not forced");
-        forced.place(|out| out.write_all(b"new")).unwrap();
+        forced.write(|out| out.write_all(b"new")).unwrap();
         assert!(fs::symlink_metadata(&path).unwrap().is_file());
         assert_eq!(fs::read(&path).unwrap(), b"new");
     }
     assert_eq!(fs::read(folder.join("target")).unwrap(), b"theirs");
     for path in ["", "..", ".", "no/such"] {
-        let error = Output::forcible(&folder.join(path), "--it", true).unwrap_err().to_string();
+        let error = OutputFile::forcible(&folder.join(path), "--it", true).unwrap_err().to_string();
         assert!(error.contains("cannot be written (") && error.contains("--it"), "{error}");
     }
     assert_eq!(names(&folder), ["empty", "file", "link", "lost", "target"]);
@@ -70,12 +70,12 @@ fn what_appears_meanwhile_is_kept() {
     let folder = folder("meanwhile");
     for (name, make) in IN_THE_WAY {
         let path = folder.join(name);
-        let output = Output::new(&path, "--it").unwrap();
-        output.place(|_| Err(io::ErrorKind::StorageFull.into())).unwrap_err();
+        let output = OutputFile::new(&path, "--it").unwrap();
+        output.write(|_| Err(io::ErrorKind::StorageFull.into())).unwrap_err();
         assert!(names(&folder).iter().all(|known| known != name), "nothing stays of a failure");
         make(&path);
         let before = fs::read(&path).ok();
-        assert!(matches!(output.place(|out| out.write_all(b"new")), Err(Error::Exists { .. })), "{name}");
+        assert!(matches!(output.write(|out| out.write_all(b"new")), Err(Error::Exists { .. })), "{name}");
         assert!(matches!(output.create(), Err(Error::Exists { .. })), "{name}");
         assert_eq!(fs::read(&path).ok(), before);
     }
@@ -86,7 +86,7 @@ fn what_appears_meanwhile_is_kept() {
 fn written(path: &Path, command: &str, force: bool, files: &[&str]) -> Result<(), Error> {
     let folder = Folder::open(path, command, "it", force)?;
     folder.only(files)?;
-    files.iter().try_for_each(|name| folder.place(name, |out| out.write_all(command.as_bytes())).map(drop))
+    files.iter().try_for_each(|name| folder.write(name, |out| out.write_all(command.as_bytes())).map(drop))
 }
 
 #[test]

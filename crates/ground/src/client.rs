@@ -1,8 +1,8 @@
 //! A ground station's end of the link to a vehicle.
 
-use crate::commands::{CommandState, Commands};
+use crate::commands::{CommandState, PendingCommands};
 use crate::parameters::VehicleParameters;
-use crate::repeated::Patience;
+use crate::retry::RetryPolicy;
 use crate::uploads::{UploadEnd, Uploads};
 use crate::vehicle::{VehicleState, VehicleText};
 use afbc_mavlink::{
@@ -22,7 +22,7 @@ pub struct Client {
     now_ms: Option<u64>,
     heartbeat_ms: Option<u64>,
     vehicle: VehicleState,
-    commands: Commands,
+    commands: PendingCommands,
     uploads: Uploads,
     parameters: VehicleParameters,
 }
@@ -41,14 +41,14 @@ impl Client {
             now_ms: None,
             heartbeat_ms: None,
             vehicle: VehicleState::default(),
-            commands: Commands::default(),
+            commands: PendingCommands::default(),
             uploads: Uploads::default(),
             parameters: VehicleParameters::default(),
         }
     }
 
     /// Sends a heartbeat at each multiple of this period \[ms\]; `None` sends none.
-    pub fn beat_every(&mut self, heartbeat_ms: Option<u64>) {
+    pub fn set_heartbeat_period(&mut self, heartbeat_ms: Option<u64>) {
         self.heartbeat_ms = heartbeat_ms.filter(|period_ms| *period_ms > 0);
     }
 
@@ -77,9 +77,9 @@ impl Client {
         self.outgoing.push(message);
     }
 
-    /// Sends a command, and repeats it until it is answered or `patience` ends.
-    pub fn command(&mut self, command: VehicleCommand, patience: Patience) {
-        self.commands.give(command, patience, self.now_ms());
+    /// Sends a command, and repeats it until it is answered or `retry_policy` ends.
+    pub fn command(&mut self, command: VehicleCommand, retry_policy: RetryPolicy) {
+        self.commands.give(command, retry_policy, self.now_ms());
         self.say(Uplink::Command(command));
     }
 
@@ -97,8 +97,12 @@ impl Client {
     }
 
     /// Uploads plans one after the other. They replace the plans that have not been uploaded yet.
-    pub fn upload(&mut self, plans: impl IntoIterator<Item = (MissionType, Vec<MissionItem>)>, patience: Patience) {
-        let offer = self.uploads.begin(plans, patience, self.now_ms());
+    pub fn upload(
+        &mut self,
+        plans: impl IntoIterator<Item = (MissionType, Vec<MissionItem>)>,
+        retry_policy: RetryPolicy,
+    ) {
+        let offer = self.uploads.begin(plans, retry_policy, self.now_ms());
         self.outgoing.extend(offer.map(Uplink::Mission));
     }
 
@@ -119,12 +123,12 @@ impl Client {
     }
 
     /// Sets the time: queues due repetitions and the heartbeat.
-    pub fn turn(&mut self, now_ms: u64) {
+    pub fn update(&mut self, now_ms: u64) {
         let before_ms = self.now_ms.replace(now_ms);
         let Client { outgoing, commands, uploads, parameters, .. } = self;
-        commands.turn(now_ms, |command| outgoing.push(Uplink::Command(command)));
-        outgoing.extend(uploads.turn(now_ms).map(Uplink::Mission));
-        parameters.turn(now_ms, |request| outgoing.push(Uplink::Parameter(request)));
+        commands.update(now_ms, |command| outgoing.push(Uplink::Command(command)));
+        outgoing.extend(uploads.update(now_ms).map(Uplink::Mission));
+        parameters.update(now_ms, |request| outgoing.push(Uplink::Parameter(request)));
         let beats = self.heartbeat_ms.is_some_and(|period_ms| match before_ms {
             Some(before_ms) => now_ms / period_ms > before_ms / period_ms,
             None => now_ms.is_multiple_of(period_ms),

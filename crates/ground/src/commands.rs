@@ -1,7 +1,7 @@
 //! Commands and their answers. MAVLink's answer gives only the command's number, so one command per number is open at a
 //! time.
 
-use crate::repeated::{Due, Patience, Repeated};
+use crate::retry::{RetriedRequest, RetryAction, RetryPolicy};
 use afbc_mavlink::{CommandResult, MavCmd, VehicleCommand};
 use std::collections::BTreeMap;
 
@@ -24,20 +24,20 @@ pub enum CommandState {
     Silent,
 }
 
-struct Given {
+struct SentCommand {
     command: VehicleCommand,
-    repeated: Repeated,
+    request: RetriedRequest,
     state: CommandState,
 }
 
 #[derive(Default)]
-pub(crate) struct Commands(BTreeMap<u16, Given>);
+pub(crate) struct PendingCommands(BTreeMap<u16, SentCommand>);
 
-impl Commands {
+impl PendingCommands {
     /// Stores a command. It replaces an earlier one of the same number, whose answer no longer counts.
-    pub(crate) fn give(&mut self, command: VehicleCommand, patience: Patience, now_ms: u64) {
-        let repeated = Repeated::new(patience, now_ms);
-        self.0.insert(command.id(), Given { command, repeated, state: CommandState::Waiting });
+    pub(crate) fn give(&mut self, command: VehicleCommand, retry_policy: RetryPolicy, now_ms: u64) {
+        let request = RetriedRequest::new(retry_policy, now_ms);
+        self.0.insert(command.id(), SentCommand { command, request, state: CommandState::Waiting });
     }
 
     pub(crate) fn state(&self, command: VehicleCommand) -> Option<CommandState> {
@@ -47,18 +47,18 @@ impl Commands {
     pub(crate) fn hear(&mut self, id: u16, answer: CommandResult, now_ms: u64) {
         let Some(given) = self.0.get_mut(&id).filter(|given| given.state == CommandState::Waiting) else { return };
         if answer == CommandResult::InProgress {
-            return given.repeated.goes_on(now_ms);
+            return given.request.goes_on(now_ms);
         }
-        given.state = CommandState::Answered { answer, after_ms: given.repeated.waited_ms(now_ms) };
+        given.state = CommandState::Answered { answer, after_ms: given.request.waited_ms(now_ms) };
     }
 
     /// Passes to `say` the commands that are due to be repeated.
-    pub(crate) fn turn(&mut self, now_ms: u64, mut say: impl FnMut(VehicleCommand)) {
+    pub(crate) fn update(&mut self, now_ms: u64, mut say: impl FnMut(VehicleCommand)) {
         for given in self.0.values_mut().filter(|given| given.state == CommandState::Waiting) {
-            match given.repeated.due(now_ms) {
-                Due::Nothing => (),
-                Due::Again => say(given.command),
-                Due::GiveUp => given.state = CommandState::Silent,
+            match given.request.due(now_ms) {
+                RetryAction::Nothing => (),
+                RetryAction::Again => say(given.command),
+                RetryAction::GiveUp => given.state = CommandState::Silent,
             }
         }
     }

@@ -1,12 +1,12 @@
 //! Download of the vehicle's parameters.
 
-use crate::repeated::{Due, Patience, Repeated};
+use crate::retry::{RetriedRequest, RetryAction, RetryPolicy};
 use afbc_mavlink::{ParameterRequest, ParameterValue};
 use std::collections::BTreeMap;
 
 /// Time without a new parameter after which missing ones are requested \[ms\], how many times that is done, and how
 /// many parameters each time requests.
-const STALLED: Patience = Patience { answer_ms: 1_000, tries: 20 };
+const STALLED: RetryPolicy = RetryPolicy { answer_ms: 1_000, tries: 20 };
 const MISSING_MAX: usize = 10;
 
 /// The vehicle's parameters that have been received.
@@ -14,7 +14,7 @@ const MISSING_MAX: usize = 10;
 pub struct VehicleParameters {
     count: Option<u16>,
     values: BTreeMap<u16, ParameterValue>,
-    download: Option<Repeated>,
+    download: Option<RetriedRequest>,
 }
 
 impl VehicleParameters {
@@ -39,7 +39,7 @@ impl VehicleParameters {
     }
 
     pub(crate) fn read(&mut self, now_ms: u64) -> ParameterRequest {
-        (self.count, self.download) = (None, Some(Repeated::new(STALLED, now_ms)));
+        (self.count, self.download) = (None, Some(RetriedRequest::new(STALLED, now_ms)));
         self.values.clear();
         ParameterRequest::List
     }
@@ -56,11 +56,11 @@ impl VehicleParameters {
     }
 
     /// Passes to `say` the requests that are due to be repeated.
-    pub(crate) fn turn(&mut self, now_ms: u64, mut say: impl FnMut(ParameterRequest)) {
-        match self.download.as_mut().map_or(Due::Nothing, |download| download.due(now_ms)) {
-            Due::Nothing => (),
-            Due::GiveUp => self.download = None,
-            Due::Again => match self.count {
+    pub(crate) fn update(&mut self, now_ms: u64, mut say: impl FnMut(ParameterRequest)) {
+        match self.download.as_mut().map_or(RetryAction::Nothing, |download| download.due(now_ms)) {
+            RetryAction::Nothing => (),
+            RetryAction::GiveUp => self.download = None,
+            RetryAction::Again => match self.count {
                 // No parameter has come, so the request itself was lost.
                 None => say(ParameterRequest::List),
                 Some(count) => {

@@ -1,6 +1,6 @@
 //! Uploads of missions, fences and rally points. The vehicle requests them item by item.
 
-use crate::repeated::{Due, Patience, Repeated};
+use crate::retry::{RetriedRequest, RetryAction, RetryPolicy};
 use afbc_mavlink::{MissionItem, MissionMessage, MissionResult, MissionType};
 use std::collections::VecDeque;
 
@@ -18,8 +18,8 @@ pub enum UploadEnd {
 /// Plans that are still to be uploaded; the first one is in progress.
 pub(crate) struct Uploads {
     plans: VecDeque<(MissionType, Vec<MissionItem>)>,
-    patience: Patience,
-    repeated: Repeated,
+    retry_policy: RetryPolicy,
+    request: RetriedRequest,
     /// Last message sent; it is repeated if no answer comes.
     said: Option<MissionMessage>,
     /// Number of items of the first plan that the vehicle has requested.
@@ -29,8 +29,8 @@ pub(crate) struct Uploads {
 
 impl Default for Uploads {
     fn default() -> Self {
-        let (patience, repeated) = (Patience::ONCE, Repeated::new(Patience::ONCE, 0));
-        Uploads { plans: VecDeque::new(), patience, repeated, said: None, asked: 0, end: None }
+        let (retry_policy, request) = (RetryPolicy::ONCE, RetriedRequest::new(RetryPolicy::ONCE, 0));
+        Uploads { plans: VecDeque::new(), retry_policy, request, said: None, asked: 0, end: None }
     }
 }
 
@@ -39,10 +39,10 @@ impl Uploads {
     pub(crate) fn begin(
         &mut self,
         plans: impl IntoIterator<Item = (MissionType, Vec<MissionItem>)>,
-        patience: Patience,
+        retry_policy: RetryPolicy,
         now_ms: u64,
     ) -> Option<MissionMessage> {
-        (self.plans, self.patience, self.end) = (plans.into_iter().collect(), patience, None);
+        (self.plans, self.retry_policy, self.end) = (plans.into_iter().collect(), retry_policy, None);
         self.offer(now_ms)
     }
 
@@ -61,7 +61,7 @@ impl Uploads {
     }
 
     fn say(&mut self, message: Option<MissionMessage>, now_ms: u64) -> Option<MissionMessage> {
-        (self.said, self.repeated) = (message, Repeated::new(self.patience, now_ms));
+        (self.said, self.request) = (message, RetriedRequest::new(self.retry_policy, now_ms));
         message
     }
 
@@ -94,12 +94,12 @@ impl Uploads {
     }
 
     /// Returns the message that is due to be repeated.
-    pub(crate) fn turn(&mut self, now_ms: u64) -> Option<MissionMessage> {
+    pub(crate) fn update(&mut self, now_ms: u64) -> Option<MissionMessage> {
         let plan = self.plans.front()?.0;
-        match self.repeated.due(now_ms) {
-            Due::Nothing => None,
-            Due::Again => self.said,
-            Due::GiveUp => {
+        match self.request.due(now_ms) {
+            RetryAction::Nothing => None,
+            RetryAction::Again => self.said,
+            RetryAction::GiveUp => {
                 self.end(UploadEnd::Silent(plan));
                 None
             }

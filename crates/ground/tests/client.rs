@@ -3,7 +3,7 @@
 
 mod line;
 
-use afbc_ground::{Client, CommandState, Patience, UploadEnd};
+use afbc_ground::{Client, CommandState, RetryPolicy, UploadEnd};
 use afbc_mavlink::{
     Address, CommandResult, Downlink, MissionItem, MissionMessage, MissionResult, MissionType, ParameterRequest,
     Uplink, VehicleCommand,
@@ -13,7 +13,7 @@ use proptest::prelude::*;
 
 const STATION: Address = Client::STATION;
 /// Long enough for every link in these tests.
-const PATIENT: Patience = Patience { answer_ms: 600, tries: 60 };
+const PATIENT: RetryPolicy = RetryPolicy { answer_ms: 600, tries: 60 };
 const LONG_MS: u64 = 60_000;
 /// Time after which no old frame is left on the line that could be taken for an answer to the next question \[ms\].
 const UNDER_WAY_MS: u64 = 1_000;
@@ -99,11 +99,11 @@ proptest! {
     #[test]
     fn heartbeats_keep_time(period_ms in 1..1_000_u64, steps_ms in prop::collection::vec(0..400_u64, 1..60)) {
         let mut client = Client::new(STATION);
-        client.beat_every(Some(period_ms));
+        client.set_heartbeat_period(Some(period_ms));
         let (mut now_ms, mut beats) = (0, 0);
         for step_ms in steps_ms {
             let before_ms = now_ms;
-            client.turn(now_ms);
+            client.update(now_ms);
             let count = said(&mut client).len();
             prop_assert!(count <= 1);
             beats += count;
@@ -111,8 +111,8 @@ proptest! {
             prop_assert!(beats as u64 <= 1 + before_ms / period_ms);
             prop_assert!(beats as u64 > before_ms / period_ms);
         }
-        client.beat_every(None);
-        client.turn(now_ms + 10 * period_ms);
+        client.set_heartbeat_period(None);
+        client.update(now_ms + 10 * period_ms);
         prop_assert_eq!(said(&mut client), []);
     }
 }
@@ -122,14 +122,14 @@ proptest! {
 fn silence_is_told() {
     let mut client = Client::new(STATION);
     let plans = [(MissionType::MISSION, items(2))];
-    client.command(VehicleCommand::Land, Patience::REPEATED);
-    client.upload(plans.clone(), Patience::REPEATED);
-    client.command(VehicleCommand::Return, Patience::ONCE);
+    client.command(VehicleCommand::Land, RetryPolicy::REPEATED);
+    client.upload(plans.clone(), RetryPolicy::REPEATED);
+    client.command(VehicleCommand::Return, RetryPolicy::ONCE);
     let land = Uplink::Command(VehicleCommand::Land);
     let count = Uplink::Mission(MissionMessage::Count(2, MissionType::MISSION));
     let mut times = Vec::new();
     for now_ms in 0..5_000 {
-        client.turn(now_ms);
+        client.update(now_ms);
         times.extend(said(&mut client).into_iter().map(|message| (now_ms, message)));
         let waits = |until_ms| if now_ms < until_ms { CommandState::Waiting } else { CommandState::Silent };
         assert_eq!(client.state(VehicleCommand::Land), Some(waits(3_000)), "{now_ms}");
@@ -155,23 +155,23 @@ fn missing_parameters_are_asked_for() {
     let mut line = Line::new(1, [0; 3]);
     line.client.read_parameters();
     assert_eq!(said(&mut line.client), [Uplink::Parameter(ParameterRequest::List)]);
-    line.client.turn(1_000);
+    line.client.update(1_000);
     assert_eq!(said(&mut line.client), [Uplink::Parameter(ParameterRequest::List)]);
-    line.client.turn(1_500);
+    line.client.update(1_500);
     let all = line.vehicle.parameters();
     for value in all.iter().filter(|value| value.index % 2 == 0) {
         line.client.receive(VEHICLE, &Downlink::Parameter(*value));
     }
-    line.client.turn(2_499);
+    line.client.update(2_499);
     assert_eq!(said(&mut line.client), []);
-    line.client.turn(2_500);
+    line.client.update(2_500);
     let odd: Vec<_> = (1..all.len() as u16).step_by(2).take(10).collect();
     assert!(odd.len() == 10);
     assert_eq!(
         said(&mut line.client),
         odd.iter().map(|it| Uplink::Parameter(ParameterRequest::ReadIndex(*it))).collect::<Vec<_>>()
     );
-    (3..60).for_each(|now_s| line.client.turn(1_000 * now_s));
+    (3..60).for_each(|now_s| line.client.update(1_000 * now_s));
     assert!(!line.client.parameters().are_being_read() && !line.client.parameters().are_complete());
 }
 
@@ -179,22 +179,22 @@ fn missing_parameters_are_asked_for() {
 #[test]
 fn what_is_in_progress_is_waited_for() {
     let mut client = Client::new(STATION);
-    client.command(VehicleCommand::SelfTest, Patience::REPEATED);
+    client.command(VehicleCommand::SelfTest, RetryPolicy::REPEATED);
     said(&mut client);
     for now_ms in (0..10_000).step_by(500) {
-        client.turn(now_ms);
+        client.update(now_ms);
         client.receive(VEHICLE, &answer(VehicleCommand::SelfTest, CommandResult::InProgress, STATION));
         assert_eq!(said(&mut client), [], "{now_ms}");
     }
     assert_eq!(client.state(VehicleCommand::SelfTest), Some(CommandState::Waiting));
-    client.turn(9_700);
+    client.update(9_700);
     client.receive(VEHICLE, &answer(VehicleCommand::SelfTest, CommandResult::Failed, STATION));
     let failed = CommandState::Answered { answer: CommandResult::Failed, after_ms: 200 };
     assert_eq!(client.state(VehicleCommand::SelfTest), Some(failed));
     // The first final answer counts. The next command waits for its own answer.
     client.receive(VEHICLE, &answer(VehicleCommand::SelfTest, CommandResult::Accepted, STATION));
     assert_eq!(client.state(VehicleCommand::SelfTest), Some(failed));
-    client.command(VehicleCommand::SelfTest, Patience::ONCE);
+    client.command(VehicleCommand::SelfTest, RetryPolicy::ONCE);
     assert_eq!(client.state(VehicleCommand::SelfTest), Some(CommandState::Waiting));
 }
 
@@ -206,8 +206,8 @@ fn answers_to_others_are_not_heard() {
     // A station's own heartbeat that is sent back does not count as a vehicle's.
     assert!(client.receive(STATION, &beat) && client.vehicle().address.is_none());
     assert!(client.receive(VEHICLE, &beat));
-    client.command(VehicleCommand::Arm, Patience::ONCE);
-    client.upload([(MissionType::MISSION, items(1))], Patience::ONCE);
+    client.command(VehicleCommand::Arm, RetryPolicy::ONCE);
+    client.upload([(MissionType::MISSION, items(1))], RetryPolicy::ONCE);
     said(&mut client);
     let request = |to| Downlink::Mission { message: MissionMessage::Request(0, MissionType::MISSION), to };
     for (from, to) in [(VEHICLE, COMPANION), (OTHER_VEHICLE, STATION)] {
@@ -237,7 +237,7 @@ fn answers_to_others_are_not_heard() {
 #[test]
 fn refused_plans_end_the_upload() {
     let mut client = Client::new(STATION);
-    client.upload([(MissionType::FENCE, items(2)), (MissionType::MISSION, items(1))], Patience::ONCE);
+    client.upload([(MissionType::FENCE, items(2)), (MissionType::MISSION, items(1))], RetryPolicy::ONCE);
     said(&mut client);
     client.receive(VEHICLE, &ack(MissionResult::ACCEPTED, MissionType::FENCE, STATION));
     client.receive(VEHICLE, &ack(MissionResult::ERROR, MissionType::MISSION, STATION));

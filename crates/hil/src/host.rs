@@ -10,7 +10,7 @@ use afbc::AdaptiveEstimate;
 use afbc_comms::services::signing::{Signing, SigningRecord};
 use afbc_comms::{Calibrator, Comms, EscReports, EscsHeard, RadioControl, Setup, Transfers};
 use afbc_estimator::GeodeticOrigin;
-use afbc_files::Flash;
+use afbc_files::FlashFile;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_log::exact::Recorder;
 use afbc_log::ulog::{BlackBox, LogStart};
@@ -142,7 +142,7 @@ impl Host {
     pub fn stored(
         vehicle: Option<&Vehicle>,
         link: Link,
-        store: &mut Store<Flash>,
+        store: &mut Store<FlashFile>,
         notice: &mut dyn FnMut(&str),
     ) -> Result<Self, OutOfRange> {
         let signing = Signing::kept(|name| store.get(name).ok().flatten().map(|(_, bits)| bits));
@@ -434,7 +434,7 @@ fn new_black_box(
 }
 
 /// Returns the parameters with the values in `store`.
-fn loaded(image: Configuration, store: &mut Store<Flash>, notice: &mut dyn FnMut(&str)) -> ParameterTable {
+fn loaded(image: Configuration, store: &mut Store<FlashFile>, notice: &mut dyn FnMut(&str)) -> ParameterTable {
     let mut table = ParameterTable::new(image);
     let loaded = Kept::NOW.load(&mut table, store, |unused: Reason| notice(unused.as_str()));
     loaded.unwrap_or_else(|error| notice(error.reason()));

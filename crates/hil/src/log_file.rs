@@ -1,6 +1,6 @@
 //! A file for the log of a host.
 
-use afbc_files::{BackgroundWriter, Error, Output};
+use afbc_files::{BackgroundWriter, Error, OutputFile};
 use std::cell::RefCell;
 use std::fs::File;
 use std::io;
@@ -37,7 +37,7 @@ impl LogFile {
     ///
     /// # Errors
     /// If the file exists or cannot be created.
-    pub fn create(output: &Output) -> Result<Self, Error> {
+    pub fn create(output: &OutputFile) -> Result<Self, Error> {
         Self::to(output.create()?).map_err(|error| output.unwritten(&error))
     }
 

@@ -4,7 +4,7 @@ use super::Extremes;
 use afbc_comms::services::modes;
 use afbc_comms::{BUSY, CALIBRATES};
 use afbc_flight_core::Refusal;
-use afbc_ground::{Client, PING, Patience};
+use afbc_ground::{Client, PING, RetryPolicy};
 use afbc_guidance::FlightMode;
 use afbc_mavlink::{CommandResult, Counters, Downlink, HealthArray, Uplink, VehicleCommand};
 use afbc_types::{PoseSigmas, ROTORS_MAX, RotorSpeeds, Setpoint, State};
@@ -95,12 +95,12 @@ impl Station {
     /// Queues a command, and forgets the previous answer.
     pub fn command(&mut self, command: VehicleCommand) {
         self.heard.answer = None;
-        self.client.command(command, Patience::ONCE);
+        self.client.command(command, RetryPolicy::ONCE);
     }
 
     /// Queues a ping, and starts timing its answer.
     pub fn ping(&mut self) {
-        self.client.command(PING, Patience::ONCE);
+        self.client.command(PING, RetryPolicy::ONCE);
         self.pings += 1;
         self.pinged = Some(Instant::now());
     }

@@ -2,7 +2,7 @@
 
 use crate::log_file::LogFile;
 use crate::stored_logs::StoredLogs;
-use afbc_files::{Error, Output};
+use afbc_files::{Error, OutputFile};
 use std::path::{Path, PathBuf};
 
 /// Most logs of earlier starts that may still wait for the disk.
@@ -168,7 +168,7 @@ impl LogPlace {
                 }
             };
             tried += 1;
-            match Output::new(&path, "--ulog").and_then(|output| LogFile::create(&output)) {
+            match OutputFile::new(&path, "--ulog").and_then(|output| LogFile::create(&output)) {
                 Ok(file) => return Ok((path, file)),
                 // Another process may log into the same folder.
                 Err(Error::Exists { .. }) if matches!(self, LogPlace::Folder(..)) && tried < NUMBERS_TRIED => {}

@@ -2,7 +2,7 @@
 #![cfg(unix)]
 #![allow(clippy::expect_used, missing_docs, reason = "tests")]
 
-use afbc_files::Output;
+use afbc_files::OutputFile;
 use afbc_hil::{LogFile, UlogFiles};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ fn stuck(path: &Path) -> Sender<()> {
 #[test]
 fn a_log_is_whole() {
     let path = folder("whole").join("whole");
-    let log = LogFile::create(&Output::new(&path, "--exact-log").expect("new")).expect("created");
+    let log = LogFile::create(&OutputFile::new(&path, "--exact-log").expect("new")).expect("created");
     let mut sink = log.sink();
     let bytes: Vec<u8> = (0..30_000_000_u32).map(|it| (it / 7) as u8).collect();
     // Written faster than any disk, and yet complete.

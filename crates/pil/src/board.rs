@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::clock_tree::{self, ClockTree, RTC_BKP0R};
-use crate::gdb::{self, Gdb, Watch};
+use crate::gdb::{self, Gdb, Watchpoint};
 use crate::qemu::{self, Qemu};
 use object::{Object, ObjectSection};
 use std::io::{Read, Write};
@@ -64,7 +64,7 @@ impl EmulatedBoard {
         let (_qemu, mut gdb) = start(elf)?;
         let mut clock_tree = ClockTree::new(&mut gdb, true)?;
         clock_tree.boot_system_memory(&mut gdb, word)?;
-        gdb.watch(Watch::Access, vectors)?;
+        gdb.watch(Watchpoint::Access, vectors)?;
         match gdb.run(WRITE_TIMEOUT)? {
             Some(address) if address == vectors => Ok(clock_tree.register(RTC_BKP0R)),
             other => Err(Error::Protocol(format!("no vector table at {vectors:#x}, but an access to {other:x?}"))),

@@ -11,8 +11,8 @@ use std::path::Path;
 
 /// Budget of the guidance within a control tick: modes, trajectory limiter, safety net, and the link's commands.
 pub const GUIDANCE_INSTRUCTIONS_MAX: u32 = 2_300;
-/// Largest number of instructions in a control tick: the worst that the search ([`crate::worst`]) found, plus a margin.
-/// At 2.5 cycles each, it takes 125 us of the 1000 us.
+/// Largest number of instructions in a control tick: the worst that the search ([`crate::worst_tick`]) found, plus a
+/// margin. At 2.5 cycles each, it takes 125 us of the 1000 us.
 pub const TICK_INSTRUCTIONS_MAX: u32 = 6_450 + GUIDANCE_INSTRUCTIONS_MAX;
 /// Largest number of instructions in a control tick with the vehicle's own estimate.
 pub const ESTIMATING_INSTRUCTIONS_MAX: u32 = 16_200 + GUIDANCE_INSTRUCTIONS_MAX;
@@ -24,8 +24,8 @@ const FLASH: std::ops::Range<u64> = 0x0800_0000..0x0810_0000;
 
 /// A linked image.
 #[derive(Debug)]
-pub struct Linked {
-    functions: BTreeMap<u32, Function>,
+pub struct LinkedImage {
+    functions: BTreeMap<u32, ImageFunction>,
     symbols: BTreeMap<String, u32>,
     /// Log messages of the image, as written in the source.
     pub log: Vec<String>,
@@ -36,7 +36,7 @@ pub struct Linked {
 }
 
 #[derive(Debug, Default)]
-struct Function {
+struct ImageFunction {
     name: String,
     stack_bytes: u32,
     calls: BTreeSet<u32>,
@@ -46,7 +46,7 @@ struct Function {
 
 /// Everything that a function can reach by calls.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Reach {
+pub struct ReachableCode {
     /// Worst-case stack \[bytes\].
     pub stack_bytes: u32,
     /// Chain of calls with the deepest stack, outermost first, each with its own stack \[bytes\].
@@ -103,7 +103,7 @@ pub const LEVELS: [(&str, &[&str]); 7] = [
 /// Bytes that the processor pushes on an interrupt: 26 words including the FPU's, and one for alignment.
 pub const FRAME_BYTES: u32 = 108;
 
-impl Linked {
+impl LinkedImage {
     /// Reads an image.
     ///
     /// # Errors
@@ -147,7 +147,7 @@ impl Linked {
                 .and_then(|section| section.data_range(u64::from(start), symbol.size()).ok().flatten());
             let Some(code) = code else { continue };
             let name = format!("{:#}", rustc_demangle::demangle(symbol.name().unwrap_or_default()));
-            functions.entry(start).or_insert_with(|| Function::decode(name, start, code, is_code));
+            functions.entry(start).or_insert_with(|| ImageFunction::decode(name, start, code, is_code));
         }
         let symbols = file.symbols().filter_map(|symbol| {
             Some((format!("{:#}", rustc_demangle::demangle(symbol.name().ok()?)), symbol.address() as u32))
@@ -155,14 +155,14 @@ impl Linked {
         let log = file.section_by_name(".defmt").map(|section| section.index());
         let log = file.symbols().filter(|symbol| symbol.section_index().is_some_and(|index| Some(index) == log));
         let log = log.filter_map(|symbol| Some(symbol.name().ok()?.to_owned())).collect();
-        Ok(Linked { functions, symbols: symbols.collect(), log, flash_bytes, ram_bytes })
+        Ok(LinkedImage { functions, symbols: symbols.collect(), log, flash_bytes, ram_bytes })
     }
 
     /// Returns what the function named `name` can reach.
     ///
     /// # Errors
     /// Fails if there is no such function, or if it can call itself.
-    pub fn reach(&self, name: &str) -> Result<Reach, Error> {
+    pub fn reach(&self, name: &str) -> Result<ReachableCode, Error> {
         self.reach_without(name, &[])
     }
 
@@ -170,27 +170,27 @@ impl Linked {
     ///
     /// # Errors
     /// The same as for [`reach`](Self::reach).
-    pub fn reach_without(&self, name: &str, omitted: &[&str]) -> Result<Reach, Error> {
+    pub fn reach_without(&self, name: &str, omitted: &[&str]) -> Result<ReachableCode, Error> {
         let root = self.find(name).ok_or_else(|| Error::Protocol(format!("the image has no function {name}")))?;
         let omitted = omitted.iter().filter_map(|name| self.find(name)).collect();
-        let mut walk = Walk { linked: self, omitted, depths: BTreeMap::new(), open: BTreeSet::new() };
+        let mut walk = CallGraphWalk { linked: self, omitted, depths: BTreeMap::new(), open: BTreeSet::new() };
         let (stack_bytes, deepest) = walk.depth(root)?;
         let reached = walk.depths.keys().filter_map(|address| self.functions.get(address));
         let indirect = reached
             .filter(|function| function.is_indirect && function.name != CHECK[0])
             .map(|function| function.name.clone())
             .collect();
-        Ok(Reach {
+        Ok(ReachableCode {
             stack_bytes,
             deepest,
-            panics: self.chains(root, Function::panics)?,
-            doubles: self.chains(root, Function::is_of_doubles)?,
+            panics: self.chains(root, ImageFunction::panics)?,
+            doubles: self.chains(root, ImageFunction::is_of_doubles)?,
             indirect,
         })
     }
 
     /// Returns the shortest chain from `root` to each function that is `sought`. Calls after a panic are ignored.
-    fn chains(&self, root: u32, sought: fn(&Function) -> bool) -> Result<Vec<Vec<String>>, Error> {
+    fn chains(&self, root: u32, sought: fn(&ImageFunction) -> bool) -> Result<Vec<Vec<String>>, Error> {
         let mut chains = Vec::new();
         let mut seen = BTreeSet::from([root]);
         let mut next = VecDeque::from([vec![root]]);
@@ -213,7 +213,7 @@ impl Linked {
         Ok(chains)
     }
 
-    fn function(&self, address: u32) -> Result<&Function, Error> {
+    fn function(&self, address: u32) -> Result<&ImageFunction, Error> {
         let none = || Error::Protocol(format!("a call to {address:#010x}, where no function is"));
         self.functions.get(&address).ok_or_else(none)
     }
@@ -234,7 +234,7 @@ impl Linked {
                 }
             }
             if USB_CALLERS.iter().any(|caller| function.name.starts_with(caller)) {
-                let is_class = |function: &Function| USB_CLASS.iter().any(|name| function.name.contains(name));
+                let is_class = |function: &ImageFunction| USB_CLASS.iter().any(|name| function.name.contains(name));
                 callees.extend(self.functions.iter().filter(|(_, f)| is_class(f)).map(|(address, _)| *address));
             }
         }
@@ -266,19 +266,19 @@ impl Linked {
 }
 
 /// Deepest stack of a function with its callees, and the chain of calls.
-type Depth = (u32, Vec<(String, u32)>);
+type StackDepth = (u32, Vec<(String, u32)>);
 
-struct Walk<'a> {
-    linked: &'a Linked,
+struct CallGraphWalk<'a> {
+    linked: &'a LinkedImage,
     /// Functions that count as never called.
     omitted: BTreeSet<u32>,
-    depths: BTreeMap<u32, Depth>,
+    depths: BTreeMap<u32, StackDepth>,
     /// Functions on the current path.
     open: BTreeSet<u32>,
 }
 
-impl Walk<'_> {
-    fn depth(&mut self, address: u32) -> Result<Depth, Error> {
+impl CallGraphWalk<'_> {
+    fn depth(&mut self, address: u32) -> Result<StackDepth, Error> {
         if let Some(depth) = self.depths.get(&address) {
             return Ok(depth.clone());
         }
@@ -287,7 +287,7 @@ impl Walk<'_> {
             // The stack of a recursion has no bound.
             return Err(Error::Protocol(format!("{} can call itself", function.name)));
         }
-        let (mut below, mut chain) = Depth::default();
+        let (mut below, mut chain) = StackDepth::default();
         let callees = if function.panics() { BTreeSet::new() } else { self.linked.callees(address)? };
         for callee in callees.difference(&self.omitted.clone()).copied() {
             let (bytes, names) = self.depth(callee)?;
@@ -303,7 +303,7 @@ impl Walk<'_> {
     }
 }
 
-impl Function {
+impl ImageFunction {
     /// Returns true if a panic begins in this function.
     fn panics(&self) -> bool {
         self.name.contains("panic") || self.name.ends_with("_fail") || self.name.ends_with("_failed")
@@ -316,7 +316,7 @@ impl Function {
     }
 
     fn decode(name: String, start: u32, code: &[u8], is_code: impl Fn(u32) -> bool) -> Self {
-        let mut function = Function { name, ..Function::default() };
+        let mut function = ImageFunction { name, ..ImageFunction::default() };
         let end = start + code.len() as u32;
         let halfwords: Vec<u16> = code
             .chunks_exact(2)
@@ -331,21 +331,21 @@ impl Function {
             }
             let effect = if first >> 11 >= 0b11101 {
                 index += 2;
-                Effect::of_wide(first, halfwords.get(index - 1).copied().unwrap_or(0))
+                InstructionEffect::of_wide(first, halfwords.get(index - 1).copied().unwrap_or(0))
             } else {
                 index += 1;
-                Effect::of_narrow(first)
+                InstructionEffect::of_narrow(first)
             };
             match effect {
-                Effect::Push(bytes) => function.stack_bytes += bytes,
-                Effect::Branch(offset) => {
+                InstructionEffect::Push(bytes) => function.stack_bytes += bytes,
+                InstructionEffect::Branch(offset) => {
                     let target = address.wrapping_add(4).wrapping_add_signed(offset);
                     if !(start..end).contains(&target) {
                         function.calls.insert(target);
                     }
                 }
-                Effect::Indirect => function.is_indirect = true,
-                Effect::Other => (),
+                InstructionEffect::Indirect => function.is_indirect = true,
+                InstructionEffect::Other => (),
             }
         }
         function
@@ -353,7 +353,7 @@ impl Function {
 }
 
 /// Effect of an instruction on stack and control flow.
-enum Effect {
+enum InstructionEffect {
     /// Lowers the stack pointer by this many bytes.
     Push(u32),
     /// Branches to its own address + 4 + this offset, with or without return.
@@ -363,21 +363,21 @@ enum Effect {
     Other,
 }
 
-impl Effect {
+impl InstructionEffect {
     fn of_narrow(code: u16) -> Self {
         let bits = u32::from(code);
         match code {
             // PUSH
-            _ if code & 0xFE00 == 0xB400 => Effect::Push(4 * (bits & 0x1FF).count_ones()),
+            _ if code & 0xFE00 == 0xB400 => InstructionEffect::Push(4 * (bits & 0x1FF).count_ones()),
             // SUB SP, #imm7 * 4
-            _ if code & 0xFF80 == 0xB080 => Effect::Push(4 * (bits & 0x7F)),
+            _ if code & 0xFF80 == 0xB080 => InstructionEffect::Push(4 * (bits & 0x7F)),
             // BLX register; BX other than LR
-            _ if code & 0xFF87 == 0x4780 || code & 0xFF87 == 0x4700 && code != 0x4770 => Effect::Indirect,
+            _ if code & 0xFF87 == 0x4780 || code & 0xFF87 == 0x4700 && code != 0x4770 => InstructionEffect::Indirect,
             // B with condition; conditions 14 and 15 are UDF and SVC
-            _ if code & 0xF000 == 0xD000 && code & 0x0E00 != 0x0E00 => Effect::Branch(signed(bits << 1, 9)),
+            _ if code & 0xF000 == 0xD000 && code & 0x0E00 != 0x0E00 => InstructionEffect::Branch(signed(bits << 1, 9)),
             // B
-            _ if code & 0xF800 == 0xE000 => Effect::Branch(signed(bits << 1, 12)),
-            _ => Effect::Other,
+            _ if code & 0xF800 == 0xE000 => InstructionEffect::Branch(signed(bits << 1, 12)),
+            _ => InstructionEffect::Other,
         }
     }
 
@@ -390,30 +390,30 @@ impl Effect {
             0x5000 | 0x1000 if is_branch => {
                 let (i1, i2) = (1 ^ j1 ^ s, 1 ^ j2 ^ s);
                 let offset = s << 24 | i1 << 23 | i2 << 22 | (a & 0x3FF) << 12 | (b & 0x7FF) << 1;
-                return Effect::Branch(signed(offset, 25));
+                return InstructionEffect::Branch(signed(offset, 25));
             }
             // B with condition; 14 and 15 are system instructions
             0x0000 if is_branch && a >> 7 & 7 != 7 => {
                 let offset = s << 20 | j2 << 19 | j1 << 18 | (a & 0x3F) << 12 | (b & 0x7FF) << 1;
-                return Effect::Branch(signed(offset, 21));
+                return InstructionEffect::Branch(signed(offset, 21));
             }
             _ => (),
         }
         match (a, b) {
             // PUSH.W
-            (0xE92D, _) => Effect::Push(4 * b.count_ones()),
+            (0xE92D, _) => InstructionEffect::Push(4 * b.count_ones()),
             // STR register, [SP, #-imm8]!
-            (0xF84D, _) if b & 0x0F00 == 0x0D00 => Effect::Push(b & 0xFF),
+            (0xF84D, _) if b & 0x0F00 == 0x0D00 => InstructionEffect::Push(b & 0xFF),
             // STRD registers, [SP, #-imm8 * 4]!
-            (0xE96D, _) => Effect::Push(4 * (b & 0xFF)),
+            (0xE96D, _) => InstructionEffect::Push(4 * (b & 0xFF)),
             // VPUSH
-            _ if a & 0xFFBF == 0xED2D && b & 0x0E00 == 0x0A00 => Effect::Push(4 * (b & 0xFF)),
+            _ if a & 0xFFBF == 0xED2D && b & 0x0E00 == 0x0A00 => InstructionEffect::Push(4 * (b & 0xFF)),
             // SUB.W SP, SP, #imm; SUBW SP, SP, #imm12
-            _ if a & 0xFBEF == 0xF1AD && b & 0x8F00 == 0x0D00 => Effect::Push(expand(immediate(a, b))),
-            _ if a & 0xFBFF == 0xF2AD && b & 0x8F00 == 0x0D00 => Effect::Push(immediate(a, b)),
+            _ if a & 0xFBEF == 0xF1AD && b & 0x8F00 == 0x0D00 => InstructionEffect::Push(expand(immediate(a, b))),
+            _ if a & 0xFBFF == 0xF2AD && b & 0x8F00 == 0x0D00 => InstructionEffect::Push(immediate(a, b)),
             // LDR PC, [register other than SP]
-            _ if a & 0xFF70 == 0xF850 && b >> 12 == 15 && a & 15 != 13 => Effect::Indirect,
-            _ => Effect::Other,
+            _ if a & 0xFF70 == 0xF850 && b >> 12 == 15 && a & 15 != 13 => InstructionEffect::Indirect,
+            _ => InstructionEffect::Other,
         }
     }
 }

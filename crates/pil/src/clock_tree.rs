@@ -5,7 +5,7 @@
 //! return after the previous stores. The image itself runs unchanged.
 
 use crate::Error;
-use crate::gdb::{Gdb, PC, Watch};
+use crate::gdb::{Gdb, PC, Watchpoint};
 use std::collections::HashMap;
 use std::time::Duration;
 
@@ -128,7 +128,7 @@ impl ClockTree {
             // An access may be to a single byte of the register.
             let register = address & !3;
             let pc = gdb.register(PC)?;
-            let access = Access::decode(gdb.memory(pc)?)?;
+            let access = RegisterAccess::decode(gdb.memory(pc)?)?;
             if register == RCC_APB2RSTR {
                 // Skip this store, on which QEMU 10.0 fails an assertion.
                 gdb.set_register(PC, pc + access.length)?;
@@ -178,29 +178,29 @@ impl ClockTree {
 
 /// Runs a halted processor to its first store to `register` and replaces that instruction by NOPs.
 pub(crate) fn skip_first_store(gdb: &mut Gdb, register: u32) -> Result<(), Error> {
-    gdb.watch(Watch::Write, register)?;
+    gdb.watch(Watchpoint::Write, register)?;
     gdb.run(PATIENCE)?.ok_or_else(|| Error::Protocol(format!("nothing stores to {register:#x}")))?;
-    gdb.unwatch(Watch::Write, register)?;
+    gdb.unwatch(Watchpoint::Write, register)?;
     let pc = gdb.register(PC)?;
-    let access = Access::decode(gdb.memory(pc)?)?;
+    let access = RegisterAccess::decode(gdb.memory(pc)?)?;
     // NOP
     gdb.set_memory(pc, &[0x00, 0xBF].repeat(access.length as usize / 2))
 }
 
-fn watch(register: u32) -> Watch {
+fn watch(register: u32) -> Watchpoint {
     // Watch only writes, since SysTick's counter is next to this register and is read all the time.
-    if [RCC_APB2RSTR, SYST_CSR].contains(&register) { Watch::Write } else { Watch::Access }
+    if [RCC_APB2RSTR, SYST_CSR].contains(&register) { Watchpoint::Write } else { Watchpoint::Access }
 }
 
 /// A load or store of one register.
-struct Access {
+struct RegisterAccess {
     is_load: bool,
     register: u32,
     /// Length of the instruction \[bytes\].
     length: u32,
 }
 
-impl Access {
+impl RegisterAccess {
     /// Decodes the Thumb forms that compilers use for device registers (Armv7-M manual, A5.2.4 and A5.3.7 to A5.3.10).
     fn decode(code: [u8; 4]) -> Result<Self, Error> {
         let [a, b, c, d] = code;
@@ -214,6 +214,6 @@ impl Access {
             0x6..=0x8 => (first >> 11 & 1 == 1, first & 7, 2),
             _ => return Err(Error::Protocol(format!("no load or store: {first:04x} {second:04x}"))),
         };
-        Ok(Access { is_load, register: register.into(), length })
+        Ok(RegisterAccess { is_load, register: register.into(), length })
     }
 }

@@ -20,7 +20,7 @@ const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Kinds of accesses to watch; their values are the protocol's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Watch {
+pub enum Watchpoint {
     /// Stores only.
     Write = 2,
     /// Loads and stores.
@@ -110,7 +110,7 @@ impl Gdb {
     ///
     /// # Errors
     /// Fails if the stub refuses.
-    pub fn watch(&mut self, watch: Watch, address: u32) -> Result<(), Error> {
+    pub fn watch(&mut self, watch: Watchpoint, address: u32) -> Result<(), Error> {
         self.order(&format!("Z{},{address:x},4", watch as u32))
     }
 
@@ -118,7 +118,7 @@ impl Gdb {
     ///
     /// # Errors
     /// Fails if the stub refuses.
-    pub fn unwatch(&mut self, watch: Watch, address: u32) -> Result<(), Error> {
+    pub fn unwatch(&mut self, watch: Watchpoint, address: u32) -> Result<(), Error> {
         self.order(&format!("z{},{address:x},4", watch as u32))
     }
 

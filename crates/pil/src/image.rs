@@ -8,18 +8,18 @@ const TARGET: &str = "thumbv7em-none-eabihf";
 
 /// One of the firmware's two images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Image {
+pub enum FirmwareImage {
     /// The image for the board.
     Flight,
     /// The same code, which exchanges bytes with the host once per control tick, for [`crate::Emulator`].
     Pil,
 }
 
-impl Image {
+impl FirmwareImage {
     const fn name(self) -> &'static str {
         match self {
-            Image::Flight => "flight",
-            Image::Pil => "pil",
+            FirmwareImage::Flight => "flight",
+            FirmwareImage::Pil => "pil",
         }
     }
 
@@ -45,8 +45,8 @@ impl Image {
             return Err(Error::NoTarget);
         }
         let alias = match self {
-            Image::Flight => "fw",
-            Image::Pil => "fw-pil",
+            FirmwareImage::Flight => "fw",
+            FirmwareImage::Pil => "fw-pil",
         };
         let mut cargo = toolchain("cargo");
         match vehicle {

@@ -8,7 +8,8 @@
 //! There are two images and two ways to run them:
 //!
 //! * [`Emulator`] flies the `pil` image in lockstep: one [exchange](Emulator::exchange) of bytes is one control tick.
-//!   Time stops while the host computes, so every run gives the same bytes. [`Twins`] compares them with the host's.
+//!   Time stops while the host computes, so every run gives the same bytes. [`LockstepPair`] compares them with the
+//!   host's.
 //! * [`EmulatedBoard`] boots the unmodified `flight` image and talks to its USART1. A [debugger](gdb) supplies the
 //!   status bits of the clock tree, which the emulator lacks.
 //!
@@ -22,7 +23,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
-pub mod beside;
+pub mod background;
 mod board;
 pub mod budget;
 pub mod clock_tree;
@@ -31,14 +32,14 @@ mod error;
 pub mod exercise;
 pub mod gdb;
 mod image;
+mod lockstep;
 mod qemu;
 pub mod response;
 pub mod timing;
-mod twins;
-pub mod worst;
+pub mod worst_tick;
 
 pub use board::EmulatedBoard;
 pub use emulator::{Emulator, TickReply};
 pub use error::Error;
-pub use image::Image;
-pub use twins::{TwinComparison, Twins};
+pub use image::FirmwareImage;
+pub use lockstep::{LockstepComparison, LockstepPair};

@@ -10,11 +10,11 @@ mod verdict;
 mod work;
 
 pub use boards::{BOARDS, BoardTimes, RateOfUart, TABLES, default_baud};
-pub use bus::{Script, i2c_ns, spi_clock_hz, spi_ns};
-pub use cycles::{CORTEX_M4F, CORTEX_M7, CoreCycles, CycleLimit, Mix};
+pub use bus::{BusScript, i2c_ns, spi_clock_hz, spi_ns};
+pub use cycles::{CORTEX_M4F, CORTEX_M7, CoreCycles, CycleLimit, InstructionMix};
 pub use known::KnownLateness;
 pub use verdict::verdicts;
-pub use work::{Section, TimingRow, Work};
+pub use work::{CriticalSection, InstructionCounts, TimingRow};
 
 use crate::Error;
 use crate::response::load;
@@ -34,11 +34,11 @@ pub struct BoardReport {
 /// # Errors
 /// Fails if the page lacks a row.
 pub fn reports(budgets: &str) -> Result<Vec<BoardReport>, Error> {
-    let work = Work::read(budgets)?;
+    let work = InstructionCounts::read(budgets)?;
     Ok(BOARDS.iter().map(|board| report(board, &work)).collect())
 }
 
-fn report(board: &BoardTimes, work: &Work) -> BoardReport {
+fn report(board: &BoardTimes, work: &InstructionCounts) -> BoardReport {
     let mut text = String::new();
     let core = board.core;
     let _ = writeln!(text, "### {}\n", board.name);

@@ -5,7 +5,7 @@ mod common;
 
 use common::start_or_skip;
 use object::{Object, ObjectSection, ObjectSegment};
-use pil::Image;
+use pil::FirmwareImage;
 use std::fs;
 use std::ops::Range;
 
@@ -16,7 +16,7 @@ const VECTORS: Range<u64> = 0x0800_0000..0x0800_4000;
 
 #[test]
 fn nothing_is_linked_into_the_sectors_of_the_parameters() {
-    for image in [Image::Flight, Image::Pil] {
+    for image in [FirmwareImage::Flight, FirmwareImage::Pil] {
         let Some(bytes) = start_or_skip(image, |path| Ok(fs::read(path)?)) else { return };
         let file = object::File::parse(bytes.as_slice()).unwrap();
         let overlaps = |start: u64, size: u64| start < PARAMETERS.end && start + size > PARAMETERS.start;

@@ -9,11 +9,11 @@ use afbc_flight_core::Refusal;
 use afbc_hil::Station;
 use afbc_mavlink::{Address, CommandResult, Decoder, Downlink, HealthArray, Uplink, VehicleCommand};
 use common::start_or_skip;
-use pil::budget::Linked;
+use pil::budget::LinkedImage;
 use pil::clock_tree::{FLASH_ACR, RCC_CFGR, RCC_PLLCFGR};
 use pil::exercise::motion;
 use pil::gdb::{PC, SP, XPSR};
-use pil::{EmulatedBoard, Image};
+use pil::{EmulatedBoard, FirmwareImage};
 use std::collections::HashSet;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -106,7 +106,7 @@ const CORE_FROM_PLL: u32 = 0b10;
 #[test]
 fn it_boots_ticks_and_listens() {
     // Boot only returns if the image has set up its clocks.
-    let Some(mut board) = start_or_skip(Image::Flight, |elf| EmulatedBoard::boot(&elf)) else { return };
+    let Some(mut board) = start_or_skip(FirmwareImage::Flight, |elf| EmulatedBoard::boot(&elf)) else { return };
     assert!(board.clock_accesses() > 10, "the clock tree was set up");
     assert_eq!(board.clock_register(FLASH_ACR), FLASH_ON);
     assert_eq!(board.clock_register(RCC_PLLCFGR) & (PLL_FROM_CRYSTAL | PLL_DIVIDER), PLL_FROM_CRYSTAL | 4);
@@ -128,13 +128,15 @@ const WANTED: u32 = 0xB007_4DF0;
 #[test]
 fn it_enters_the_boot_loader_once_if_that_is_wanted() {
     let boot = |elf: PathBuf| EmulatedBoard::boot_to_loader(&elf, WANTED, SYSTEM_MEMORY);
-    let Some(left) = start_or_skip(Image::Flight, boot) else { return };
+    let Some(left) = start_or_skip(FirmwareImage::Flight, boot) else { return };
     assert_eq!(left, 0);
 }
 
 #[test]
 fn without_a_crystal_it_runs_on_and_does_not_arm() {
-    let Some(board) = start_or_skip(Image::Flight, |elf| EmulatedBoard::boot_without_crystal(&elf)) else { return };
+    let Some(board) = start_or_skip(FirmwareImage::Flight, |elf| EmulatedBoard::boot_without_crystal(&elf)) else {
+        return;
+    };
     assert_eq!(board.clock_register(RCC_PLLCFGR) & (PLL_FROM_CRYSTAL | PLL_DIVIDER), 8, "16 MHz / 8, as 8 MHz / 4");
     assert_eq!(board.clock_register(RCC_CFGR) & 0b11, CORE_FROM_PLL);
     assert_eq!(board.clock_register(FLASH_ACR), FLASH_ON);
@@ -147,7 +149,7 @@ fn without_a_crystal_it_runs_on_and_does_not_arm() {
 
 #[test]
 fn a_crystal_that_fails_does_not_stop_it() {
-    let Some(board) = start_or_skip(Image::Flight, |elf| EmulatedBoard::boot(&elf)) else { return };
+    let Some(board) = start_or_skip(FirmwareImage::Flight, |elf| EmulatedBoard::boot(&elf)) else { return };
     let mut talk = Talk::new(board);
     talk.until(None, |heard| heard.health.rate_hz > 0.0);
     talk.ask();
@@ -169,7 +171,7 @@ fn a_crystal_that_fails_does_not_stop_it() {
 #[test]
 fn a_panic_of_the_link_does_not_stop_the_tick() {
     let Some((mut board, linked)) =
-        start_or_skip(Image::Flight, |elf| Ok((EmulatedBoard::boot(&elf)?, Linked::read(&elf)?)))
+        start_or_skip(FirmwareImage::Flight, |elf| Ok((EmulatedBoard::boot(&elf)?, LinkedImage::read(&elf)?)))
     else {
         return;
     };
@@ -196,7 +198,7 @@ const USART1: u32 = 16 + 37;
 #[test]
 fn few_bytes_do_not_wake_the_link() {
     let Some((mut board, linked)) =
-        start_or_skip(Image::Flight, |elf| Ok((EmulatedBoard::boot(&elf)?, Linked::read(&elf)?)))
+        start_or_skip(FirmwareImage::Flight, |elf| Ok((EmulatedBoard::boot(&elf)?, LinkedImage::read(&elf)?)))
     else {
         return;
     };
@@ -215,7 +217,7 @@ fn few_bytes_do_not_wake_the_link() {
 #[test]
 fn the_flight_image_has_a_log() {
     let Some((mut board, linked)) =
-        start_or_skip(Image::Flight, |elf| Ok((EmulatedBoard::boot(&elf)?, Linked::read(&elf)?)))
+        start_or_skip(FirmwareImage::Flight, |elf| Ok((EmulatedBoard::boot(&elf)?, LinkedImage::read(&elf)?)))
     else {
         return;
     };
@@ -246,7 +248,7 @@ const HARD_FAULT: u32 = 3;
 
 #[test]
 fn a_stack_that_overflows_ends_in_the_fault_handler() {
-    let Some(mut board) = start_or_skip(Image::Flight, |elf| EmulatedBoard::boot(&elf)) else { return };
+    let Some(mut board) = start_or_skip(FirmwareImage::Flight, |elf| EmulatedBoard::boot(&elf)) else { return };
     let start = Instant::now();
     while board.receive().unwrap().is_empty() {
         assert!(start.elapsed() < PATIENCE, "the image does not run");

@@ -9,7 +9,7 @@ use afbc_hil::{Host, HostTick, Station};
 use afbc_mavlink::{Uplink, VehicleCommand};
 use common::start_or_skip;
 use pil::exercise::{TICKS, bytes_of_tick};
-use pil::{Emulator, Image, TickReply};
+use pil::{Emulator, FirmwareImage, TickReply};
 
 /// Returns all replies of one flight.
 fn fly(mut emulator: Emulator) -> Vec<TickReply> {
@@ -19,7 +19,7 @@ fn fly(mut emulator: Emulator) -> Vec<TickReply> {
 
 #[test]
 fn every_bit_is_the_hosts() {
-    let Some(emulator) = start_or_skip(Image::Pil, |elf| Emulator::start(&elf)) else { return };
+    let Some(emulator) = start_or_skip(FirmwareImage::Pil, |elf| Emulator::start(&elf)) else { return };
     let replies = fly(emulator);
 
     let (mut host, mut station) = (Host::new().unwrap(), Station::default());
@@ -42,9 +42,9 @@ fn every_bit_is_the_hosts() {
 
 #[test]
 fn every_run_is_the_same() {
-    let Some(emulator) = start_or_skip(Image::Pil, |elf| Emulator::start(&elf)) else { return };
+    let Some(emulator) = start_or_skip(FirmwareImage::Pil, |elf| Emulator::start(&elf)) else { return };
     let first = fly(emulator);
-    let second = fly(start_or_skip(Image::Pil, |elf| Emulator::start(&elf)).unwrap());
+    let second = fly(start_or_skip(FirmwareImage::Pil, |elf| Emulator::start(&elf)).unwrap());
     let differs = first.iter().zip(&second).position(|(a, b)| a != b);
     assert_eq!(differs, None, "index of the first tick that differs");
 }
@@ -55,7 +55,7 @@ fn every_run_is_the_same() {
 fn no_tick_is_late_while_every_stream_runs_at_full_rate() {
     for slower in [0, 1] {
         let start = |elf: std::path::PathBuf| Emulator::start_slower(&elf, slower);
-        let Some(mut emulator) = start_or_skip(Image::Pil, start) else { return };
+        let Some(mut emulator) = start_or_skip(FirmwareImage::Pil, start) else { return };
         let (mut station, mut sent) = (Station::default(), 0);
         for (place, (message, _)) in DEFAULTS.iter().enumerate() {
             let command = VehicleCommand::SetInterval { message: *message, interval_us: 1_000 };
@@ -87,7 +87,7 @@ fn no_tick_is_late_while_every_stream_runs_at_full_rate() {
 fn the_tick_keeps_its_time_on_any_processor() {
     for slower in 0..3 {
         let start = |elf: std::path::PathBuf| Emulator::start_slower(&elf, slower);
-        let Some(mut emulator) = start_or_skip(Image::Pil, start) else { return };
+        let Some(mut emulator) = start_or_skip(FirmwareImage::Pil, start) else { return };
         let mut station = Station::default();
         let ticks = (0..2_500).map(|tick| emulator.exchange(&bytes_of_tick(&mut station, tick)).unwrap());
         let times: Vec<u64> = ticks.map(|reply| reply.time_us).collect();

@@ -10,8 +10,8 @@
 
 use pil::response::PeriodicTask;
 use pil::timing::{
-    BOARDS, CORTEX_M4F, CORTEX_M7, CycleLimit, KnownLateness, RateOfUart, TABLES, TimingRow, Work, default_baud,
-    i2c_ns, page, reports, spi_clock_hz, spi_ns, verdicts,
+    BOARDS, CORTEX_M4F, CORTEX_M7, CycleLimit, InstructionCounts, KnownLateness, RateOfUart, TABLES, TimingRow,
+    default_baud, i2c_ns, page, reports, spi_clock_hz, spi_ns, verdicts,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -37,7 +37,7 @@ fn the_page_has_the_tables() {
 /// time.
 #[test]
 fn the_tick_is_in_time() {
-    let work = Work::read(&read("docs/budgets.md")).unwrap();
+    let work = InstructionCounts::read(&read("docs/budgets.md")).unwrap();
     for board in &BOARDS {
         for limit in [CycleLimit::Best, CycleLimit::Bound] {
             let rows = work.rows(board, limit, default_baud());
@@ -53,7 +53,7 @@ fn the_tick_is_in_time() {
 /// STM32F4. At half the rate only the links' task may be late.
 #[test]
 fn the_baud_rate_is_the_highest_that_loses_no_byte() {
-    let work = Work::read(&read("docs/budgets.md")).unwrap();
+    let work = InstructionCounts::read(&read("docs/budgets.md")).unwrap();
     for board in &BOARDS {
         let late = |baud| {
             let rows = work.rows(board, CycleLimit::Bound, baud);
@@ -106,8 +106,8 @@ fn uarts_keep_what_their_manuals_say() {
 #[test]
 fn a_page_that_lacks_a_row_is_refused() {
     let text = read("docs/budgets.md");
-    assert!(Work::read(&text).is_ok());
-    let error = Work::read(&text.replace("SysTick's interrupt |", "its interrupt |")).unwrap_err();
+    assert!(InstructionCounts::read(&text).is_ok());
+    let error = InstructionCounts::read(&text.replace("SysTick's interrupt |", "its interrupt |")).unwrap_err();
     assert!(error.to_string().contains("SysTick"), "{error}");
 }
 

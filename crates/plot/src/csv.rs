@@ -1,11 +1,11 @@
 //! Reads CSV files with a header.
 
 use crate::table::LogTable;
-use afbc_files::read::Separated;
+use afbc_files::read::DelimitedFormat;
 
 /// Reads the file's only table. A column without any number becomes a column of words.
 pub(crate) fn read(bytes: &[u8]) -> Result<Vec<LogTable>, String> {
-    let form = Separated::of(bytes);
+    let form = DelimitedFormat::of(bytes);
     let mut reader = csv::ReaderBuilder::new().delimiter(form.separator).from_reader(bytes);
     let bad = |error: csv::Error| match error.position() {
         Some(place) => {

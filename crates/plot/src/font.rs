@@ -8,7 +8,7 @@ const BYTES: &[u8] = include_bytes!("../font/DejaVuSans-subset.ttf");
 
 /// One segment of an outline \[pt\]; y points down.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Stretch {
+pub(crate) enum OutlineSegment {
     Move(Point),
     Line(Point),
     /// A cubic Bézier curve: two control points and the end.
@@ -36,7 +36,13 @@ pub(crate) fn width_pt(text: &str, size_pt: f64) -> f64 {
 }
 
 /// Returns the outlines of a text whose base line goes through the given point.
-pub(crate) fn outlines(text: &str, (x, y): Point, size_pt: f64, anchor: TextAnchor, upwards: bool) -> Vec<Stretch> {
+pub(crate) fn outlines(
+    text: &str,
+    (x, y): Point,
+    size_pt: f64,
+    anchor: TextAnchor,
+    upwards: bool,
+) -> Vec<OutlineSegment> {
     let Some(face) = face() else { return Vec::new() };
     let full = size_pt / f64::from(face.units_per_em());
     let along = match anchor {
@@ -44,7 +50,7 @@ pub(crate) fn outlines(text: &str, (x, y): Point, size_pt: f64, anchor: TextAnch
         TextAnchor::Middle => -0.5 * width_pt(text, size_pt),
         TextAnchor::End => -width_pt(text, size_pt),
     };
-    let mut pen = Pen { x, y, upwards, along, down: 0.0, scale: full, last: (0.0, 0.0), stretches: Vec::new() };
+    let mut pen = GlyphPen { x, y, upwards, along, down: 0.0, scale: full, last: (0.0, 0.0), stretches: Vec::new() };
     for (words, is_lowered) in parts(text) {
         (pen.scale, pen.down) = if is_lowered { (LOWERED * full, DOWN * size_pt) } else { (full, 0.0) };
         for c in words.chars() {
@@ -59,7 +65,7 @@ pub(crate) fn outlines(text: &str, (x, y): Point, size_pt: f64, anchor: TextAnch
 }
 
 /// Transforms glyph outlines from font units to their position in the drawing.
-struct Pen {
+struct GlyphPen {
     x: f64,
     y: f64,
     upwards: bool,
@@ -70,25 +76,25 @@ struct Pen {
     scale: f64,
     /// Last point, in font units.
     last: (f32, f32),
-    stretches: Vec<Stretch>,
+    stretches: Vec<OutlineSegment>,
 }
 
-impl Pen {
+impl GlyphPen {
     fn place(&self, x: f32, y: f32) -> Point {
         let (along, up) = (self.along + self.scale * f64::from(x), self.scale * f64::from(y) - self.down);
         if self.upwards { (self.x - up, self.y - along) } else { (self.x + along, self.y - up) }
     }
 }
 
-impl OutlineBuilder for Pen {
+impl OutlineBuilder for GlyphPen {
     fn move_to(&mut self, x: f32, y: f32) {
         self.last = (x, y);
-        self.stretches.push(Stretch::Move(self.place(x, y)));
+        self.stretches.push(OutlineSegment::Move(self.place(x, y)));
     }
 
     fn line_to(&mut self, x: f32, y: f32) {
         self.last = (x, y);
-        self.stretches.push(Stretch::Line(self.place(x, y)));
+        self.stretches.push(OutlineSegment::Line(self.place(x, y)));
     }
 
     /// Converts a quadratic curve to the equal cubic one: both its control points lie two thirds of the way from an end
@@ -101,11 +107,11 @@ impl OutlineBuilder for Pen {
 
     fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
         self.last = (x, y);
-        self.stretches.push(Stretch::Curve(self.place(x1, y1), self.place(x2, y2), self.place(x, y)));
+        self.stretches.push(OutlineSegment::Curve(self.place(x1, y1), self.place(x2, y2), self.place(x, y)));
     }
 
     fn close(&mut self) {
-        self.stretches.push(Stretch::Close);
+        self.stretches.push(OutlineSegment::Close);
     }
 }
 
@@ -129,8 +135,10 @@ mod tests {
         let lowest = |text: &str| {
             let stretches = outlines(text, (0.0, 0.0), 8.0, TextAnchor::Start, false);
             stretches.iter().fold(f64::NEG_INFINITY, |lowest, stretch| match stretch {
-                Stretch::Move((_, y)) | Stretch::Line((_, y)) | Stretch::Curve(_, _, (_, y)) => lowest.max(*y),
-                Stretch::Close => lowest,
+                OutlineSegment::Move((_, y)) | OutlineSegment::Line((_, y)) | OutlineSegment::Curve(_, _, (_, y)) => {
+                    lowest.max(*y)
+                }
+                OutlineSegment::Close => lowest,
             })
         };
         assert!((lowest("H⟨H⟩") - lowest("H") - DOWN * 8.0).abs() < 1e-6);
@@ -144,12 +152,12 @@ mod tests {
                 let stretches = outlines("HH", (100.0, 50.0), 10.0, anchor, upwards);
                 let width = width_pt("HH", 10.0);
                 for stretch in &stretches {
-                    let (Stretch::Move((x, y)) | Stretch::Line((x, y))) = stretch else { continue };
+                    let (OutlineSegment::Move((x, y)) | OutlineSegment::Line((x, y))) = stretch else { continue };
                     let (along, up) = if upwards { (50.0 - y, 100.0 - x) } else { (x - 100.0, 50.0 - y) };
                     assert!((from * width..=(from + 1.0) * width).contains(&along), "{along}");
                     assert!((0.0..=8.0).contains(&up), "{up}");
                 }
-                assert_eq!(stretches.iter().filter(|stretch| **stretch == Stretch::Close).count(), 2);
+                assert_eq!(stretches.iter().filter(|stretch| **stretch == OutlineSegment::Close).count(), 2);
             }
         }
     }

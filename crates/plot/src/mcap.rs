@@ -27,7 +27,7 @@ pub(crate) fn read_ulog(path: &Path) -> Result<Vec<LogTable>, FileError> {
 
 /// Reads the topics of an MCAP file. Topics in another encoding are left out.
 pub(crate) fn read(bytes: &[u8]) -> Result<Vec<LogTable>, String> {
-    let mut topics: BTreeMap<u16, Option<(Layout, Topic)>> = BTreeMap::new();
+    let mut topics: BTreeMap<u16, Option<(TopicLayout, TopicColumns)>> = BTreeMap::new();
     let mut start = None;
     let mut others = Vec::new();
     for message in MessageStream::new(bytes).map_err(refused)? {
@@ -35,11 +35,11 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Vec<LogTable>, String> {
         let start = *start.get_or_insert(message.log_time);
         let channel = &message.channel;
         let known = topics.entry(channel.id).or_insert_with(|| {
-            let layout = Layout::of(channel);
+            let layout = TopicLayout::of(channel);
             if layout.is_none() {
                 others.push(channel.topic.clone());
             }
-            layout.map(|layout| (layout, Topic::default()))
+            layout.map(|layout| (layout, TopicColumns::default()))
         });
         if let Some((layout, topic)) = known {
             let time_s = (message.log_time as f64 - start as f64) / 1e9;
@@ -84,14 +84,14 @@ fn refused(error: McapError) -> String {
 
 /// Columns of a topic while the file is read.
 #[derive(Default)]
-struct Topic {
+struct TopicColumns {
     times_s: Vec<f64>,
     columns: Vec<(String, Vec<f64>)>,
     /// Index in `columns` of each name.
     places: HashMap<String, usize>,
 }
 
-impl Topic {
+impl TopicColumns {
     fn add(&mut self, time_s: f64, values: Vec<(String, f64)>) {
         let before = self.times_s.len();
         self.times_s.push(time_s);
@@ -119,7 +119,7 @@ impl Topic {
 }
 
 /// Field layout of a topic's messages.
-struct Layout {
+struct TopicLayout {
     topic: String,
     /// Fields of each message type, by the last part of its name; the topic's own message has the empty name.
     messages: BTreeMap<String, Vec<FieldLayout>>,
@@ -133,7 +133,7 @@ struct FieldLayout {
     many: Option<usize>,
 }
 
-impl Layout {
+impl TopicLayout {
     fn of(channel: &Arc<Channel<'_>>) -> Option<Self> {
         let schema = channel.schema.as_ref()?;
         if channel.message_encoding != "cdr" || schema.encoding != "ros2msg" {
@@ -157,7 +157,7 @@ impl Layout {
                 }
             }
         }
-        Some(Layout { topic: channel.topic.trim_start_matches('/').to_owned(), messages })
+        Some(TopicLayout { topic: channel.topic.trim_start_matches('/').to_owned(), messages })
     }
 
     /// Returns the numbers of a message with their names. Stops at the end of the data or at an unknown type.

@@ -8,7 +8,7 @@ use bytes::Bytes;
 
 /// A column while it is read; it becomes a column of words if any row has a word.
 #[derive(Default)]
-struct Column {
+struct ParsedColumn {
     numbers: Vec<f64>,
     words: Vec<String>,
     has_words: bool,
@@ -25,7 +25,7 @@ fn rows(bytes: Vec<u8>) -> Result<LogTable, ParquetError> {
     let reader = SerializedFileReader::new(Bytes::from(bytes))?;
     let schema = reader.metadata().file_metadata().schema_descr();
     let names: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
-    let mut columns: Vec<Column> = names.iter().map(|_| Column::default()).collect();
+    let mut columns: Vec<ParsedColumn> = names.iter().map(|_| ParsedColumn::default()).collect();
     for row in reader.get_row_iter(None)? {
         for (column, (_, field)) in columns.iter_mut().zip(row?.get_column_iter()) {
             let (number, word) = value(field);

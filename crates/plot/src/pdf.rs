@@ -1,6 +1,6 @@
 //! Writes a figure as PDF: vector graphics without embedded fonts.
 
-use crate::font::{Stretch, outlines};
+use crate::font::{OutlineSegment, outlines};
 use afbc_drawing::{Drawing, Rgb, Shape};
 use miniz_oxide::deflate::compress_to_vec_zlib;
 use pdf_writer::types::LineJoinStyle;
@@ -69,12 +69,12 @@ fn draw(content: &mut Content, shape: &Shape, opacities: &mut Vec<f64>) {
             content.set_fill_rgb(r, g, b);
             for stretch in outlines(text, *place, *size, *anchor, *upwards) {
                 match stretch {
-                    Stretch::Move((x, y)) => content.move_to(x as f32, y as f32),
-                    Stretch::Line((x, y)) => content.line_to(x as f32, y as f32),
-                    Stretch::Curve(a, b, end) => {
+                    OutlineSegment::Move((x, y)) => content.move_to(x as f32, y as f32),
+                    OutlineSegment::Line((x, y)) => content.line_to(x as f32, y as f32),
+                    OutlineSegment::Curve(a, b, end) => {
                         content.cubic_to(a.0 as f32, a.1 as f32, b.0 as f32, b.1 as f32, end.0 as f32, end.1 as f32)
                     }
-                    Stretch::Close => content.close_path(),
+                    OutlineSegment::Close => content.close_path(),
                 };
             }
             content.fill_nonzero();

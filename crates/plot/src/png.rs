@@ -1,6 +1,6 @@
 //! Writes a figure as PNG.
 
-use crate::font::{Stretch, outlines};
+use crate::font::{OutlineSegment, outlines};
 use afbc_drawing::{Drawing, Point, Shape};
 use tiny_skia::{Color, FillRule, LineJoin, Mask, Paint, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
 
@@ -51,12 +51,12 @@ fn draw(pixels: &mut Pixmap, shape: &Shape, transform: Transform) {
             let mut path = PathBuilder::new();
             for stretch in outlines(text, *place, *size, *anchor, *upwards) {
                 match stretch {
-                    Stretch::Move((x, y)) => path.move_to(x as f32, y as f32),
-                    Stretch::Line((x, y)) => path.line_to(x as f32, y as f32),
-                    Stretch::Curve(a, b, end) => {
+                    OutlineSegment::Move((x, y)) => path.move_to(x as f32, y as f32),
+                    OutlineSegment::Line((x, y)) => path.line_to(x as f32, y as f32),
+                    OutlineSegment::Curve(a, b, end) => {
                         path.cubic_to(a.0 as f32, a.1 as f32, b.0 as f32, b.1 as f32, end.0 as f32, end.1 as f32);
                     }
-                    Stretch::Close => path.close(),
+                    OutlineSegment::Close => path.close(),
                 }
             }
             if let Some(path) = path.finish() {

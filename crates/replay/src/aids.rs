@@ -1,6 +1,6 @@
 //! Makes measurements for the estimator from the aiding sensors in a log, with assumed measurement errors.
 
-use crate::recording::{Aiding, SampleSource, Sensor, flip};
+use crate::recording::{AidingSample, SampleSource, Sensor, flip};
 use afbc_estimator::{GeodeticOrigin, Measurement, Stamped};
 use nalgebra::Vector3;
 
@@ -21,7 +21,7 @@ const FAR_DEG: f64 = 0.4;
 
 /// A fix of a GNSS receiver.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Fix {
+pub(crate) struct ReceiverFix {
     pub(crate) arrived_us: u64,
     /// Latitude and longitude \[degrees\], altitude \[m\].
     pub(crate) place: [f64; 3],
@@ -33,7 +33,7 @@ pub(crate) struct Fix {
     pub(crate) speed_m_s: f64,
 }
 
-impl Fix {
+impl ReceiverFix {
     /// Returns true if the coordinates are valid and are not those of a receiver without a fix.
     pub(crate) fn is_place(&self) -> bool {
         let [latitude, longitude, altitude] = self.place;
@@ -43,22 +43,23 @@ impl Fix {
 }
 
 /// Returns the first fix that is close to the median of all fixes.
-pub(crate) fn begin(fixes: &[Fix]) -> Option<&Fix> {
-    let middle = |of: fn(&Fix) -> f64| {
+pub(crate) fn begin(fixes: &[ReceiverFix]) -> Option<&ReceiverFix> {
+    let middle = |of: fn(&ReceiverFix) -> f64| {
         let mut all: Vec<f64> = fixes.iter().map(of).collect();
         // The median, since one absurd fix does not move it.
         all.sort_by(f64::total_cmp);
         all.get(all.len() / 2).copied()
     };
     let (latitude, longitude) = (middle(|fix| fix.place[0])?, middle(|fix| fix.place[1])?);
-    let near = |fix: &&Fix| (fix.place[0] - latitude).abs() < FAR_DEG && (fix.place[1] - longitude).abs() < FAR_DEG;
+    let near =
+        |fix: &&ReceiverFix| (fix.place[0] - latitude).abs() < FAR_DEG && (fix.place[1] - longitude).abs() < FAR_DEG;
     fixes.iter().find(near)
 }
 
 /// Returns the fixes as measurements; `delay_us` is the receiver's delay.
-pub(crate) fn gnss(fixes: &[Fix], origin: &GeodeticOrigin, delay_us: u64) -> Vec<Aiding> {
+pub(crate) fn gnss(fixes: &[ReceiverFix], origin: &GeodeticOrigin, delay_us: u64) -> Vec<AidingSample> {
     let sigma = |stated: f64, (least, most): (f64, f64)| stated.max(least).min(most) as f32;
-    let aiding = |fix: &Fix| {
+    let aiding = |fix: &ReceiverFix| {
         let [latitude, longitude, altitude] = fix.place;
         let speed_sigma_m_s = fix.velocity_m_s.map_or(UNTOLD_M_S, |_| sigma(fix.speed_m_s, SPEED_M_S));
         let value = Measurement::Gnss {
@@ -75,29 +76,29 @@ pub(crate) fn gnss(fixes: &[Fix], origin: &GeodeticOrigin, delay_us: u64) -> Vec
 }
 
 /// Returns a barometer's height as a measurement.
-pub(crate) fn height(arrived_us: u64, at_us: u64, height_m: f64, delay_us: u64) -> Aiding {
+pub(crate) fn height(arrived_us: u64, at_us: u64, height_m: f64, delay_us: u64) -> AidingSample {
     let value = Measurement::Height { height_m: height_m as f32, sigma_m: BAROMETER_M };
     aided(value, arrived_us, at_us, delay_us)
 }
 
 /// Returns a magnetic field as a measurement.
-pub(crate) fn field(arrived_us: u64, at_us: u64, gauss: [f64; 3], delay_us: u64) -> Aiding {
+pub(crate) fn field(arrived_us: u64, at_us: u64, gauss: [f64; 3], delay_us: u64) -> AidingSample {
     let value = Measurement::MagneticField { field: flip(gauss), sigma: FIELD_GAUSS };
     aided(value, arrived_us, at_us, delay_us)
 }
 
-fn aided(value: Measurement, arrived_us: u64, at_us: u64, delay_us: u64) -> Aiding {
-    Aiding { arrived_us, measurement: Stamped { value, at_us: at_us.saturating_sub(delay_us) } }
+fn aided(value: Measurement, arrived_us: u64, at_us: u64, delay_us: u64) -> AidingSample {
+    AidingSample { arrived_us, measurement: Stamped { value, at_us: at_us.saturating_sub(delay_us) } }
 }
 
 /// Appends the plausible measurements to `all`, in the order of time, and returns their source. Heights and fields are
 /// thinned out to [`SPARSE_US`]. `raw` is the number of samples in the log.
 pub(crate) fn collect(
-    all: &mut Vec<Aiding>,
+    all: &mut Vec<AidingSample>,
     sensor: Sensor,
     topic: &str,
     raw: usize,
-    aiding: Vec<Aiding>,
+    aiding: Vec<AidingSample>,
 ) -> SampleSource {
     let usable: Vec<_> = aiding.into_iter().filter(|aiding| aiding.measurement.value.is_plausible()).collect();
     let (mut kept, _) = crate::order::rising(usable, |aiding| aiding.measurement.at_us);

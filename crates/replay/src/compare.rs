@@ -74,13 +74,13 @@ impl Figures {
         let (validity, sigmas) = (&ours.validity, &ours.sigmas);
         let wide = |v: &Vector3<f32>| v.cast::<f64>();
         if let Some(attitude) = &logged.attitude {
-            let turn = turn(attitude, &ours.attitude).map(f64::to_degrees);
+            let rotation = rotation_between(attitude, &ours.attitude).map(f64::to_degrees);
             let sigma = wide(&sigmas.attitude_rad).map(f64::to_degrees);
-            let (tilt, about) = (turn.xy(), sigma.xy());
+            let (tilt, about) = (rotation.xy(), sigma.xy());
             compare(&mut self.tilt, validity.attitude, tilt.as_slice(), about.as_slice());
-            compare(&mut self.heading, validity.heading, &[turn.z], &[sigma.z]);
+            compare(&mut self.heading, validity.heading, &[rotation.z], &[sigma.z]);
             let all = validity.attitude && validity.heading;
-            compare(&mut self.attitude, all, turn.as_slice(), sigma.as_slice());
+            compare(&mut self.attitude, all, rotation.as_slice(), sigma.as_slice());
         }
         if let Some(velocity) = &logged.velocity_m_s {
             let difference = wide(velocity) - wide(&ours.state.velocity_m_s);
@@ -111,14 +111,14 @@ fn compare(figure: &mut ErrorFigure, valid: bool, difference: &[f64], sigma: &[f
 
 /// Returns the rotation from `ours` to `theirs` as a vector about the axes of the earth frame \[rad\]. Both are
 /// quaternions w, x, y, z from body to earth.
-pub(crate) fn turn(theirs: &[f32; 4], ours: &[f32; 4]) -> Vector3<f64> {
+pub(crate) fn rotation_between(theirs: &[f32; 4], ours: &[f32; 4]) -> Vector3<f64> {
     let [w, x, y, z] = theirs.map(f64::from);
     let [ow, ox, oy, oz] = ours.map(f64::from);
-    let turn = Quaternion::new(w, x, y, z) * Quaternion::new(ow, -ox, -oy, -oz);
+    let rotation = Quaternion::new(w, x, y, z) * Quaternion::new(ow, -ox, -oy, -oz);
     // Take the shorter way round: q and -q are the same rotation.
-    let turn = if turn.w < 0.0 { -turn } else { turn };
-    let sine = turn.vector().norm();
+    let rotation = if rotation.w < 0.0 { -rotation } else { rotation };
+    let sine = rotation.vector().norm();
     // angle/sin(angle/2) tends to 2 for a small angle.
-    let per_sine = if sine > 1e-9 { 2.0 * libm::atan2(sine, turn.w) / sine } else { 2.0 };
-    turn.vector() * per_sine
+    let per_sine = if sine > 1e-9 { 2.0 * libm::atan2(sine, rotation.w) / sine } else { 2.0 };
+    rotation.vector() * per_sine
 }

@@ -1,6 +1,6 @@
 //! Checks a recording's magnetometer against the earth's magnetic field.
 
-use crate::earth::Field;
+use crate::earth::EarthField;
 use crate::recording::{Recording, SampleSource, Sensor};
 use afbc_estimator::{Measurement, Settings};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -21,7 +21,7 @@ const TOLD_RAD: f32 = 0.35;
 /// Sets the recording's heading error due to its magnetometer. The heading does not change the horizontal and the
 /// downward part of the field, so their differences from the `earth`'s field show how large the error of the third part
 /// may be. A magnetometer that is neither calibrated nor comparable gives no heading.
-pub(crate) fn doubt(recording: &mut Recording, earth: Option<&Field>) {
+pub(crate) fn doubt(recording: &mut Recording, earth: Option<&EarthField>) {
     let most_rad = Settings::MAG_SLOW.range.max as f32;
     let (Some([level, down]), Some(earth)) = (parts(recording), earth) else {
         let is_raw = |source: &SampleSource| source.sensor == Sensor::Magnetometer && source.topic == RAW;

@@ -1,7 +1,7 @@
 //! Reads the CSV of PX4-ECL's replay tests, with lines `time_us,kind,values`. A second file in the same folder has
 //! EKF2's estimate.
 
-use crate::aids::{self, Fix};
+use crate::aids::{self, ReceiverFix};
 use crate::order::rising;
 use crate::recording::{LoggedState, Recording, SampleSource, Sensor, flip, flip_rotation};
 use crate::{earth, states};
@@ -20,7 +20,7 @@ const KINDS: [&str; 13] =
 const EXCERPT: usize = 40;
 
 /// Times and values of all lines of one kind.
-type Lines = Vec<(u64, Vec<f64>)>;
+type KindLines = Vec<(u64, Vec<f64>)>;
 
 /// Reads a log and its estimate. The estimate's file has the log's name with `_ekf2` appended, as in `flight_ekf2.csv`.
 ///
@@ -54,7 +54,7 @@ pub(crate) fn read(bytes: &[u8], path: &Path) -> Result<Recording, String> {
     let fix = |(at_us, values): &(u64, Vec<f64>)| {
         let [altitude, latitude, longitude] = vector(values, 0);
         let velocity_m_s = vector(values, 3);
-        let fix = Fix {
+        let fix = ReceiverFix {
             arrived_us: *at_us,
             place: [latitude * 1e-7, longitude * 1e-7, altitude * 1e-3],
             velocity_m_s: velocity_m_s.iter().all(|speed| speed.is_finite()).then_some(velocity_m_s),
@@ -64,18 +64,20 @@ pub(crate) fn read(bytes: &[u8], path: &Path) -> Result<Recording, String> {
         };
         fix.is_place().then_some(fix)
     };
-    let mut fixes: Vec<Fix> = gps.iter().filter_map(fix).collect();
+    let mut fixes: Vec<ReceiverFix> = gps.iter().filter_map(fix).collect();
     // The declination belongs to the place as written, as EKF2 used it.
     let written = aids::begin(&fixes).copied();
     if are_exchanged(&fixes) {
-        fixes.iter_mut().for_each(|Fix { place: [latitude, longitude, _], .. }| std::mem::swap(latitude, longitude));
+        fixes
+            .iter_mut()
+            .for_each(|ReceiverFix { place: [latitude, longitude, _], .. }| std::mem::swap(latitude, longitude));
         recording.notes.push("Latitude and longitude are exchanged: only so they agree with the velocity.".into());
     }
     let first = aids::begin(&fixes).copied();
-    if let Some(Fix { place: [latitude, longitude, altitude], .. }) = first {
+    if let Some(ReceiverFix { place: [latitude, longitude, altitude], .. }) = first {
         recording.origin = GeodeticOrigin::new(latitude, longitude, altitude);
     }
-    if let Some(Fix { place: [latitude, longitude, altitude], .. }) = written {
+    if let Some(ReceiverFix { place: [latitude, longitude, altitude], .. }) = written {
         let field = earth::at(latitude, longitude, altitude, None);
         recording.declination_rad = field.map_or(0.0, |field| field.declination_rad);
     }
@@ -101,11 +103,11 @@ pub(crate) fn read(bytes: &[u8], path: &Path) -> Result<Recording, String> {
 
 /// Returns true if the fixes agree with the integrated velocity only after latitude and longitude are exchanged. Some
 /// of PX4-ECL's logs were written in that order.
-fn are_exchanged(fixes: &[Fix]) -> bool {
+fn are_exchanged(fixes: &[ReceiverFix]) -> bool {
     let (mut way, mut straight, mut exchanged) = (0.0_f64, 0.0_f64, 0.0_f64);
     let mut flown = [0.0; 2];
     let Some(first) = fixes.first() else { return false };
-    let local = |order: fn(&[f64; 3]) -> (f64, f64), fix: &Fix| {
+    let local = |order: fn(&[f64; 3]) -> (f64, f64), fix: &ReceiverFix| {
         let (from, to) = (order(&first.place), order(&fix.place));
         let origin = GeodeticOrigin::new(from.0, from.1, 0.0)?;
         let place = origin.local(to.0, to.1, 0.0);
@@ -126,18 +128,18 @@ fn are_exchanged(fixes: &[Fix]) -> bool {
 }
 
 /// Lines of a file, by kind.
-struct Read {
-    kinds: HashMap<String, Lines>,
+struct LinesByKind {
+    kinds: HashMap<String, KindLines>,
     /// Number of unreadable lines, and the line number of the first.
     bad: Option<(usize, u64)>,
 }
 
-fn lines(bytes: &[u8]) -> Result<Read, String> {
+fn lines(bytes: &[u8]) -> Result<LinesByKind, String> {
     const WANTED: &str = "a log is a PX4 ULog or a PX4-ECL CSV (lines of time_us,kind,values)";
     if bytes.is_empty() {
         return Err(format!("empty; {WANTED}"));
     }
-    let mut read = Read { kinds: HashMap::new(), bad: None };
+    let mut read = LinesByKind { kinds: HashMap::new(), bad: None };
     // Each kind of line has its own number of values.
     let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(bytes);
     let mut record = csv::ByteRecord::new();

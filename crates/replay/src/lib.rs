@@ -20,7 +20,7 @@ mod states;
 mod ulog;
 
 pub use compare::{ErrorFigure, Figures};
-pub use recording::{Aiding, LoggedReset, LoggedState, Recording, SampleSource, Sensor};
+pub use recording::{AidingSample, LoggedReset, LoggedState, Recording, SampleSource, Sensor};
 pub use run::{EstimatorStart, ReplayRow, Replayed, fly};
 
 use afbc_files::read::FileError;

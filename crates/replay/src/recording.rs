@@ -53,7 +53,7 @@ pub struct SampleSource {
 
 /// A measurement and its time of arrival.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Aiding {
+pub struct AidingSample {
     /// Time of arrival \[us\].
     pub arrived_us: u64,
     /// The measurement with the time of its sample.
@@ -94,7 +94,7 @@ pub struct Recording {
     /// IMU samples in the order of time, at least one.
     pub imu: Vec<ImuSample>,
     /// Measurements in the order of their arrival.
-    pub aiding: Vec<Aiding>,
+    pub aiding: Vec<AidingSample>,
     /// The log's own estimate in the order of time.
     pub states: Vec<LoggedState>,
     /// Jumps of the log's own estimate.

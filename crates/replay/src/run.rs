@@ -1,6 +1,6 @@
 //! Runs the estimator on a recording.
 
-use crate::compare::{Figures, turn};
+use crate::compare::{Figures, rotation_between};
 use crate::recording::{LoggedState, Recording};
 use afbc_estimator::{
     AidRecords, DroppedMeasurements, Estimate, Estimator, ImuHealth, Memory, Resets, Settings, Sigmas, Unready,
@@ -54,8 +54,8 @@ pub struct ReplayRow {
 impl ReplayRow {
     /// Returns the rotation from our attitude to the log's, about the axes of the earth frame \[rad\].
     #[must_use]
-    pub fn turn_rad(&self) -> Option<Vector3<f64>> {
-        Some(turn(&self.logged.attitude?, &self.ours?.attitude))
+    pub fn rotation_rad(&self) -> Option<Vector3<f64>> {
+        Some(rotation_between(&self.logged.attitude?, &self.ours?.attitude))
     }
 }
 
@@ -97,7 +97,7 @@ pub fn fly(recording: &Recording, from_s: Option<f64>) -> Result<Replayed, OutOf
     });
     let settings = Settings { mag_slow_rad: recording.mag_slow_rad.unwrap_or(flown.mag_slow_rad), ..flown };
     let first_us = recording.imu.first().map_or(0, |sample| sample.at_us);
-    let mut run = Run {
+    let mut run = EstimatorRun {
         estimator: Estimator::new(settings)?,
         memory: Memory::default(),
         recording,
@@ -172,7 +172,7 @@ fn last(values: &[(u64, bool)], now_us: u64) -> Option<bool> {
 }
 
 /// State of a running replay.
-struct Run<'a> {
+struct EstimatorRun<'a> {
     estimator: Estimator,
     memory: Memory,
     recording: &'a Recording,
@@ -182,7 +182,7 @@ struct Run<'a> {
     start: EstimatorStart,
 }
 
-impl Run<'_> {
+impl EstimatorRun<'_> {
     fn step(&mut self, now_us: u64, sample: Option<&afbc_estimator::ImuSample>) -> Estimate {
         while let Some(aiding) = self.recording.aiding.get(self.arrived).filter(|it| it.arrived_us <= now_us) {
             self.memory.offer(&aiding.measurement);

@@ -78,7 +78,7 @@ fn a_field_that_is_not_the_earths_gives_no_heading() {
     let stated = recording.notes.iter().any(|note| note.contains("magnetometer") && note.contains("calibrate"));
     assert!(stated, "{:?}", recording.notes);
     for row in &replayed.rows {
-        let Some((ours, turn)) = row.ours.zip(row.turn_rad()) else { continue };
+        let Some((ours, turn)) = row.ours.zip(row.rotation_rad()) else { continue };
         let sigma = f64::from(ours.sigmas.attitude_rad.z);
         assert!(!ours.validity.heading && turn.z.abs() < 3.0 * sigma, "{} s: {} of {sigma} rad", row.time_s, turn.z);
     }

@@ -249,7 +249,7 @@ fn a_heading_is_as_good_as_the_field() {
         let valid = replayed.figures.heading.valid_ratio().unwrap();
         assert!(if gauss > 0.5 { strange } else { !strange || gauss > 0.04 }, "{stray:?}: {:?}", recording.notes);
         assert!(gauss > 0.04 || valid > 0.95, "{stray:?}: heading valid {valid}");
-        for (ours, turn) in replayed.rows.iter().filter_map(|row| row.ours.zip(row.turn_rad())) {
+        for (ours, turn) in replayed.rows.iter().filter_map(|row| row.ours.zip(row.rotation_rad())) {
             let sigma = f64::from(ours.sigmas.attitude_rad.z);
             inside += usize::from(turn.z.abs() < 3.0 * sigma);
             all += 1;

@@ -13,7 +13,7 @@ use nalgebra::Vector4;
 use std::io::{self, Write};
 
 /// A value, written with the fewest digits that restore it exactly.
-enum Number {
+enum CsvNumber {
     /// A value that the controller computes.
     Single(f32),
     /// A value that the plant or the reference computes.
@@ -22,10 +22,10 @@ enum Number {
     Flag(bool),
 }
 
-use Number::{Double, Flag, Single};
+use CsvNumber::{Double, Flag, Single};
 
 /// Data of one row.
-struct Row<'a> {
+struct CsvRow<'a> {
     sample: &'a Sample,
     /// Lowest and highest U1..U4 since the previous row.
     extremes: &'a [Vector4<f64>; 2],
@@ -34,9 +34,9 @@ struct Row<'a> {
 }
 
 /// Name of a column, and the function that returns its value.
-struct Column {
+struct CsvColumn {
     name: String,
-    value: Box<dyn Fn(&Row) -> Number>,
+    value: Box<dyn Fn(&CsvRow) -> CsvNumber>,
 }
 
 /// Returns the computable terms of the Lyapunov functions, with g_i of the nominal vehicle.
@@ -46,9 +46,9 @@ fn lyapunov(model: &ModelConstants, sample: &Sample) -> PerAxis<f32> {
 }
 
 /// Returns every column of a flight's log, from left to right.
-fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
+fn columns(scenario: &Scenario, contender: &Contender) -> Vec<CsvColumn> {
     let mut columns = Vec::new();
-    let mut add = |name: String, value: Box<dyn Fn(&Row) -> Number>| columns.push(Column { name, value });
+    let mut add = |name: String, value: Box<dyn Fn(&CsvRow) -> CsvNumber>| columns.push(CsvColumn { name, value });
     macro_rules! add {
         ($kind:ident $($name:literal: $value:expr;)*) => {
             $(add($name.into(), Box::new(|row| { let value: fn(&Sample) -> _ = $value; $kind(value(row.sample)) }));)*
@@ -82,16 +82,16 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
     }
     let rotors = 0..scenario.rotors.len();
     for i in rotors.clone() {
-        let force = move |row: &Row| Single(row.sample.action.forces.0.get(i).copied().unwrap_or_default());
+        let force = move |row: &CsvRow| Single(row.sample.action.forces.0.get(i).copied().unwrap_or_default());
         add(format!("f{}_n", i + 1), Box::new(force));
     }
     for i in rotors {
-        let speed = move |row: &Row| Single(row.sample.action.speeds.0.get(i).copied().unwrap_or_default());
+        let speed = move |row: &CsvRow| Single(row.sample.action.speeds.0.get(i).copied().unwrap_or_default());
         add(format!("omega{}_rad_s", i + 1), Box::new(speed));
     }
     for (i, u) in ["u1", "u2", "u3", "u4"].into_iter().enumerate() {
         for (j, extreme) in ["min", "max"].into_iter().enumerate() {
-            let value = move |row: &Row| row.extremes.get(j).and_then(|u| u.get(i)).copied();
+            let value = move |row: &CsvRow| row.extremes.get(j).and_then(|u| u.get(i)).copied();
             // The rotors' U1..U4 are computed in f32.
             add(format!("{u}_{extreme}_n"), Box::new(move |row| Single(value(row).unwrap_or(f64::NAN) as f32)));
         }
@@ -112,7 +112,7 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
             add(format!("e2_{name}_{e2}"), Box::new(move |row| Single(row.sample.trace.errors[axis].e2)));
         }
         if adaptive {
-            let estimate = move |row: &Row| row.sample.estimates.unwrap_or_default()[axis];
+            let estimate = move |row: &CsvRow| row.sample.estimates.unwrap_or_default()[axis];
             add(format!("delta_hat_{name}_{u}"), Box::new(move |row| Single(estimate(row).delta)));
             add(format!("theta_norm_{name}_{u}"), Box::new(move |row| Single(estimate(row).theta.norm())));
         }
@@ -121,7 +121,7 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
         }
     }
     if in_cascade {
-        let sum = |row: &Row| Axis::ALL.iter().map(|&axis| &row.lyapunov[axis]).sum();
+        let sum = |row: &CsvRow| Axis::ALL.iter().map(|&axis| &row.lyapunov[axis]).sum();
         add("lyapunov_sum".into(), Box::new(move |row| Single(sum(row))));
     }
     if contender.monitored {
@@ -132,17 +132,17 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
 }
 
 /// Returns the columns of real rotors, air and sensors, as far as the scenario has them.
-fn real(scenario: &Scenario) -> Vec<Column> {
+fn real(scenario: &Scenario) -> Vec<CsvColumn> {
     let mut columns = Vec::new();
     if !scenario.is_ideal() {
         for i in 0..scenario.rotors.len() {
             let speed = move |t: &EffectsState| t.rotor_speeds_rad_s.get(i).copied().unwrap_or(f64::NAN);
-            let value = move |row: &Row| Double(row.sample.telemetry.as_ref().map_or(f64::NAN, speed));
-            columns.push(Column { name: format!("rotor{}_rad_s", i + 1), value: Box::new(value) });
+            let value = move |row: &CsvRow| Double(row.sample.telemetry.as_ref().map_or(f64::NAN, speed));
+            columns.push(CsvColumn { name: format!("rotor{}_rad_s", i + 1), value: Box::new(value) });
         }
         let mut add = |name: &str, value: fn(&EffectsState) -> f64| {
-            let value = move |row: &Row| Double(row.sample.telemetry.as_ref().map_or(f64::NAN, value));
-            columns.push(Column { name: name.into(), value: Box::new(value) });
+            let value = move |row: &CsvRow| Double(row.sample.telemetry.as_ref().map_or(f64::NAN, value));
+            columns.push(CsvColumn { name: name.into(), value: Box::new(value) });
         };
         add("wind_x_m_s", |t| t.wind_m_s.x);
         add("wind_y_m_s", |t| t.wind_m_s.y);
@@ -157,8 +157,9 @@ fn real(scenario: &Scenario) -> Vec<Column> {
     }
     if scenario.sensing != Sensing::default() || !scenario.sensor_faults.is_empty() {
         let mut add = |name: &str, value: fn(&State) -> f32| {
-            let value = move |row: &Row| Single(row.sample.measurement.as_ref().map_or(f32::NAN, |m| value(&m.state)));
-            columns.push(Column { name: name.into(), value: Box::new(value) });
+            let value =
+                move |row: &CsvRow| Single(row.sample.measurement.as_ref().map_or(f32::NAN, |m| value(&m.state)));
+            columns.push(CsvColumn { name: name.into(), value: Box::new(value) });
         };
         add("x_measured_m", |s| s.position_m.x);
         add("y_measured_m", |s| s.position_m.y);
@@ -172,25 +173,25 @@ fn real(scenario: &Scenario) -> Vec<Column> {
         add("p_measured_rad_s", |s| s.rates_rad_s.x);
         add("q_measured_rad_s", |s| s.rates_rad_s.y);
         add("r_measured_rad_s", |s| s.rates_rad_s.z);
-        let fresh = |row: &Row| Flag(row.sample.measurement.is_some_and(|measurement| measurement.fresh));
-        columns.push(Column { name: "measurement_fresh".into(), value: Box::new(fresh) });
+        let fresh = |row: &CsvRow| Flag(row.sample.measurement.is_some_and(|measurement| measurement.fresh));
+        columns.push(CsvColumn { name: "measurement_fresh".into(), value: Box::new(fresh) });
     }
     if scenario.instruments.imu.is_some() {
         for (name, value) in ESTIMATE {
-            let value = move |row: &Row| Single(row.sample.estimated.as_ref().map_or(f32::NAN, value));
-            columns.push(Column { name: name.into(), value: Box::new(value) });
+            let value = move |row: &CsvRow| Single(row.sample.estimated.as_ref().map_or(f32::NAN, value));
+            columns.push(CsvColumn { name: name.into(), value: Box::new(value) });
         }
-        let valid = |row: &Row| Flag(row.sample.estimated.is_some_and(|estimated| estimated.valid));
-        columns.push(Column { name: "estimate_valid".into(), value: Box::new(valid) });
+        let valid = |row: &CsvRow| Flag(row.sample.estimated.is_some_and(|estimated| estimated.valid));
+        columns.push(CsvColumn { name: "estimate_valid".into(), value: Box::new(valid) });
     }
     columns
 }
 
 /// Returns every row of a flight's log.
-fn rows<'a>(ScenarioFlight { scenario, run }: &'a ScenarioFlight) -> impl Iterator<Item = Row<'a>> {
+fn rows<'a>(ScenarioFlight { scenario, run }: &'a ScenarioFlight) -> impl Iterator<Item = CsvRow<'a>> {
     let model = ModelConstants::new(&scenario.vehicle.to_f32());
     let row =
-        move |(sample, extremes): (&'a Sample, &'a _)| Row { sample, extremes, lyapunov: lyapunov(&model, sample) };
+        move |(sample, extremes): (&'a Sample, &'a _)| CsvRow { sample, extremes, lyapunov: lyapunov(&model, sample) };
     run.log.iter().zip(&run.input_extremes).map(row)
 }
 

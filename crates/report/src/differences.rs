@@ -1,8 +1,8 @@
 //! Medians, and differences between contenders over the same seeds: as text, JSON and CSV.
 
 use crate::grid::{Grid, GridCell};
-use afbc_campaign::Versus;
-use afbc_campaign::compare::{Comparison, DISTANCE, Entry, Measure};
+use afbc_campaign::PairedDifference;
+use afbc_campaign::compare::{Comparison, ContenderFlights, DISTANCE, Measure};
 use afbc_campaign::statistics::{Median, SignedRank};
 use serde::Serialize;
 use std::io::{self, Write};
@@ -47,13 +47,14 @@ pub(crate) const TEST_LEGEND: &str = "p: Wilcoxon's signed rank test, two-sided,
 
 /// Returns a table of the distances, and of their differences to the reference contender's; `None` for a single seed.
 pub(crate) fn grid(comparison: &Comparison) -> Option<Grid> {
-    let against = comparison.entries.get(comparison.against).filter(|_| comparison.is_repeated())?.contender().title();
-    let row = |(entry, versus): (&Entry, Option<Versus>)| {
+    let baseline =
+        comparison.entries.get(comparison.baseline).filter(|_| comparison.is_repeated())?.contender().title();
+    let row = |(entry, paired): (&ContenderFlights, Option<PairedDifference>)| {
         let own = entry.median(DISTANCE.value).map_or("lost".into(), |own| median(&own, &DISTANCE));
         let best = comparison.is_best(entry, &DISTANCE);
-        let [difference, p, effect] = match versus {
+        let [difference, p, effect] = match paired {
             None => [const { String::new() }; 3],
-            Some(Versus { difference, test: tested, p_holm, .. }) => {
+            Some(PairedDifference { difference, test: tested, p_holm, .. }) => {
                 let [p, effect] = test(&tested, p_holm);
                 [if difference.value.is_nan() { "-".into() } else { median(&difference, &DISTANCE) }, p, effect]
             }
@@ -63,9 +64,9 @@ pub(crate) fn grid(comparison: &Comparison) -> Option<Grid> {
         let cells = [own, difference.into(), p.into(), effect.into(), lost.unwrap_or_default().into()];
         (entry.contender().title().to_owned(), cells.to_vec())
     };
-    let versus = comparison.versus(DISTANCE.value);
-    let mut rows: Vec<(String, Vec<GridCell>)> = comparison.entries.iter().zip(versus).map(row).collect();
-    let less = format!("less {against}'s");
+    let paired = comparison.paired_differences(DISTANCE.value);
+    let mut rows: Vec<(String, Vec<GridCell>)> = comparison.entries.iter().zip(paired).map(row).collect();
+    let less = format!("less {baseline}'s");
     let mut heads: Vec<String> = ["law", DISTANCE.title, &less].into_iter().chain(TEST).map(String::from).collect();
     if comparison.entries.iter().any(|entry| entry.lost() > 0) {
         heads.push("lost".into());
@@ -77,7 +78,7 @@ pub(crate) fn grid(comparison: &Comparison) -> Option<Grid> {
         format!("{}: root mean square distance from the reference over {seeds} seeds", comparison.scenario.name);
     let note = format!(
         "Medians, and in brackets intervals of at least 95 %: order statistics, from six seeds on; a vehicle that was \
-         lost is infinitely far. less {against}'s: median of the differences over the same seeds. {TEST_LEGEND}"
+         lost is infinitely far. less {baseline}'s: median of the differences over the same seeds. {TEST_LEGEND}"
     );
     Some(Grid { caption, heads, rows, note })
 }
@@ -105,25 +106,25 @@ pub(crate) fn figures<'a>(
 ) -> Vec<Vec<FigureOverSeeds>> {
     let mut all = vec![Vec::new(); comparison.entries.len()];
     for measure in measures {
-        let versus = comparison.versus(measure.value);
-        for ((entry, versus), all) in comparison.entries.iter().zip(versus).zip(&mut all) {
-            all.push(figure(measure, Median::of(&entry.values(measure.value)), versus));
+        let paired = comparison.paired_differences(measure.value);
+        for ((entry, paired), all) in comparison.entries.iter().zip(paired).zip(&mut all) {
+            all.push(figure(measure, Median::of(&entry.values(measure.value)), paired));
         }
     }
     all
 }
 
-fn figure(measure: &Measure, median: Option<Median>, versus: Option<Versus>) -> FigureOverSeeds {
+fn figure(measure: &Measure, median: Option<Median>, paired: Option<PairedDifference>) -> FigureOverSeeds {
     let ends = |median: Option<Median>| {
         let interval = median.and_then(|median| median.interval);
         [median.map(|median| median.value), interval.map(|[low, _]| low), interval.map(|[_, high]| high)]
             .map(|number| number.filter(|number| number.is_finite()))
     };
-    let [difference, difference_low_95, difference_high_95] = ends(versus.map(|versus| versus.difference));
+    let [difference, difference_low_95, difference_high_95] = ends(paired.map(|paired| paired.difference));
     let [median, low_95, high_95] = ends(median);
     let name = measure.name;
-    let (p, p_holm) = (versus.map(|versus| versus.test.p), versus.map(|versus| versus.p_holm));
-    let rank_biserial = versus.map(|versus| versus.test.effect);
+    let (p, p_holm) = (paired.map(|paired| paired.test.p), paired.map(|paired| paired.p_holm));
+    let rank_biserial = paired.map(|paired| paired.test.effect);
     FigureOverSeeds {
         name,
         median,
@@ -174,7 +175,7 @@ pub(crate) fn csv(out: &mut dyn Write, comparisons: &[Comparison], measures: &[&
                     median: figure.median,
                     low_95: figure.low_95,
                     high_95: figure.high_95,
-                    against: against(comparison),
+                    against: baseline(comparison),
                     difference: figure.difference,
                     difference_low_95: figure.difference_low_95,
                     difference_high_95: figure.difference_high_95,
@@ -189,6 +190,6 @@ pub(crate) fn csv(out: &mut dyn Write, comparisons: &[Comparison], measures: &[&
 }
 
 /// Returns the name of the contender with which the others are compared.
-pub(crate) fn against(comparison: &Comparison) -> &str {
-    comparison.entries.get(comparison.against).map_or("", |entry| &entry.contender().name)
+pub(crate) fn baseline(comparison: &Comparison) -> &str {
+    comparison.entries.get(comparison.baseline).map_or("", |entry| &entry.contender().name)
 }

@@ -6,7 +6,7 @@ use afbc_sim::flown::ScenarioFlight;
 use std::collections::HashSet;
 
 /// The flights of one scenario, and their file names.
-pub(super) struct Group<'a> {
+pub(super) struct ScenarioGroup<'a> {
     /// The scenario that all of them flew.
     pub(super) scenario: &'a Scenario,
     /// Flights in the order flown; never empty.
@@ -18,12 +18,12 @@ pub(super) struct Group<'a> {
 }
 
 /// Groups flights by scenario, in the order flown, and names their files.
-pub(super) fn groups(flown: &[ScenarioFlight]) -> Vec<Group<'_>> {
-    let mut groups: Vec<Group<'_>> = Vec::new();
+pub(super) fn groups(flown: &[ScenarioFlight]) -> Vec<ScenarioGroup<'_>> {
+    let mut groups: Vec<ScenarioGroup<'_>> = Vec::new();
     for flight in flown {
         match groups.iter_mut().find(|group| group.scenario == &flight.scenario) {
             Some(group) => group.flights.push(flight),
-            None => groups.push(Group {
+            None => groups.push(ScenarioGroup {
                 scenario: &flight.scenario,
                 flights: vec![flight],
                 csv_names: Vec::new(),

@@ -3,7 +3,7 @@
 use crate::claims::Claim;
 use crate::explore::{Explorable, ExplorableScene};
 use crate::figures::Picture;
-use crate::groups::Group;
+use crate::groups::ScenarioGroup;
 use crate::{explore, reality, table, words};
 use afbc::reference::ReferenceModel;
 use afbc::{PositionControlLimits, Settings};
@@ -98,7 +98,7 @@ body > .scroll:has(.prose) { max-width: min(100%, 900px); }
 const NAMESPACE: &str = " xmlns=\"http://www.w3.org/2000/svg\"";
 
 /// Returns the page of some flights; `figures` holds one set of figures per group.
-pub(super) fn page(groups: &[Group], figures: &[Vec<Picture>], claims: &[Claim]) -> String {
+pub(super) fn page(groups: &[ScenarioGroup], figures: &[Vec<Picture>], claims: &[Claim]) -> String {
     let title = match groups {
         [only] => only.scenario.description.as_str(),
         _ => "Flights",
@@ -193,7 +193,7 @@ fn verdicts(claims: &[Claim]) -> Markup {
     }
 }
 
-fn section(group: &Group, figures: &[Picture]) -> Markup {
+fn section(group: &ScenarioGroup, figures: &[Picture]) -> Markup {
     html! {
         h2 { (group.scenario.name) }
         p { (words::conditions(group.scenario)) "." }
@@ -214,7 +214,7 @@ fn section(group: &Group, figures: &[Picture]) -> Markup {
 }
 
 /// Returns the terminal's table as HTML.
-fn results(group: &Group) -> Markup {
+fn results(group: &ScenarioGroup) -> Markup {
     html! {
         table {
             @for (i, block) in table::BLOCKS.iter().enumerate() {

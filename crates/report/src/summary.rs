@@ -10,7 +10,7 @@ use std::io::{self, Write};
 
 /// Summary of one run. A value that does not apply or could not be measured is null.
 #[derive(Serialize)]
-struct Summary<'a> {
+struct RunJson<'a> {
     scenario: &'a str,
     reading: Option<&'a str>,
     inertia_sign: Option<&'a str>,
@@ -29,17 +29,17 @@ struct Summary<'a> {
     seed: u64,
     /// Time from which `rmse`, `max_abs` and `mean_abs_delta_u_n` are evaluated.
     measured_from_s: f64,
-    rmse: Option<Outputs>,
-    max_abs: Option<Outputs>,
-    final_error: Outputs,
+    rmse: Option<OutputsJson>,
+    max_abs: Option<OutputsJson>,
+    final_error: OutputsJson,
     /// Mean absolute change of U1..U4 per control step.
     mean_abs_delta_u_n: Option<[f64; 4]>,
     /// Errors of the vehicle's own estimate.
-    estimate: Option<Estimate>,
+    estimate: Option<EstimateJson>,
 }
 
 #[derive(Serialize)]
-struct Estimate {
+struct EstimateJson {
     position_rms_m: f64,
     horizontal_rms_m: f64,
     velocity_rms_m_s: f64,
@@ -48,28 +48,28 @@ struct Estimate {
     heading_rms_deg: f64,
     nees_mean: f64,
     valid_ratio: f64,
-    aids: Vec<AidWords>,
+    aids: Vec<EstimateAidJson>,
 }
 
 #[derive(Serialize)]
-struct AidWords {
+struct EstimateAidJson {
     name: &'static str,
     fused: u64,
     rejected: u64,
     nis_mean: Option<f64>,
 }
 
-impl From<EstimateMetrics> for Estimate {
+impl From<EstimateMetrics> for EstimateJson {
     fn from(metrics: EstimateMetrics) -> Self {
         let EstimateMetrics { position_m, velocity_m_s, attitude_rad, nees, valid_ratio, aids } = metrics;
         let heard = AidSource::ALL.into_iter().zip(aids).filter(|(_, aid)| aid.fused + aid.rejected > 0);
-        let aid = |(aid, AidMetrics { fused, rejected, nis, .. })| AidWords {
+        let aid = |(aid, AidMetrics { fused, rejected, nis, .. })| EstimateAidJson {
             name: name(aid),
             fused,
             rejected,
             nis_mean: (fused > 0).then_some(nis),
         };
-        Estimate {
+        EstimateJson {
             position_rms_m: position_m.norm(),
             horizontal_rms_m: position_m.xy().norm(),
             velocity_rms_m_s: velocity_m_s.norm(),
@@ -96,23 +96,23 @@ const fn name(aid: AidSource) -> &'static str {
 }
 
 #[derive(Serialize)]
-struct Outputs {
+struct OutputsJson {
     x_m: f64,
     y_m: f64,
     z_m: f64,
     psi_rad: f64,
 }
 
-impl From<Vector4<f64>> for Outputs {
+impl From<Vector4<f64>> for OutputsJson {
     fn from(v: Vector4<f64>) -> Self {
-        Outputs { x_m: v.x, y_m: v.y, z_m: v.z, psi_rad: v.w }
+        OutputsJson { x_m: v.x, y_m: v.y, z_m: v.z, psi_rad: v.w }
     }
 }
 
-fn summary(ScenarioFlight { scenario, run }: &ScenarioFlight) -> Summary<'_> {
+fn summary(ScenarioFlight { scenario, run }: &ScenarioFlight) -> RunJson<'_> {
     let uncertainty = scenario.case.and_then(|case| case.uncertainty);
     let measured = |figures: Vector4<f64>| run.is_settled().then_some(figures);
-    Summary {
+    RunJson {
         scenario: &scenario.name,
         reading: scenario.case.and_then(|case| case.reading).map(Reading::name),
         inertia_sign: uncertainty.map(|u| u.inertia).map(Sign::symbol),
@@ -128,11 +128,11 @@ fn summary(ScenarioFlight { scenario, run }: &ScenarioFlight) -> Summary<'_> {
         tripped_reason: run.tripped.map(|tripped| tripped.reason),
         seed: scenario.seed,
         measured_from_s: SETTLED_S,
-        rmse: measured(run.metrics.rmse).map(Outputs::from),
-        max_abs: measured(run.metrics.max_abs).map(Outputs::from),
+        rmse: measured(run.metrics.rmse).map(OutputsJson::from),
+        max_abs: measured(run.metrics.max_abs).map(OutputsJson::from),
         final_error: run.metrics.final_error.into(),
         mean_abs_delta_u_n: measured(run.metrics.mean_abs_delta_u).map(Into::into),
-        estimate: run.metrics.estimate.map(Estimate::from),
+        estimate: run.metrics.estimate.map(EstimateJson::from),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Formats the table of flights for the terminal.
 
 use crate::claims::Claim;
-use crate::groups::{Group, groups};
+use crate::groups::{ScenarioGroup, groups};
 use crate::words;
 use afbc_sim::flown::ScenarioFlight;
 use afbc_sim::metrics::{Metrics, SETTLED_S};
@@ -33,7 +33,7 @@ pub fn for_terminal(columns: usize, make: impl FnOnce() -> String) -> String {
 }
 
 /// One block of the table: title, heads of its four columns, and values.
-pub(super) struct Block {
+pub(super) struct TableBlock {
     pub(super) title: &'static str,
     pub(super) columns: [&'static str; 4],
     pub(super) digits: usize,
@@ -47,9 +47,9 @@ pub(super) struct Block {
 const OUTPUTS: [&str; 4] = ["x [m]", "y [m]", "z [m]", "psi [rad]"];
 
 /// Blocks from top to bottom.
-pub(super) const BLOCKS: [Block; 4] = [
-    Block { title: "RMSE", columns: OUTPUTS, digits: 4, values: |m| m.rmse, needs_settled: true, first: true },
-    Block {
+pub(super) const BLOCKS: [TableBlock; 4] = [
+    TableBlock { title: "RMSE", columns: OUTPUTS, digits: 4, values: |m| m.rmse, needs_settled: true, first: true },
+    TableBlock {
         title: "largest |error|",
         columns: OUTPUTS,
         digits: 4,
@@ -57,7 +57,7 @@ pub(super) const BLOCKS: [Block; 4] = [
         needs_settled: true,
         first: false,
     },
-    Block {
+    TableBlock {
         title: "final error",
         columns: OUTPUTS,
         digits: 4,
@@ -65,7 +65,7 @@ pub(super) const BLOCKS: [Block; 4] = [
         needs_settled: false,
         first: false,
     },
-    Block {
+    TableBlock {
         title: "mean |dU|",
         columns: ["U1 [mN]", "U2 [mN]", "U3 [mN]", "U4 [mN]"],
         digits: 1,
@@ -75,9 +75,9 @@ pub(super) const BLOCKS: [Block; 4] = [
     },
 ];
 
-impl Block {
+impl TableBlock {
     /// Returns the flights that have a row in this block.
-    pub(super) fn rows<'a>(&self, group: &'a Group<'_>) -> impl Iterator<Item = &'a ScenarioFlight> {
+    pub(super) fn rows<'a>(&self, group: &'a ScenarioGroup<'_>) -> impl Iterator<Item = &'a ScenarioFlight> {
         let all = self.first;
         group.flights.iter().copied().filter(move |flight| all || flight.run.lost.is_none())
     }
@@ -140,7 +140,7 @@ pub fn table(flown: &[ScenarioFlight], claims: &[Claim]) -> String {
 }
 
 /// Formats the block of one scenario.
-fn flights(group: &Group, lines: &mut Vec<String>) {
+fn flights(group: &ScenarioGroup, lines: &mut Vec<String>) {
     wrap(lines, "", &format!("{}: {}", group.scenario.name, words::conditions(group.scenario)));
     // Width of the longest printed name.
     let name_width = group.flights.iter().map(|flight| flight.run.contender.title().chars().count()).max().unwrap_or(0);

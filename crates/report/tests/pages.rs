@@ -4,11 +4,11 @@
 mod common;
 
 use afbc_campaign::compare::Comparison;
-use afbc_campaign::random::{self, FlownDraw, Random, Seen};
+use afbc_campaign::random::{self, FeedbackSource, FlownRandomFlight, RandomFlights};
 use afbc_campaign::suite::{SUITES, Suite};
 use afbc_campaign::{QUANTITIES, compare};
 use afbc_plant::{Environment, PlantParameter, PlantParameterChange, RotorFault};
-use afbc_report::random::Judged;
+use afbc_report::random::RandomResults;
 use afbc_report::{self as report, flights};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::{Scenario, built_in};
@@ -203,15 +203,15 @@ impl Suited {
 #[test]
 fn the_flights_that_tell_most_are_told() {
     let vehicles = BUILT_IN.iter().take(2).map(|vehicle| vehicle.read().unwrap()).collect();
-    let random = Random { seeds: 1..2, flights: 3, seen: Seen::Truth, vehicles };
+    let random = RandomFlights { seeds: 1..2, flights: 3, seen: FeedbackSource::Truth, vehicles };
     let contenders = ["afbc", "pid"].map(named);
     let mut drawn = random.under(&contenders, &[]).unwrap();
     drawn.iter_mut().for_each(|flight| flight.scenario.duration_s = 6.0);
     let mut flown = random::fly(drawn, &|| ()).unwrap();
-    let told = |flown: &[FlownDraw]| -> Vec<String> {
-        Judged::new(&random, flown, "afbc").telling().iter().map(|scenario| scenario.name.clone()).collect()
+    let told = |flown: &[FlownRandomFlight]| -> Vec<String> {
+        RandomResults::new(&random, flown, "afbc").telling().iter().map(|scenario| scenario.name.clone()).collect()
     };
-    let name = |place: usize, flown: &[FlownDraw]| flown[place].flight.scenario.name.clone();
+    let name = |place: usize, flown: &[FlownRandomFlight]| flown[place].flight.scenario.name.clone();
     // Make all results equal, except for one flight per vehicle.
     for one in flown.iter_mut().flat_map(|flown| &mut flown.outcomes) {
         (one.lost, one.metrics.rmse) = (None, Vector4::repeat(1.0));
@@ -226,7 +226,7 @@ fn the_flights_that_tell_most_are_told() {
     flown[3].outcomes.iter_mut().for_each(|outcome| outcome.lost = lost);
     assert_eq!(told(&flown), [name(2, &flown), name(5, &flown)]);
 
-    let judged = Judged::new(&random, &flown, "afbc");
+    let judged = RandomResults::new(&random, &flown, "afbc");
     let again = compare::fly(judged.telling().into_iter().cloned().collect(), 1, 10, &|| ()).unwrap();
     let out = folder("random");
     report::random::write(&open(&out), &judged, &again).unwrap();

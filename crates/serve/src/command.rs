@@ -1,6 +1,6 @@
 //! Text commands, one per line, that change weather and faults while vehicles fly.
 
-use crate::hand::{Grip, SIDES};
+use crate::handheld::{Grip, SIDES};
 use afbc_files::read::words::{nearest, out_of_range};
 use afbc_plant::instruments::{FailureKind, limits as failure};
 use afbc_plant::rotors::limits as rotor;
@@ -13,7 +13,7 @@ use std::str::SplitWhitespace;
 
 /// A parsed line.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Line {
+pub struct ScheduledLine {
     /// Time at which the command is carried out, by the vehicles' clock \[s\]; `None`: at once.
     pub at_s: Option<f64>,
     /// System id of the vehicle that the command is for; `None`: all.
@@ -173,9 +173,9 @@ const TURBULENCE: [(&str, Option<Turbulence>); 4] = [
 ///
 /// # Errors
 /// Fails with one line that says what is wrong with the text.
-pub fn parse(text: &str) -> Result<Option<Line>, String> {
+pub fn parse(text: &str) -> Result<Option<ScheduledLine>, String> {
     let text = text.split('#').next().unwrap_or_default();
-    let mut words = Words { command: "", rest: text.split_whitespace() };
+    let mut words = CommandWords { command: "", rest: text.split_whitespace() };
     let (mut at_s, mut vehicle) = (None, None);
     loop {
         let Some(word) = words.rest.next() else {
@@ -190,13 +190,13 @@ pub fn parse(text: &str) -> Result<Option<Line>, String> {
             _ => {
                 let command = command(word, &mut words)?;
                 words.finish()?;
-                return Ok(Some(Line { at_s, vehicle, command }));
+                return Ok(Some(ScheduledLine { at_s, vehicle, command }));
             }
         }
     }
 }
 
-fn command(word: &str, words: &mut Words<'_>) -> Result<ServerCommand, String> {
+fn command(word: &str, words: &mut CommandWords<'_>) -> Result<ServerCommand, String> {
     Ok(match word {
         "status" => ServerCommand::Status,
         "help" => ServerCommand::Help,
@@ -210,7 +210,7 @@ fn command(word: &str, words: &mut Words<'_>) -> Result<ServerCommand, String> {
     })
 }
 
-fn change(word: &str, words: &mut Words<'_>) -> Result<WorldChange, String> {
+fn change(word: &str, words: &mut CommandWords<'_>) -> Result<WorldChange, String> {
     Ok(match word {
         "wind" => WorldChange::Wind(words.vector(&Wind::STEADY.range)?),
         "turbulence" => WorldChange::Turbulence(words.choice(&TURBULENCE)?),
@@ -255,14 +255,14 @@ fn change(word: &str, words: &mut Words<'_>) -> Result<WorldChange, String> {
 }
 
 /// Parses the name of a control law.
-fn law(words: &mut Words<'_>) -> Result<ControllerKind, String> {
+fn law(words: &mut CommandWords<'_>) -> Result<ControllerKind, String> {
     let name = words.word(&format!("one of {}", ControllerKind::names()))?;
     ControllerKind::named(name)
         .ok_or_else(|| format!("law: {}: no such law; {}", shown(name), ControllerKind::cure(name)))
 }
 
 /// Parses how a hand holds the vehicle, such as `left 60`.
-fn grip(words: &mut Words<'_>) -> Result<Grip, String> {
+fn grip(words: &mut CommandWords<'_>) -> Result<Grip, String> {
     let sides = SIDES.map(|(name, level_rad)| (name, Some(level_rad)));
     let options: Vec<_> = sides.into_iter().chain([("none", None)]).collect();
     let Some(level_rad) = words.choice(&options)? else { return Ok(Grip::Down) };
@@ -271,7 +271,7 @@ fn grip(words: &mut Words<'_>) -> Result<Grip, String> {
 }
 
 /// Parses how an instrument fails, such as `gnss jumped 5 0 0`.
-fn fault(words: &mut Words<'_>) -> Result<FailureKind, String> {
+fn fault(words: &mut CommandWords<'_>) -> Result<FailureKind, String> {
     let instrument = words.word("an instrument, as in: fault gnss lost")?;
     let of = |failure: &&FailureKind| failure.name().split_once('-').is_some_and(|(of, _)| of == instrument);
     let known: Vec<FailureKind> = FailureKind::ALL.iter().filter(of).copied().collect();
@@ -314,12 +314,12 @@ fn fault(words: &mut Words<'_>) -> Result<FailureKind, String> {
 }
 
 /// The name of a command, and the words after it.
-struct Words<'a> {
+struct CommandWords<'a> {
     command: &'a str,
     rest: SplitWhitespace<'a>,
 }
 
-impl<'a> Words<'a> {
+impl<'a> CommandWords<'a> {
     fn word(&mut self, wanted: &str) -> Result<&'a str, String> {
         self.rest.next().ok_or_else(|| format!("{}: it needs {wanted}", self.usage()))
     }

@@ -15,20 +15,20 @@ const TEXT_MAX: usize = 50;
 
 /// The bytes of one frame.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Frame<'a>(&'a [u8]);
+pub(crate) struct RawFrame<'a>(&'a [u8]);
 
 /// Splits `bytes` into frames; `bytes` must consist of complete frames.
-pub(crate) fn frames(mut bytes: &[u8]) -> impl Iterator<Item = Frame<'_>> {
+pub(crate) fn frames(mut bytes: &[u8]) -> impl Iterator<Item = RawFrame<'_>> {
     core::iter::from_fn(move || {
         let [_, payload, flags, ..] = bytes else { return None };
         let length = OVERHEAD + usize::from(*payload) + if flags & SIGNED == 0 { 0 } else { SIGNATURE };
         let (frame, rest) = bytes.split_at_checked(length)?;
         bytes = rest;
-        Some(Frame(frame))
+        Some(RawFrame(frame))
     })
 }
 
-impl<'a> Frame<'a> {
+impl<'a> RawFrame<'a> {
     pub(crate) fn bytes(self) -> &'a [u8] {
         self.0
     }
@@ -73,8 +73,8 @@ mod tests {
             })
             .into();
         let bytes = sent.concat();
-        assert!(frames(&bytes).map(Frame::bytes).eq(sent.iter().map(Vec::as_slice)));
-        assert!(frames(&bytes).filter_map(Frame::text).eq(["on", "on"]));
+        assert!(frames(&bytes).map(RawFrame::bytes).eq(sent.iter().map(Vec::as_slice)));
+        assert!(frames(&bytes).filter_map(RawFrame::text).eq(["on", "on"]));
         assert_eq!(frames(&bytes).filter(|frame| frame.is_heartbeat()).count(), 3);
     }
 }

@@ -8,16 +8,17 @@
 //! 2. [`Server`]: several vehicles, and [commands](command) that change weather and faults while they fly. Neither has
 //!    a clock or a socket: the same lines and bytes at the same milliseconds give the same bytes.
 //! 3. [`QgcPlan`]: a QGroundControl plan, and [`fly_plan`], a ground station that flies it.
-//! 4. [`Ports`]: the vehicles' UDP and TCP ports. [`Door`]: other access to the vehicles, such as a web page. [`Pace`]:
-//!    real time. [`run`]: all of these together. [`LineOutput`]: output lines that never block.
+//! 4. [`Ports`]: the vehicles' UDP and TCP ports. [`ServerHook`]: other access to the vehicles, such as a web page.
+//!    [`Pace`]: real time. [`run`]: all of these together. [`LineOutput`]: output lines that never block.
 //! 5. [`page`]: what a web page shows and may command. `web` (a feature): the HTTP server that brings it to browsers.
 #![forbid(unsafe_code)]
 
 pub mod command;
-mod door;
+mod fleet;
 mod frames;
 mod guide;
-mod hand;
+mod handheld;
+mod hook;
 mod output;
 mod pace;
 pub mod page;
@@ -29,7 +30,6 @@ mod ports;
 mod reported_sensors;
 mod run;
 mod server;
-mod stand;
 mod systems;
 mod tcp;
 mod udp;
@@ -39,16 +39,16 @@ mod waypoint_file;
 pub mod web;
 mod world_changes;
 
-pub use door::{Door, TimeFlow, TimeRate};
+pub use fleet::{VEHICLES_MAX, fleet};
 pub use guide::guide;
+pub use hook::{ServerHook, TimeFlow, TimeRate};
 pub use output::LineOutput;
 pub use pace::{BEHIND_MAX, Pace, Wait};
 pub use parameter_file::ParameterFile;
 pub use plan_file::QgcPlan;
 pub use plan_flight::{PlanEnd, fly_plan};
 pub use ports::{Addresses, Ports};
-pub use run::{Lines, RunEnd, run};
-pub use server::{Reply, Server, Then};
-pub use stand::{VEHICLES_MAX, fleet};
+pub use run::{InputLines, Interfaces, RunEnd, run};
+pub use server::{LineReply, Server, ServerAction};
 pub use vehicle::ServedVehicle;
 pub use waypoint_file::is_waypoint_file;

@@ -1,7 +1,7 @@
 //! A vehicle's parameters in a file, stored by the firmware's code.
 
 use afbc_comms::services::signing::SigningRecord;
-use afbc_files::{Flash, FlashError, FlashFailure};
+use afbc_files::{FlashError, FlashFailure, FlashFile};
 use afbc_hil::Host;
 use afbc_onboard::Link;
 use afbc_onboard::parameters::{Kept, RecordChange};
@@ -15,7 +15,7 @@ use std::path::Path;
 const PAPER: &str = "paper";
 
 /// A parameter store in a file. The file is written in the background, so that no tick waits for the disk.
-pub struct ParameterFile(Store<Flash>, FlashFailure);
+pub struct ParameterFile(Store<FlashFile>, FlashFailure);
 
 impl ParameterFile {
     /// Opens or creates the file at `path` for the vehicle of `scenario`.
@@ -24,7 +24,7 @@ impl ParameterFile {
     /// Fails with one line that names the file.
     pub fn open(path: &Path, scenario: &Scenario) -> Result<Self, String> {
         let name = scenario.vehicle_file.as_ref().map_or(PAPER, |vehicle| &vehicle.name);
-        let flash = Flash::open(path).map_err(|error| match error.kind() {
+        let flash = FlashFile::open(path).map_err(|error| match error.kind() {
             ErrorKind::NotFound => format!("{}: its folder does not exist; make it first", path.display()),
             _ => format!("{}: {error}", path.display()),
         })?;
@@ -54,18 +54,18 @@ impl ParameterFile {
     }
 
     /// Stores a change of a parameter.
-    pub(crate) fn keep(&mut self, change: RecordChange) -> Result<(), Error<FlashError>> {
+    pub(crate) fn store_change(&mut self, change: RecordChange) -> Result<(), Error<FlashError>> {
         self.write(|store| Kept::NOW.keep(store, change))
     }
 
     /// Stores a part of the signing key.
-    pub(crate) fn keep_signing(&mut self, record: SigningRecord) -> Result<(), Error<FlashError>> {
+    pub(crate) fn store_signing(&mut self, record: SigningRecord) -> Result<(), Error<FlashError>> {
         self.write(|store| store.set(record.name, 0, record.bits))
     }
 
     fn write(
         &mut self,
-        write: impl Fn(&mut Store<Flash>) -> Result<(), Error<FlashError>>,
+        write: impl Fn(&mut Store<FlashFile>) -> Result<(), Error<FlashError>>,
     ) -> Result<(), Error<FlashError>> {
         match write(&mut self.0) {
             // Erase at once; the board would have to wait until it may stand still.

@@ -6,7 +6,7 @@ use std::net::SocketAddr;
 const STARTS: [u8; 2] = [0xFD, 0xFE];
 
 /// An event of a peer.
-pub(crate) enum Event<'a> {
+pub(crate) enum PeerEvent<'a> {
     /// A new peer.
     New(SocketAddr),
     /// The peer with this number has sent these bytes. The handler returns whether they complete a valid frame.

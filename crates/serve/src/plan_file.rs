@@ -62,23 +62,23 @@ pub struct QgcPlan {
 }
 
 /// A part of the file, with its place for error messages.
-struct Part<'a> {
+struct PlanSection<'a> {
     file: &'a str,
     place: String,
     value: &'a Value,
 }
 
-impl<'a> Part<'a> {
+impl<'a> PlanSection<'a> {
     fn wrong(&self, problem: &str) -> FileError {
         FileError::whole(self.file, format!("{}: {problem}", self.place))
     }
 
-    fn at(&self, key: &str) -> Option<Part<'a>> {
+    fn at(&self, key: &str) -> Option<PlanSection<'a>> {
         let value = self.value.get(key).filter(|value| !value.is_null())?;
-        Some(Part { file: self.file, place: format!("{}.{key}", self.place), value })
+        Some(PlanSection { file: self.file, place: format!("{}.{key}", self.place), value })
     }
 
-    fn get(&self, key: &str) -> Result<Part<'a>, FileError> {
+    fn get(&self, key: &str) -> Result<PlanSection<'a>, FileError> {
         self.at(key).ok_or_else(|| self.wrong(&format!("{key} is missing; save the plan again in QGroundControl")))
     }
 
@@ -98,9 +98,9 @@ impl<'a> Part<'a> {
         }
     }
 
-    fn list(&self) -> Result<Vec<Part<'a>>, FileError> {
+    fn list(&self) -> Result<Vec<PlanSection<'a>>, FileError> {
         let list = self.value.as_array().ok_or_else(|| self.wrong("it must be a list"))?;
-        let part = |(number, value)| Part { file: self.file, place: format!("{} {number}", self.place), value };
+        let part = |(number, value)| PlanSection { file: self.file, place: format!("{} {number}", self.place), value };
         Ok(list.iter().enumerate().map(part).collect())
     }
 
@@ -158,12 +158,12 @@ impl QgcPlan {
         }
         let value: Value = serde_json::from_str(text)
             .map_err(|error| FileError::whole(file, format!("no JSON: {error}; save the plan again")))?;
-        let whole = Part { file, place: "plan".into(), value: &value };
+        let whole = PlanSection { file, place: "plan".into(), value: &value };
         if value.get("fileType").and_then(Value::as_str) != Some("Plan") {
             return Err(FileError::whole(file, "no plan of QGroundControl: its fileType is not Plan"));
         }
         whole.known(Some(1), PLAN)?;
-        let part = |key: &str| whole.at(key).map(|part| Part { place: key.into(), ..part });
+        let part = |key: &str| whole.at(key).map(|part| PlanSection { place: key.into(), ..part });
         let mission = part("mission");
         Ok(QgcPlan {
             mission: mission.as_ref().map_or(Ok(Vec::new()), read_mission)?,
@@ -175,9 +175,9 @@ impl QgcPlan {
 }
 
 /// Returns the items of the mission. Complex items are replaced by the simple items that QGroundControl computed.
-fn read_mission(mission: &Part<'_>) -> Result<Vec<MissionItem>, FileError> {
+fn read_mission(mission: &PlanSection<'_>) -> Result<Vec<MissionItem>, FileError> {
     mission.known(Some(2), MISSION)?;
-    let items = Part { place: "mission item".into(), ..mission.get("items")? };
+    let items = PlanSection { place: "mission item".into(), ..mission.get("items")? };
     let mut simple = Vec::new();
     for item in items.list()? {
         match item.value.get("type").and_then(Value::as_str) {
@@ -193,7 +193,7 @@ fn read_mission(mission: &Part<'_>) -> Result<Vec<MissionItem>, FileError> {
     simple.iter().zip(0..).map(|(item, number)| simple_item(item, number, &names)).collect()
 }
 
-fn simple_item(item: &Part<'_>, number: u16, names: &[Option<u64>]) -> Result<MissionItem, FileError> {
+fn simple_item(item: &PlanSection<'_>, number: u16, names: &[Option<u64>]) -> Result<MissionItem, FileError> {
     item.known(None, SIMPLE_ITEM)?;
     if item.at("autoContinue").is_some_and(|goes_on| goes_on.value != &Value::Bool(true)) {
         return Err(item.wrong("autoContinue must be true: a mission does not wait between items"));
@@ -202,7 +202,7 @@ fn simple_item(item: &Part<'_>, number: u16, names: &[Option<u64>]) -> Result<Mi
     let frame = item.get("frame")?.whole(u8::MAX.into())? as u8;
     let params = item.get("params")?;
     let numbers = params.list()?;
-    let number_of = |part: &Part<'_>| if part.value.is_null() { Ok(f64::NAN) } else { part.number() };
+    let number_of = |part: &PlanSection<'_>| if part.value.is_null() { Ok(f64::NAN) } else { part.number() };
     let numbers = numbers.iter().map(number_of).collect::<Result<Vec<_>, _>>()?;
     let [first, second, third, fourth, x, y, z] = numbers.as_slice() else {
         return Err(params.wrong("it must have seven numbers; save the plan again in QGroundControl"));
@@ -237,15 +237,15 @@ fn simple_item(item: &Part<'_>, number: u16, names: &[Option<u64>]) -> Result<Mi
     })
 }
 
-fn read_fence(fence: &Part<'_>) -> Result<Vec<MissionItem>, FileError> {
+fn read_fence(fence: &PlanSection<'_>) -> Result<Vec<MissionItem>, FileError> {
     if let Some(point) = fence.at("breachReturn") {
         return Err(point.wrong("return points are not supported; remove it, the vehicle returns home"));
     }
     fence.known(Some(2), FENCE)?;
     let mut items = Vec::new();
-    let kind = |area: &Part<'_>, command: u16| Ok(command + u16::from(!area.get("inclusion")?.truth()?));
+    let kind = |area: &PlanSection<'_>, command: u16| Ok(command + u16::from(!area.get("inclusion")?.truth()?));
     let named = |key: &str, name: &str| match fence.at(key) {
-        Some(list) => Part { place: name.into(), ..list }.list(),
+        Some(list) => PlanSection { place: name.into(), ..list }.list(),
         None => Ok(Vec::new()),
     };
     for polygon in named("polygons", "geoFence polygon")? {
@@ -267,9 +267,9 @@ fn read_fence(fence: &Part<'_>) -> Result<Vec<MissionItem>, FileError> {
     Ok(numbered(items))
 }
 
-fn read_rally(rally: &Part<'_>) -> Result<Vec<MissionItem>, FileError> {
+fn read_rally(rally: &PlanSection<'_>) -> Result<Vec<MissionItem>, FileError> {
     rally.known(Some(2), RALLY)?;
-    let points = Part { place: "rally point".into(), ..rally.get("points")? };
+    let points = PlanSection { place: "rally point".into(), ..rally.get("points")? };
     let points = points.list()?;
     let items = points.iter().map(|part| {
         let (place, height) = part.coordinates()?;

@@ -3,7 +3,7 @@
 use crate::plan_file::QgcPlan;
 use crate::vehicle::ServedVehicle;
 use afbc_comms::services::modes::custom;
-use afbc_ground::{Client, CommandState, Patience, UploadEnd};
+use afbc_ground::{Client, CommandState, RetryPolicy, UploadEnd};
 use afbc_guidance::FlightMode;
 use afbc_mavlink::{CommandResult, Downlink, MissionItem, MissionMessage, MissionType, VehicleCommand};
 
@@ -43,7 +43,7 @@ pub struct PlanEnd {
 }
 
 /// A ground station, and what it has observed.
-struct Station<'a> {
+struct PlanStation<'a> {
     vehicle: &'a mut ServedVehicle,
     log: &'a mut dyn FnMut(&str),
     client: Client,
@@ -70,8 +70,8 @@ pub fn fly_plan(
     log: &mut dyn FnMut(&str),
 ) -> Result<PlanEnd, String> {
     let mut client = Client::new(Client::STATION);
-    client.beat_every(Some(HEARTBEAT_MS));
-    let mut station = Station {
+    client.set_heartbeat_period(Some(HEARTBEAT_MS));
+    let mut station = PlanStation {
         vehicle,
         log,
         client,
@@ -86,7 +86,7 @@ pub fn fly_plan(
     station.fly(plan, limit_s)
 }
 
-impl Station<'_> {
+impl PlanStation<'_> {
     fn fly(&mut self, plan: &QgcPlan, limit_s: f64) -> Result<PlanEnd, String> {
         if plan.mission.is_empty() {
             return Err("the mission has no items; add some".into());
@@ -139,7 +139,7 @@ impl Station<'_> {
     fn get_ready(&mut self) -> Result<(), String> {
         let mut texts = Vec::new();
         while self.now_ms < READY_MS {
-            self.client.command(VehicleCommand::CheckArming, Patience::ONCE);
+            self.client.command(VehicleCommand::CheckArming, RetryPolicy::ONCE);
             self.wait(HEARTBEAT_MS);
             texts = self.take_texts();
             if texts.iter().any(|text| text == "ready to arm") {
@@ -151,7 +151,7 @@ impl Station<'_> {
 
     fn upload(&mut self, items: &[MissionItem], plan: MissionType, part: &str) -> Result<(), String> {
         self.take_texts();
-        self.client.upload([(plan, items.to_vec())], Patience::ONCE);
+        self.client.upload([(plan, items.to_vec())], RetryPolicy::ONCE);
         loop {
             self.step();
             match self.client.take_upload_end() {
@@ -169,7 +169,7 @@ impl Station<'_> {
 
     fn order(&mut self, command: VehicleCommand) -> Result<(), String> {
         self.take_texts();
-        self.client.command(command, Patience::ONCE);
+        self.client.command(command, RetryPolicy::ONCE);
         while self.client.state(command) == Some(CommandState::Waiting) {
             self.step();
         }
@@ -192,8 +192,8 @@ impl Station<'_> {
     }
 
     fn step(&mut self) {
-        let Station { vehicle, log, client, now_ms, reached, complete, .. } = self;
-        client.turn(*now_ms);
+        let PlanStation { vehicle, log, client, now_ms, reached, complete, .. } = self;
+        client.update(*now_ms);
         client.send(|_, frame| {
             vehicle.hear(PEER, frame);
         });

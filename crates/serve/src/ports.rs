@@ -1,9 +1,9 @@
 //! UDP and TCP ports of all vehicles.
 
-use crate::peer::Event;
+use crate::peer::PeerEvent;
 use crate::server::Server;
-use crate::tcp::Tcp;
-use crate::udp::Udp;
+use crate::tcp::TcpPort;
+use crate::udp::UdpPort;
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::time::Duration;
@@ -42,7 +42,7 @@ impl Default for Addresses {
 
 /// Open ports of all vehicles.
 pub struct Ports {
-    vehicles: Vec<(Udp, Option<Tcp>)>,
+    vehicles: Vec<(UdpPort, Option<TcpPort>)>,
     /// Number of the last peer.
     next: u32,
 }
@@ -61,11 +61,12 @@ impl Ports {
                 .map(|companion| Ok(SocketAddr::new(companion.ip(), counted(companion.port(), place, 1)?)));
             let companions = companions.collect::<Result<Vec<_>, String>>()?;
             let standing = stations.iter().copied().chain(companions).collect();
-            let udp = Udp::open(*bind, udp, standing).map_err(|error| taken("UDP", *bind, udp, "--port", &error))?;
+            let udp =
+                UdpPort::open(*bind, udp, standing).map_err(|error| taken("UDP", *bind, udp, "--port", &error))?;
             let tcp = match addresses.tcp {
                 Some(tcp) => {
                     let port = counted(tcp, place, TCP_STEP)?;
-                    Some(Tcp::open(*bind, port).map_err(|error| taken("TCP", *bind, port, "--tcp", &error))?)
+                    Some(TcpPort::open(*bind, port).map_err(|error| taken("TCP", *bind, port, "--tcp", &error))?)
                 }
                 None => None,
             };
@@ -79,7 +80,9 @@ impl Ports {
     /// # Errors
     /// Fails if the system does not know a socket's address; this does not happen in practice.
     pub fn addresses(&self) -> io::Result<Vec<(SocketAddr, Option<SocketAddr>)>> {
-        let of = |(udp, tcp): &(Udp, Option<Tcp>)| Ok((udp.address()?, tcp.as_ref().map(Tcp::address).transpose()?));
+        let of = |(udp, tcp): &(UdpPort, Option<TcpPort>)| {
+            Ok((udp.address()?, tcp.as_ref().map(TcpPort::address).transpose()?))
+        };
         self.vehicles.iter().map(of).collect()
     }
 
@@ -94,21 +97,21 @@ impl Ports {
             let system = server.vehicles().get(place).map_or(0, |vehicle| vehicle.system());
             let now_s = server.now_s();
             let as_of = (now, server.vehicles().get(place).is_some_and(|vehicle| vehicle.needs_signatures()));
-            let mut on = |event: Event<'_>, wire: &str| match event {
-                Event::New(from) => {
+            let mut on = |event: PeerEvent<'_>, wire: &str| match event {
+                PeerEvent::New(from) => {
                     log(&format!("{now_s:.3} vehicle {system}: {wire} {from} connected"));
                     true
                 }
-                Event::Sent(peer, bytes) => server.hear(place, peer, bytes),
-                Event::Nobody(peer) => {
+                PeerEvent::Sent(peer, bytes) => server.hear(place, peer, bytes),
+                PeerEvent::Nobody(peer) => {
                     server.forget(place, peer);
                     false
                 }
-                Event::Foreign(from) => {
+                PeerEvent::Foreign(from) => {
                     log(&format!("{now_s:.3} vehicle {system}: {wire} {from} speaks another protocol than MAVLink"));
                     false
                 }
-                Event::Gone(from, peer) => {
+                PeerEvent::Gone(from, peer) => {
                     log(&format!("{now_s:.3} vehicle {system}: {wire} {from} gone"));
                     server.forget(place, peer);
                     false

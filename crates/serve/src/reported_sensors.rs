@@ -46,7 +46,7 @@ impl ReportedSensors {
     }
 
     /// Returns the state of the sensors after these readings.
-    pub(crate) fn look(&mut self, world: &World, readings: &Readings) -> AuxSensors {
+    pub(crate) fn observe(&mut self, world: &World, readings: &Readings) -> AuxSensors {
         for silent_ms in &mut self.silent_ms {
             *silent_ms = silent_ms.saturating_add(1);
         }

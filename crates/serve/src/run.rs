@@ -1,9 +1,9 @@
 //! Runs the server: vehicles, ports, time and text lines together.
 
-use crate::door::{Door, TimeFlow, TimeRate};
+use crate::hook::{ServerHook, TimeFlow, TimeRate};
 use crate::pace::{Pace, Wait};
 use crate::ports::Ports;
-use crate::server::{LINE_MAX, Server, Then};
+use crate::server::{LINE_MAX, Server, ServerAction};
 use std::io::{self, BufRead, Read};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, sync_channel};
@@ -21,8 +21,16 @@ pub enum RunEnd {
     Silent,
 }
 
+/// Interfaces through which clients reach the vehicles.
+pub struct Interfaces<'a> {
+    /// Ports of all vehicles.
+    pub ports: &'a mut Ports,
+    /// Another interface, such as a web page; `()` if there is none.
+    pub hook: &'a mut dyn ServerHook,
+}
+
 /// Text lines from an input, read in the background.
-pub struct Lines {
+pub struct InputLines {
     lines: Receiver<String>,
     over: bool,
 }
@@ -34,7 +42,7 @@ const LINES_MAX: usize = 16;
 /// Least time between two reports of lost time.
 const REPORTED_EVERY: Duration = Duration::from_secs(5);
 
-impl Lines {
+impl InputLines {
     /// Reads lines of `source` in a separate thread.
     pub fn of(source: impl BufRead + Send + 'static) -> Self {
         Self::paced(source, || ())
@@ -52,7 +60,7 @@ impl Lines {
                 }
             }
         });
-        Lines { lines, over: false }
+        InputLines { lines, over: false }
     }
 
     /// Returns the next line, if there is one.
@@ -99,9 +107,9 @@ fn read_line(source: &mut impl BufRead) -> io::Result<Option<Vec<u8>>> {
 /// Runs `server` until somebody sends `quit` or `stop` is set. Passes answers and events to `log`, one line each.
 pub fn run(
     server: &mut Server,
-    (ports, door): (&mut Ports, &mut dyn Door),
+    Interfaces { ports, hook }: Interfaces<'_>,
     rate: TimeRate,
-    lines: &mut Lines,
+    lines: &mut InputLines,
     stop: &AtomicBool,
     mut log: impl FnMut(&str),
 ) -> RunEnd {
@@ -112,8 +120,8 @@ pub fn run(
     loop {
         // Handle lines first: during a pause there is nothing else to do.
         for _ in 0..LINES_MAX {
-            let stands = time.stands();
-            let line = if stands { lines.wait() } else { lines.next() };
+            let halted = time.is_halted();
+            let line = if halted { lines.wait() } else { lines.next() };
             if stop.load(Ordering::Relaxed) {
                 return RunEnd::Stopped;
             }
@@ -124,40 +132,40 @@ pub fn run(
                 break;
             };
             let mut reply = server.line(&line);
-            match (reply.then, rate) {
-                (Then::Step(steps), TimeRate::Lockstep) => {
+            match (reply.action, rate) {
+                (ServerAction::Step(steps), TimeRate::Lockstep) => {
                     for _ in 0..steps {
                         if stop.load(Ordering::Relaxed) {
                             return RunEnd::Stopped;
                         }
-                        if step(server, ports, door, began, &mut log) == Then::Quit {
+                        if step(server, ports, hook, began, &mut log) == ServerAction::Quit {
                             return RunEnd::Quit;
                         }
                     }
                 }
-                (Then::Step(_), TimeRate::Times(_)) => {
+                (ServerAction::Step(_), TimeRate::Times(_)) => {
                     reply.lines = vec!["error step: time goes on by itself; start with --lockstep".into()];
                 }
-                (Then::Speed(_) | Then::Pause(_), TimeRate::Lockstep) => {
+                (ServerAction::Speed(_) | ServerAction::Pause(_), TimeRate::Lockstep) => {
                     let command = line.split_whitespace().next().unwrap_or_default();
                     let problem = "time goes on by step alone; start without --lockstep";
                     reply.lines = vec![format!("error {command}: {problem}")];
                 }
-                (then, _) => time.change(then, began.elapsed()),
+                (action, _) => time.change(action, began.elapsed()),
             }
             reply.lines.iter().for_each(|line| log(line));
-            if reply.then == Then::Quit {
+            if reply.action == ServerAction::Quit {
                 return RunEnd::Quit;
             }
         }
-        let then = door.turn(server, time.flow, began.elapsed(), &mut log);
-        time.change(then, began.elapsed());
-        if time.stands() {
+        let action = hook.update(server, time.flow, began.elapsed(), &mut log);
+        time.change(action, began.elapsed());
+        if time.is_halted() {
             continue;
         }
-        match step(server, ports, door, began, &mut log) {
-            Then::Quit => return RunEnd::Quit,
-            then => time.change(then, began.elapsed()),
+        match step(server, ports, hook, began, &mut log) {
+            ServerAction::Quit => return RunEnd::Quit,
+            action => time.change(action, began.elapsed()),
         }
         let now = began.elapsed();
         match time.pace.step(now) {
@@ -182,17 +190,19 @@ struct RunningTime {
 
 impl RunningTime {
     /// Returns true if time does not advance by itself.
-    fn stands(&self) -> bool {
+    fn is_halted(&self) -> bool {
         self.flow.paused || self.flow.rate == TimeRate::Lockstep
     }
 
     /// Changes speed or pause from `now` on.
-    fn change(&mut self, then: Then, now: Duration) {
-        match then {
-            Then::Nothing | Then::Step(_) | Then::Quit => return,
-            Then::Speed(speed) if self.flow.rate != TimeRate::Lockstep => self.flow.rate = TimeRate::Times(speed),
-            Then::Speed(_) => return,
-            Then::Pause(stands) => self.flow.paused = stands,
+    fn change(&mut self, action: ServerAction, now: Duration) {
+        match action {
+            ServerAction::Nothing | ServerAction::Step(_) | ServerAction::Quit => return,
+            ServerAction::Speed(speed) if self.flow.rate != TimeRate::Lockstep => {
+                self.flow.rate = TimeRate::Times(speed)
+            }
+            ServerAction::Speed(_) => return,
+            ServerAction::Pause(paused) => self.flow.paused = paused,
         }
         // Restart the pace: time that passed during a pause is not caught up.
         self.pace = Pace::new(factor(self.flow.rate), now);
@@ -203,14 +213,14 @@ impl RunningTime {
 fn step(
     server: &mut Server,
     ports: &mut Ports,
-    door: &mut dyn Door,
+    hook: &mut dyn ServerHook,
     began: Instant,
     mut log: impl FnMut(&str),
-) -> Then {
+) -> ServerAction {
     ports.receive(server, began.elapsed(), &mut log);
     let send = |vehicle, bytes: &[u8]| {
         ports.send(vehicle, bytes);
-        door.sent(vehicle, bytes);
+        hook.sent(vehicle, bytes);
     };
     server.step(send, &mut log)
 }

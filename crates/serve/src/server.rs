@@ -1,7 +1,7 @@
 //! Several vehicles on a common clock, and text commands for them.
 
 use crate::ParameterFile;
-use crate::command::{COMMANDS, Line, ServerCommand, WorldChange, parse};
+use crate::command::{COMMANDS, ScheduledLine, ServerCommand, WorldChange, parse};
 use crate::systems::listed;
 use crate::vehicle::ServedVehicle;
 use afbc_hil::{LogFile, UlogFiles};
@@ -18,21 +18,21 @@ pub struct Server {
     /// Milliseconds since the start.
     now_ms: u64,
     /// Lines that wait for their time, sorted by time, then by arrival.
-    agenda: Vec<(u64, Line, String)>,
+    agenda: Vec<(u64, ScheduledLine, String)>,
 }
 
 /// Answer to a line.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Reply {
+pub struct LineReply {
     /// Lines of the answer; the last one begins with `ok` or `error`. Empty for an empty line.
     pub lines: Vec<String>,
     /// Action that the server's caller must carry out.
-    pub then: Then,
+    pub action: ServerAction,
 }
 
 /// Action that the server's caller must carry out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Then {
+pub enum ServerAction {
     /// Nothing.
     #[default]
     Nothing,
@@ -62,9 +62,14 @@ impl Server {
     ///
     /// # Errors
     /// Fails with the first setting out of range.
-    pub fn kept(scenarios: &[Scenario], first: u8, keepers: Vec<ParameterFile>) -> Result<Self, OutOfRange> {
-        let vehicles = scenarios.iter().zip(first..).zip(keepers);
-        let vehicles = vehicles.map(|((scenario, system), keeper)| ServedVehicle::new(scenario, system, Some(keeper)));
+    pub fn with_parameter_files(
+        scenarios: &[Scenario],
+        first: u8,
+        parameter_files: Vec<ParameterFile>,
+    ) -> Result<Self, OutOfRange> {
+        let vehicles = scenarios.iter().zip(first..).zip(parameter_files);
+        let vehicles = vehicles
+            .map(|((scenario, system), parameter_file)| ServedVehicle::new(scenario, system, Some(parameter_file)));
         Ok(Server { vehicles: vehicles.collect::<Result<_, _>>()?, now_ms: 0, agenda: Vec::new() })
     }
 
@@ -124,8 +129,8 @@ impl Server {
 
     /// Runs one millisecond. Passes to `send` the index of each vehicle and the complete frames that it has sent, and
     /// to `log` lines about events.
-    pub fn step(&mut self, mut send: impl FnMut(usize, &[u8]), mut log: impl FnMut(&str)) -> Then {
-        let then = self.turn_to_agenda(&mut log);
+    pub fn step(&mut self, mut send: impl FnMut(usize, &[u8]), mut log: impl FnMut(&str)) -> ServerAction {
+        let action = self.run_agenda(&mut log);
         let (now_s, mut changed) = (self.now_s(), false);
         for (place, vehicle) in self.vehicles.iter_mut().enumerate() {
             let system = vehicle.system();
@@ -137,89 +142,95 @@ impl Server {
             log(&format!("{now_s:.3} several vehicles have the system id {system}: set MAV_SYS_ID of one of them"));
         }
         self.now_ms += 1;
-        then
+        action
     }
 
     /// Carries out the lines that are due.
-    fn turn_to_agenda(&mut self, log: &mut impl FnMut(&str)) -> Then {
-        let mut then = Then::Nothing;
+    fn run_agenda(&mut self, log: &mut impl FnMut(&str)) -> ServerAction {
+        let mut action = ServerAction::Nothing;
         let due = self.agenda.partition_point(|(at_ms, ..)| *at_ms <= self.now_ms);
         for (_, line, text) in self.agenda.drain(..due).collect::<Vec<_>>() {
             let reply = self.carry_out(&line, &text);
             let now_s = self.now_s();
             reply.lines.iter().for_each(|text| log(&format!("{now_s:.3} {text}")));
-            if reply.then != Then::Nothing {
-                then = reply.then;
+            if reply.action != ServerAction::Nothing {
+                action = reply.action;
             }
         }
-        then
+        action
     }
 
     /// Handles a line of the [text protocol](crate::command); returns its answer.
-    pub fn line(&mut self, text: &str) -> Reply {
+    pub fn line(&mut self, text: &str) -> LineReply {
         if text.len() > LINE_MAX {
-            return Reply::refused(&format!("a line has at most {LINE_MAX} characters"));
+            return LineReply::refused(&format!("a line has at most {LINE_MAX} characters"));
         }
         let line = match parse(text) {
-            Ok(None) => return Reply::default(),
+            Ok(None) => return LineReply::default(),
             Ok(Some(line)) => line,
-            Err(problem) => return Reply::refused(&problem),
+            Err(problem) => return LineReply::refused(&problem),
         };
         if let Some(refused) = self.refused(&line) {
-            return Reply::refused(&refused);
+            return LineReply::refused(&refused);
         }
         let Some(at_s) = line.at_s else { return self.carry_out(&line, text.trim()) };
         let at_ms = (at_s * 1e3).round() as u64;
         let place = self.agenda.partition_point(|(earlier_ms, ..)| *earlier_ms <= at_ms);
         self.agenda.insert(place, (at_ms, line, text.trim().into()));
-        Reply::accepted(text.trim())
+        LineReply::accepted(text.trim())
     }
 
     /// Returns why a line cannot be carried out at any time, if so.
-    fn refused(&self, line: &Line) -> Option<String> {
+    fn refused(&self, line: &ScheduledLine) -> Option<String> {
         let known = |system: u8| self.vehicles.iter().any(|vehicle| vehicle.system() == system);
         match line {
-            Line { vehicle: Some(system), .. } if !known(*system) => {
+            ScheduledLine { vehicle: Some(system), .. } if !known(*system) => {
                 Some(format!("there is no vehicle {system}; they are {}", listed(&self.systems())))
             }
-            Line { at_s: Some(_), command: ServerCommand::Step(_), .. } => Some("step cannot be put off".into()),
-            Line { at_s: Some(_), .. } if self.agenda.len() >= AGENDA_MAX => {
+            ScheduledLine { at_s: Some(_), command: ServerCommand::Step(_), .. } => {
+                Some("step cannot be put off".into())
+            }
+            ScheduledLine { at_s: Some(_), .. } if self.agenda.len() >= AGENDA_MAX => {
                 Some(format!("{AGENDA_MAX} lines wait for their time already; send this one later"))
             }
-            Line { at_s: Some(at_s), .. } if *at_s < self.now_s() => {
+            ScheduledLine { at_s: Some(at_s), .. } if *at_s < self.now_s() => {
                 Some(format!("{at_s} s are over; it is {:.3} s", self.now_s()))
             }
             _ => None,
         }
     }
 
-    fn carry_out(&mut self, line: &Line, text: &str) -> Reply {
+    fn carry_out(&mut self, line: &ScheduledLine, text: &str) -> LineReply {
         match &line.command {
             ServerCommand::WorldChange(change) => match self.apply(line.vehicle, change) {
-                Ok(()) => Reply::accepted(text),
-                Err(problem) => Reply::refused(&problem),
+                Ok(()) => LineReply::accepted(text),
+                Err(problem) => LineReply::refused(&problem),
             },
             ServerCommand::Status => {
                 let wanted = |vehicle: &&ServedVehicle| line.vehicle.is_none_or(|system| vehicle.system() == system);
                 let lines = self.vehicles.iter().filter(wanted).map(ServedVehicle::status);
-                Reply::with(lines.collect(), &format!("{text}, {:.3} s", self.now_s()))
+                LineReply::with(lines.collect(), &format!("{text}, {:.3} s", self.now_s()))
             }
             ServerCommand::Help => {
                 let lines = COMMANDS
                     .iter()
                     .map(|[name, arguments, meaning]| format!("{:<46} {meaning}", format!("{name} {arguments}")));
-                Reply::with(lines.collect(), text)
+                LineReply::with(lines.collect(), text)
             }
-            ServerCommand::Step(steps) => Reply { then: Then::Step(*steps), ..Reply::accepted(text) },
-            ServerCommand::Speed(speed) => Reply { then: Then::Speed(*speed), ..Reply::accepted(text) },
-            ServerCommand::Pause(stands) => Reply { then: Then::Pause(*stands), ..Reply::accepted(text) },
+            ServerCommand::Step(steps) => LineReply { action: ServerAction::Step(*steps), ..LineReply::accepted(text) },
+            ServerCommand::Speed(speed) => {
+                LineReply { action: ServerAction::Speed(*speed), ..LineReply::accepted(text) }
+            }
+            ServerCommand::Pause(paused) => {
+                LineReply { action: ServerAction::Pause(*paused), ..LineReply::accepted(text) }
+            }
             ServerCommand::Law(kind) => {
                 match self.wanted(line.vehicle).try_for_each(|vehicle| vehicle.change_law(*kind)) {
-                    Ok(()) => Reply::accepted(text),
-                    Err(problem) => Reply::refused(&problem),
+                    Ok(()) => LineReply::accepted(text),
+                    Err(problem) => LineReply::refused(&problem),
                 }
             }
-            ServerCommand::Quit => Reply { then: Then::Quit, ..Reply::accepted(text) },
+            ServerCommand::Quit => LineReply { action: ServerAction::Quit, ..LineReply::accepted(text) },
         }
     }
 
@@ -234,17 +245,17 @@ impl Server {
     }
 }
 
-impl Reply {
+impl LineReply {
     fn accepted(what: &str) -> Self {
         Self::with(Vec::new(), what)
     }
 
     fn with(mut lines: Vec<String>, what: &str) -> Self {
         lines.push(format!("ok {what}"));
-        Reply { lines, then: Then::Nothing }
+        LineReply { lines, action: ServerAction::Nothing }
     }
 
     fn refused(problem: &str) -> Self {
-        Reply { lines: vec![format!("error {problem}")], then: Then::Nothing }
+        LineReply { lines: vec![format!("error {problem}")], action: ServerAction::Nothing }
     }
 }

@@ -1,7 +1,7 @@
 //! TCP port of a vehicle.
 
 use crate::frames::frames;
-use crate::peer::{Event, speaks_mavlink};
+use crate::peer::{PeerEvent, speaks_mavlink};
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
@@ -19,15 +19,15 @@ const PART_MAX: usize = 2048;
 const WRITTEN_MAX: usize = 4096;
 
 /// A listener and its connections.
-pub(crate) struct Tcp {
+pub(crate) struct TcpPort {
     listener: TcpListener,
     /// Connections, rotated when a step's bytes are used up, so that each gets its turn.
-    streams: VecDeque<Connection>,
+    streams: VecDeque<TcpConnection>,
     /// True if frames need a signature.
     signed: bool,
 }
 
-struct Connection {
+struct TcpConnection {
     number: u32,
     stream: TcpStream,
     address: SocketAddr,
@@ -40,7 +40,7 @@ struct Connection {
     open: bool,
 }
 
-impl Tcp {
+impl TcpPort {
     /// Opens port `port` of this address.
     ///
     /// # Errors
@@ -48,7 +48,7 @@ impl Tcp {
     pub(crate) fn open(address: IpAddr, port: u16) -> io::Result<Self> {
         let listener = TcpListener::bind((address, port))?;
         listener.set_nonblocking(true)?;
-        Ok(Tcp { listener, streams: VecDeque::new(), signed: false })
+        Ok(TcpPort { listener, streams: VecDeque::new(), signed: false })
     }
 
     pub(crate) fn address(&self) -> io::Result<SocketAddr> {
@@ -56,13 +56,13 @@ impl Tcp {
     }
 
     /// Accepts connections and reads the bytes that have arrived by `now`. If `signed`, frames need a signature.
-    /// `number` returns the number of a new peer. `on` handles events; for [`Event::Sent`] it returns whether the bytes
-    /// complete a valid frame.
+    /// `number` returns the number of a new peer. `on` handles events; for [`PeerEvent::Sent`] it returns whether the
+    /// bytes complete a valid frame.
     pub(crate) fn receive(
         &mut self,
         (now, signed): (Duration, bool),
         number: &mut impl FnMut() -> u32,
-        mut on: impl FnMut(Event<'_>) -> bool,
+        mut on: impl FnMut(PeerEvent<'_>) -> bool,
     ) {
         if signed && !self.signed {
             // A signature is needed from now on, and nobody has sent one yet.
@@ -79,16 +79,16 @@ impl Tcp {
             if self.streams.len() >= STREAMS_MAX
                 && let Some(gone) = self.give_up()
             {
-                on(Event::Gone(gone.address, gone.number));
+                on(PeerEvent::Gone(gone.address, gone.number));
             }
-            self.streams.push_back(Connection::new(number(), stream, address, now));
-            on(Event::New(address));
+            self.streams.push_back(TcpConnection::new(number(), stream, address, now));
+            on(PeerEvent::New(address));
         }
         let mut left = TAKEN_MAX;
         for connection in &mut self.streams {
             connection.receive(now, &mut left, &mut on);
             if !connection.open {
-                on(Event::Gone(connection.address, connection.number));
+                on(PeerEvent::Gone(connection.address, connection.number));
             }
         }
         self.streams.retain(|connection| connection.open);
@@ -98,7 +98,7 @@ impl Tcp {
     }
 
     /// Removes the connection that has been silent for longest; connections without any valid frame go first.
-    fn give_up(&mut self) -> Option<Connection> {
+    fn give_up(&mut self) -> Option<TcpConnection> {
         let streams = self.streams.iter().enumerate();
         let longest = streams.min_by_key(|(_, it)| (it.heard.is_some(), it.heard.unwrap_or(it.since), it.number));
         longest.map(|(place, _)| place).and_then(|place| self.streams.remove(place))
@@ -117,14 +117,14 @@ impl Tcp {
     }
 }
 
-impl Connection {
+impl TcpConnection {
     fn new(number: u32, stream: TcpStream, address: SocketAddr, since: Duration) -> Self {
         let (heard, has_begun, waiting) = (None, false, VecDeque::new());
-        Connection { number, stream, address, since, heard, has_begun, waiting, open: true }
+        TcpConnection { number, stream, address, since, heard, has_begun, waiting, open: true }
     }
 
     /// Reads once, at most `left` bytes.
-    fn receive(&mut self, now: Duration, left: &mut usize, on: &mut impl FnMut(Event<'_>) -> bool) {
+    fn receive(&mut self, now: Duration, left: &mut usize, on: &mut impl FnMut(PeerEvent<'_>) -> bool) {
         let mut buffer = [0; PART_MAX];
         let Some(room) = buffer.get_mut(..PART_MAX.min(*left)).filter(|room| !room.is_empty()) else { return };
         match self.stream.read(room) {
@@ -133,11 +133,11 @@ impl Connection {
                 let bytes = buffer.get(..length).unwrap_or_default();
                 if !self.has_begun && !speaks_mavlink(bytes) {
                     self.open = false;
-                    on(Event::Foreign(self.address));
+                    on(PeerEvent::Foreign(self.address));
                     return;
                 }
                 self.has_begun = true;
-                if on(Event::Sent(self.number, bytes)) {
+                if on(PeerEvent::Sent(self.number, bytes)) {
                     self.heard = Some(now);
                 }
             }

@@ -1,7 +1,7 @@
 //! UDP port of a vehicle.
 
 use crate::frames::frames;
-use crate::peer::{Event, speaks_mavlink};
+use crate::peer::{PeerEvent, speaks_mavlink};
 use std::collections::BTreeMap;
 use std::io;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
@@ -20,23 +20,23 @@ const TAKEN_MAX: usize = 16_384;
 const DATAGRAM_MAX: usize = 1400;
 
 /// A socket, the standing addresses that always get heartbeats, and the peers: clients that have sent a valid frame.
-pub(crate) struct Udp {
+pub(crate) struct UdpPort {
     socket: UdpSocket,
     standing: Vec<SocketAddr>,
-    peers: BTreeMap<SocketAddr, Known>,
+    peers: BTreeMap<SocketAddr, UdpPeer>,
     /// True if frames need a signature.
     signed: bool,
     buffer: Vec<u8>,
 }
 
 /// A peer.
-struct Known {
+struct UdpPeer {
     number: u32,
     /// Time when the peer is forgotten, unless it sends a valid frame before.
     until: Duration,
 }
 
-impl Udp {
+impl UdpPort {
     /// Opens port `port` of this address.
     ///
     /// # Errors
@@ -44,7 +44,7 @@ impl Udp {
     pub(crate) fn open(address: IpAddr, port: u16, standing: Vec<SocketAddr>) -> io::Result<Self> {
         let socket = UdpSocket::bind((address, port))?;
         socket.set_nonblocking(true)?;
-        Ok(Udp { socket, standing, peers: BTreeMap::new(), signed: false, buffer: vec![0; 65_536] })
+        Ok(UdpPort { socket, standing, peers: BTreeMap::new(), signed: false, buffer: vec![0; 65_536] })
     }
 
     pub(crate) fn address(&self) -> io::Result<SocketAddr> {
@@ -52,13 +52,13 @@ impl Udp {
     }
 
     /// Reads the datagrams that have arrived by `now`. If `signed`, frames need a signature. `number` returns the
-    /// number of a new peer. `on` handles events; for [`Event::Sent`] it returns whether the bytes complete a valid
+    /// number of a new peer. `on` handles events; for [`PeerEvent::Sent`] it returns whether the bytes complete a valid
     /// frame.
     pub(crate) fn receive(
         &mut self,
         (now, signed): (Duration, bool),
         number: &mut impl FnMut() -> u32,
-        mut on: impl FnMut(Event<'_>) -> bool,
+        mut on: impl FnMut(PeerEvent<'_>) -> bool,
     ) {
         if signed && !self.signed {
             // Peers that do not sign are no longer heard, and soon get no telemetry.
@@ -83,7 +83,7 @@ impl Udp {
         self.peers.retain(|address, known| {
             let here = now <= known.until;
             if !here {
-                on(Event::Gone(*address, known.number));
+                on(PeerEvent::Gone(*address, known.number));
             }
             here
         });
@@ -96,10 +96,10 @@ impl Udp {
         (from, bytes): (SocketAddr, &[u8]),
         now: Duration,
         number: &mut impl FnMut() -> u32,
-        on: &mut impl FnMut(Event<'_>) -> bool,
+        on: &mut impl FnMut(PeerEvent<'_>) -> bool,
     ) {
         if let Some(known) = self.peers.get_mut(&from) {
-            if on(Event::Sent(known.number, bytes)) {
+            if on(PeerEvent::Sent(known.number, bytes)) {
                 known.until = now + SILENCE_MAX;
             }
             return;
@@ -108,18 +108,18 @@ impl Udp {
             return;
         }
         let number = number();
-        if !on(Event::Sent(number, bytes)) {
-            on(Event::Nobody(number));
+        if !on(PeerEvent::Sent(number, bytes)) {
+            on(PeerEvent::Nobody(number));
             return;
         }
         let longest = self.peers.iter().min_by_key(|(_, known)| known.until).map(|(address, _)| *address);
         if self.peers.len() >= PEERS_MAX
             && let Some((address, known)) = longest.and_then(|address| self.peers.remove_entry(&address))
         {
-            on(Event::Gone(address, known.number));
+            on(PeerEvent::Gone(address, known.number));
         }
-        self.peers.insert(from, Known { number, until: now + SILENCE_MAX });
-        on(Event::New(from));
+        self.peers.insert(from, UdpPeer { number, until: now + SILENCE_MAX });
+        on(PeerEvent::New(from));
     }
 
     /// Sends complete frames: all frames to the peers, and heartbeats to the standing addresses. A datagram holds as

@@ -3,7 +3,7 @@
 use crate::ParameterFile;
 use crate::command::WorldChange;
 use crate::frames::frames;
-use crate::hand::Hand;
+use crate::handheld::HandheldMotion;
 use crate::reported_sensors::ReportedSensors;
 use crate::world_changes::WorldChanges;
 use afbc::Profile;
@@ -40,7 +40,7 @@ pub struct ServedVehicle {
     world: World,
     changes: WorldChanges,
     /// Hand that holds the vehicle, if any.
-    hand: Option<Hand>,
+    handheld: Option<HandheldMotion>,
     /// One decoder per peer, so that bytes of different peers never mix into one frame.
     peers: BTreeMap<u32, Decoder<Uplink>>,
     /// True if new peers count as wired to the vehicle.
@@ -52,7 +52,7 @@ pub struct ServedVehicle {
     law: ControllerKind,
     reported: ReportedSensors,
     scenario: Scenario,
-    keeper: Option<ParameterFile>,
+    parameter_file: Option<ParameterFile>,
     exact_log: Option<LogFile>,
     black_box: Option<UlogFiles>,
     /// Lines about the stored parameters and restarts, to be logged in the next step.
@@ -60,15 +60,15 @@ pub struct ServedVehicle {
 }
 
 impl ServedVehicle {
-    /// Creates and powers up the vehicle of `scenario` at its start. Its parameters are stored in `keeper`, if there is
-    /// one. Its system id is `system`, unless the parameter MAV_SYS_ID says otherwise.
+    /// Creates and powers up the vehicle of `scenario` at its start. Its parameters are stored in `parameter_file`, if
+    /// there is one. Its system id is `system`, unless the parameter MAV_SYS_ID says otherwise.
     ///
     /// # Errors
     /// Fails with the first setting out of range.
-    pub fn new(scenario: &Scenario, system: u8, mut keeper: Option<ParameterFile>) -> Result<Self, OutOfRange> {
+    pub fn new(scenario: &Scenario, system: u8, mut parameter_file: Option<ParameterFile>) -> Result<Self, OutOfRange> {
         let link = Link { system: system.into(), ..Link::DEFAULT };
         let mut notices = Vec::new();
-        let mut host = power_up(scenario, link, keeper.as_mut(), &mut notices)?;
+        let mut host = power_up(scenario, link, parameter_file.as_mut(), &mut notices)?;
         host.serve_files(place(scenario), None);
         Ok(ServedVehicle {
             link,
@@ -76,7 +76,7 @@ impl ServedVehicle {
             host,
             world: World::released(scenario, STEP_S)?,
             changes: WorldChanges::new(scenario),
-            hand: None,
+            handheld: None,
             peers: BTreeMap::new(),
             wired: false,
             mode: Mode::Disarmed,
@@ -84,7 +84,7 @@ impl ServedVehicle {
             law: ControllerKind::Afbc,
             reported: ReportedSensors::new(scenario),
             scenario: scenario.clone(),
-            keeper,
+            parameter_file,
             exact_log: None,
             black_box: None,
             notices,
@@ -163,7 +163,7 @@ impl ServedVehicle {
     /// Runs one millisecond; returns the complete frames that the vehicle has sent. Passes lines about events to `log`.
     pub fn step(&mut self, mut log: impl FnMut(&str)) -> Vec<u8> {
         self.notices.drain(..).for_each(|notice| log(&notice));
-        match &self.hand {
+        match &self.handheld {
             Some(_) => self.world.look_held(),
             None => drop(self.world.look()),
         }
@@ -171,7 +171,7 @@ impl ServedVehicle {
             self.host.sense(readings);
         }
         let readings = self.world.readings().copied().unwrap_or_default();
-        let aux = self.reported.look(&self.world, &readings);
+        let aux = self.reported.observe(&self.world, &readings);
         self.host.comms().set_aux_sensors(aux);
         if self.host.comms().wants_self_tests() {
             self.test_sensors(&aux, &readings);
@@ -187,11 +187,11 @@ impl ServedVehicle {
         self.mode = report.mode;
         self.report = Some(report);
         frames(&bytes).filter_map(|frame| frame.text()).for_each(|text| log(&text));
-        if let Some(keeper) = &mut self.keeper {
-            let change = change.map_or(Ok(()), |change| keeper.keep(change));
-            let signing = signing.map_or(Ok(()), |record| keeper.keep_signing(record));
+        if let Some(parameter_file) = &mut self.parameter_file {
+            let change = change.map_or(Ok(()), |change| parameter_file.store_change(change));
+            let signing = signing.map_or(Ok(()), |record| parameter_file.store_signing(record));
             // Both writes have been attempted by now: if one fails, the other is still done.
-            let later = keeper.take_failure().map_or(Ok(()), Err);
+            let later = parameter_file.take_failure().map_or(Ok(()), Err);
             if let Err(error) = change.and(signing).and(later) {
                 // The warning is sent as a status text, and thereby logged, too.
                 self.host.comms().warn(error.reason());
@@ -229,7 +229,7 @@ impl ServedVehicle {
     /// Restarts the firmware; the world goes on.
     fn restart(&mut self) {
         self.notices.push("restarted".into());
-        let host = power_up(&self.scenario, self.link, self.keeper.as_mut(), &mut self.notices);
+        let host = power_up(&self.scenario, self.link, self.parameter_file.as_mut(), &mut self.notices);
         match host {
             Ok(host) => {
                 self.address = address(&host);
@@ -252,12 +252,12 @@ impl ServedVehicle {
 
     /// Moves the vehicle to where the hand holds it.
     fn hold(&mut self) {
-        let Some(hand) = &self.hand else { return };
+        let Some(handheld) = &self.handheld else { return };
         let plant = self.world.plant_mut();
         let now_s = plant.time_s();
-        plant.set_motion(&hand.motion(now_s));
-        if hand.has_left(now_s) {
-            self.hand = None;
+        plant.set_motion(&handheld.motion(now_s));
+        if handheld.is_released(now_s) {
+            self.handheld = None;
         }
     }
 
@@ -272,7 +272,7 @@ impl ServedVehicle {
             }
             let plant = self.world.plant();
             let now_s = plant.time_s();
-            self.hand.get_or_insert_with(|| Hand::new(&plant.motion(), now_s)).take(*grip, now_s);
+            self.handheld.get_or_insert_with(|| HandheldMotion::new(&plant.motion(), now_s)).take(*grip, now_s);
         }
         self.changes.apply(change, &mut self.world)
     }
@@ -370,11 +370,11 @@ impl ServedVehicle {
 fn power_up(
     scenario: &Scenario,
     link: Link,
-    keeper: Option<&mut ParameterFile>,
+    parameter_file: Option<&mut ParameterFile>,
     notices: &mut Vec<String>,
 ) -> Result<Host, OutOfRange> {
-    let host = match keeper {
-        Some(keeper) => keeper.power_up(scenario, link, |notice| notices.push(notice.into()))?,
+    let host = match parameter_file {
+        Some(parameter_file) => parameter_file.power_up(scenario, link, |notice| notices.push(notice.into()))?,
         None => Host::linked(scenario.vehicle_file.as_ref(), link)?,
     };
     let setup = Setup { bytes_per_s: BYTES_PER_S, reboots: &[Reboot::Program], ..host.setup() };

@@ -4,7 +4,7 @@
 //! frame, command, four parameters, latitude or x, longitude or y, altitude or z, autocontinue. In version 110 the
 //! first line is the home position if it is a waypoint; version 120 has no home.
 
-use afbc_files::read::{FileError, Source};
+use afbc_files::read::{FileError, SourceFile};
 use afbc_mavlink::MissionItem;
 
 /// Beginning of every file, before the version.
@@ -22,14 +22,14 @@ pub fn is_waypoint_file(bytes: &[u8]) -> bool {
 }
 
 /// Home: latitude and longitude \[deg\], and the altitude above the sea \[m\] if known.
-pub(crate) type Home = ([f64; 2], Option<f64>);
+pub(crate) type PlannedHome = ([f64; 2], Option<f64>);
 
 /// Reads the mission and, if known, its home from the `text` of `file`.
 ///
 /// # Errors
 /// Fails with one line that names the file, the line, the problem and the remedy.
-pub(crate) fn read(file: &str, text: &str) -> Result<(Vec<MissionItem>, Option<Home>), FileError> {
-    let source = Source { file, text };
+pub(crate) fn read(file: &str, text: &str) -> Result<(Vec<MissionItem>, Option<PlannedHome>), FileError> {
+    let source = SourceFile { file, text };
     let head = text.lines().next().unwrap_or_default();
     let version = head.trim_start_matches('\u{feff}').strip_prefix(MAGIC).unwrap_or_default().trim();
     if version != "110" && version != "120" {

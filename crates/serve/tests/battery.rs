@@ -25,7 +25,7 @@ const FAR: [f32; 3] = [200.0, 0.0, 10.0];
 
 /// State in one step.
 #[derive(Clone, Copy, Debug)]
-struct Moment {
+struct BatterySample {
     charge: f64,
     place_m: Vector3<f64>,
 }
@@ -43,7 +43,7 @@ fn an_empty_battery_warns_returns_and_lands() {
     let go = VehicleCommand::Reposition { place, yaw_rad: f32::NAN, speed_m_s: Some(10.0), changes_mode: true };
 
     // Collect every change of mode with its state, and every line about the battery.
-    let (mut modes, mut lines) = (Vec::<(u32, Moment)>::new(), Vec::<(String, Moment)>::new());
+    let (mut modes, mut lines) = (Vec::<(u32, BatterySample)>::new(), Vec::<(String, BatterySample)>::new());
     let mut has_landed = false;
     for ms in 0..END {
         let message = match ms {
@@ -58,11 +58,11 @@ fn an_empty_battery_warns_returns_and_lands() {
         }
         let plant = server.vehicles().first().unwrap().world().plant();
         let charge = plant.telemetry().unwrap().battery.unwrap().charge;
-        let moment = Moment { charge, place_m: plant.motion().position_m };
+        let sample = BatterySample { charge, place_m: plant.motion().position_m };
         let hear = |_, bytes: &[u8]| {
             decoder.feed(bytes, |_, message| match message {
                 Downlink::Heartbeat { mode, armed: true, .. } if modes.last().is_none_or(|last| last.0 != mode) => {
-                    modes.push((mode, moment));
+                    modes.push((mode, sample));
                 }
                 _ => {}
             });
@@ -70,7 +70,7 @@ fn an_empty_battery_warns_returns_and_lands() {
         let log = |line: &str| {
             has_landed |= line.ends_with("disarmed");
             if line.contains("battery") {
-                lines.push((line.to_owned(), moment));
+                lines.push((line.to_owned(), sample));
             }
         };
         let _ = server.step(hear, log);
@@ -80,7 +80,7 @@ fn an_empty_battery_warns_returns_and_lands() {
     }
     assert!(has_landed, "{modes:?} {lines:?}");
 
-    let told = |what: &str| lines.iter().find(|(line, _)| line.contains(what)).map(|(_, moment)| *moment).unwrap();
+    let told = |what: &str| lines.iter().find(|(line, _)| line.contains(what)).map(|(_, sample)| *sample).unwrap();
     // The simulated battery monitor reports whole percents, rounded down.
     for (what, threshold) in [("battery low", 0.15), ("battery critical", 0.07), ("battery almost empty", 0.05)] {
         let charge = told(what).charge;
@@ -88,17 +88,18 @@ fn an_empty_battery_warns_returns_and_lands() {
     }
     let [returns, lands] = [FlightMode::Return, FlightMode::Land].map(|mode| {
         let first = modes.iter().find(|(told, _)| *told == custom(mode));
-        first.map(|(_, moment)| *moment).unwrap_or_else(|| panic!("{modes:?}"))
+        first.map(|(_, sample)| *sample).unwrap_or_else(|| panic!("{modes:?}"))
     });
     // Heartbeats report the mode once per second.
-    for (moment, cause) in [(returns, "battery critical"), (lands, "battery almost empty")] {
-        assert!(moment.charge <= told(cause).charge && told(cause).charge - moment.charge < 0.01, "{modes:?}");
+    for (sample, cause) in [(returns, "battery critical"), (lands, "battery almost empty")] {
+        assert!(sample.charge <= told(cause).charge && told(cause).charge - sample.charge < 0.01, "{modes:?}");
     }
     // A low battery only warns. The vehicle returned a good part of the way, landed in place, and had charge left.
-    assert_eq!(modes.iter().filter(|(_, moment)| (0.07..0.15).contains(&moment.charge)).count(), 0, "{modes:?}");
-    let from_home = |moment: &Moment| moment.place_m.xy().norm();
+    assert_eq!(modes.iter().filter(|(_, sample)| (0.07..0.15).contains(&sample.charge)).count(), 0, "{modes:?}");
+    let from_home = |sample: &BatterySample| sample.place_m.xy().norm();
     let end = server.vehicles().first().unwrap().world().plant();
-    let landed = Moment { charge: end.telemetry().unwrap().battery.unwrap().charge, place_m: end.motion().position_m };
+    let landed =
+        BatterySample { charge: end.telemetry().unwrap().battery.unwrap().charge, place_m: end.motion().position_m };
     assert!(from_home(&lands) < from_home(&returns) - 20.0 && from_home(&lands) > 20.0, "{returns:?} {lands:?}");
     assert!((landed.place_m - lands.place_m).xy().norm() < 10.0, "{lands:?} {landed:?}");
     assert!(landed.charge > 0.0 && landed.place_m.z < 0.3, "{landed:?}");

@@ -25,7 +25,7 @@ fn fresh(test: &str) -> PathBuf {
 fn served(file: &Path) -> Server {
     let scenarios = fleet(&built_in("outdoor").unwrap().read().unwrap(), 1).unwrap();
     let keeper = ParameterFile::open(file, scenarios.first().unwrap()).unwrap();
-    Server::kept(&scenarios, 1, vec![keeper]).unwrap()
+    Server::with_parameter_files(&scenarios, 1, vec![keeper]).unwrap()
 }
 
 /// Sends a message; returns the messages and lines of the next tenth of a second.
@@ -147,14 +147,14 @@ fn the_system_id_is_a_parameter() {
     let scenarios = fleet(&built_in("outdoor").unwrap().read().unwrap(), 3).unwrap();
     let files = ["system1", "system2", "system3"].map(fresh);
     let keepers = || files.iter().zip(&scenarios).map(|(file, it)| ParameterFile::open(file, it).unwrap()).collect();
-    let mut server = Server::kept(&scenarios, 5, keepers()).unwrap();
+    let mut server = Server::with_parameter_files(&scenarios, 5, keepers()).unwrap();
     assert_eq!((server.systems(), server.ambiguous()), (vec![5, 6, 7], None));
     set(&mut server, "MAV_SYS_ID", 7.0);
     let (_, lines) = exchange(&mut server, Uplink::Command(VehicleCommand::Reboot(Reboot::Program)));
     assert!(lines.iter().any(|line| line.contains("several vehicles have the system id 7")), "{lines:?}");
     assert_eq!((server.systems(), server.ambiguous()), (vec![7, 6, 7], Some(7)));
     drop(server);
-    assert_eq!(Server::kept(&scenarios, 5, keepers()).unwrap().systems(), [7, 6, 7]);
+    assert_eq!(Server::with_parameter_files(&scenarios, 5, keepers()).unwrap().systems(), [7, 6, 7]);
 }
 
 /// Returns the number of messages in a tenth of a second, and how many of them are signed with this key.

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_scenario::built_in;
-use afbc_serve::{LineOutput, Lines, Ports, RunEnd, Server, TimeRate, fleet, run};
+use afbc_serve::{InputLines, Interfaces, LineOutput, Ports, RunEnd, Server, TimeRate, fleet, run};
 use std::io::{self, Cursor, Write};
 use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -68,18 +68,25 @@ fn a_flight_waits_for_no_reader() {
     let addresses = afbc_serve::Addresses { udp: 0, stations: vec![], companions: vec![], ..Default::default() };
     let mut ports = Ports::open(&addresses, 1).unwrap();
     for line in 0..1000 {
-        assert_eq!(server.line(&format!("at {} help", f64::from(line) * 2e-3)).then, afbc_serve::Then::Nothing);
+        assert_eq!(
+            server.line(&format!("at {} help", f64::from(line) * 2e-3)).action,
+            afbc_serve::ServerAction::Nothing
+        );
     }
     let refused = server.line("at 2.5 quit").lines.concat();
     assert!(refused.contains("1000 lines wait for their time already"), "{refused}");
     let (reader, begin) = Reader::new();
     let mut output = LineOutput::to(reader.clone()).unwrap();
     let text: String = (0..2000).map(|_| "status\nhelp\n").chain(["quit\n"]).collect();
-    let mut lines = Lines::of(Cursor::new(text));
-    let end =
-        run(&mut server, (&mut ports, &mut ()), TimeRate::Times(0.0), &mut lines, &AtomicBool::new(false), |line| {
-            output.line(line)
-        });
+    let mut lines = InputLines::of(Cursor::new(text));
+    let end = run(
+        &mut server,
+        Interfaces { ports: &mut ports, hook: &mut () },
+        TimeRate::Times(0.0),
+        &mut lines,
+        &AtomicBool::new(false),
+        |line| output.line(line),
+    );
     assert_eq!(end, RunEnd::Quit);
     drop(begin);
     output.finish();
@@ -95,12 +102,16 @@ fn endless_lines_do_not_stop_time() {
     server.line("at 1 quit");
     let long = format!("{}wind 1 0 0", " ".repeat(600));
     let text = format!("{long}\nwind 2 0 0 # {}\nwind 3 0 0\r\n", "x".repeat(100_000));
-    let mut lines = Lines::of(io::BufReader::new(io::Read::chain(Cursor::new(text), Endless)));
+    let mut lines = InputLines::of(io::BufReader::new(io::Read::chain(Cursor::new(text), Endless)));
     let mut said = Vec::new();
-    let end =
-        run(&mut server, (&mut ports, &mut ()), TimeRate::Times(0.0), &mut lines, &AtomicBool::new(false), |line| {
-            said.push(line.to_owned())
-        });
+    let end = run(
+        &mut server,
+        Interfaces { ports: &mut ports, hook: &mut () },
+        TimeRate::Times(0.0),
+        &mut lines,
+        &AtomicBool::new(false),
+        |line| said.push(line.to_owned()),
+    );
     assert_eq!(end, RunEnd::Quit);
     let too_long = "error a line has at most 512 characters";
     assert_eq!(said[..3], [too_long, too_long, "ok wind 3 0 0"]);

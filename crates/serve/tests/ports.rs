@@ -3,7 +3,7 @@
 
 use afbc_mavlink::{Address, Decoder, Downlink, Encoder, FRAME_MAX, Uplink, VehicleCommand};
 use afbc_scenario::built_in;
-use afbc_serve::{Addresses, Lines, Ports, RunEnd, Server, TimeRate, fleet, run};
+use afbc_serve::{Addresses, InputLines, Interfaces, Ports, RunEnd, Server, TimeRate, fleet, run};
 use std::io::{Cursor, ErrorKind, Read, Write};
 use std::net::{TcpStream, UdpSocket};
 use std::sync::atomic::AtomicBool;
@@ -179,10 +179,15 @@ fn in_lockstep_lines_drive_the_clock() {
     let session = |text: &'static str| {
         let (mut server, mut ports) = (served(1), Ports::open(&free(), 1).unwrap());
         let mut reported = Vec::new();
-        let (mut lines, stop) = (Lines::of(Cursor::new(text)), AtomicBool::new(false));
-        let end = run(&mut server, (&mut ports, &mut ()), TimeRate::Lockstep, &mut lines, &stop, |line| {
-            reported.push(line.to_owned())
-        });
+        let (mut lines, stop) = (InputLines::of(Cursor::new(text)), AtomicBool::new(false));
+        let end = run(
+            &mut server,
+            Interfaces { ports: &mut ports, hook: &mut () },
+            TimeRate::Lockstep,
+            &mut lines,
+            &stop,
+            |line| reported.push(line.to_owned()),
+        );
         (end, server.now_s(), reported)
     };
     let (end, now_s, reported) = session("step 250\nspeed 2\nwind 1 0 0\nstep 50\nnonsense");
@@ -204,15 +209,27 @@ fn in_lockstep_lines_drive_the_clock() {
 fn as_fast_as_possible_it_ends_when_asked_to() {
     let (mut server, mut ports) = (served(1), Ports::open(&free(), 1).unwrap());
     assert_eq!(server.line("at 30 quit").lines, ["ok at 30 quit"]);
-    let (mut lines, stop) = (Lines::of(Cursor::new("step 5")), AtomicBool::new(false));
+    let (mut lines, stop) = (InputLines::of(Cursor::new("step 5")), AtomicBool::new(false));
     let mut reported = Vec::new();
-    let end = run(&mut server, (&mut ports, &mut ()), TimeRate::Times(0.0), &mut lines, &stop, |line| {
-        reported.push(line.to_owned())
-    });
+    let end = run(
+        &mut server,
+        Interfaces { ports: &mut ports, hook: &mut () },
+        TimeRate::Times(0.0),
+        &mut lines,
+        &stop,
+        |line| reported.push(line.to_owned()),
+    );
     assert_eq!(end, RunEnd::Quit);
     assert!((server.now_s() - 30.001).abs() < 1e-9);
     assert!(reported.contains(&"error step: time goes on by itself; start with --lockstep".into()), "{reported:?}");
     stop.store(true, std::sync::atomic::Ordering::Relaxed);
-    let end = run(&mut server, (&mut ports, &mut ()), TimeRate::Lockstep, &mut lines, &stop, |_| ());
+    let end = run(
+        &mut server,
+        Interfaces { ports: &mut ports, hook: &mut () },
+        TimeRate::Lockstep,
+        &mut lines,
+        &stop,
+        |_| (),
+    );
     assert_eq!(end, RunEnd::Stopped);
 }

@@ -4,7 +4,7 @@
 use afbc_mavlink::{Address, Decoder, Downlink, Encoder, FRAME_MAX, Uplink, VehicleCommand};
 use afbc_plant::InstrumentSuite;
 use afbc_scenario::{Scenario, built_in};
-use afbc_serve::{Server, Then, fleet};
+use afbc_serve::{Server, ServerAction, fleet};
 
 /// A command that no vehicle knows; it is answered, too.
 const UNKNOWN: u16 = 31_999;
@@ -206,11 +206,11 @@ fn lines_with_a_time_are_carried_out_then_and_in_order() {
     let mut ends = Vec::new();
     for step in 0..500 {
         match server.step(|_, _| (), |line| reported.push(line.to_owned())) {
-            Then::Nothing => {}
-            then => ends.push((step, then)),
+            ServerAction::Nothing => {}
+            action => ends.push((step, action)),
         }
     }
-    assert_eq!(ends, [(200, Then::Quit), (400, Then::Speed(3.0))]);
+    assert_eq!(ends, [(200, ServerAction::Quit), (400, ServerAction::Speed(3.0))]);
     let wanted = [
         "0.100 ok at 0.1 battery 0.1",
         "0.200 ok at 0.2 quit",
@@ -263,7 +263,7 @@ fn bad_lines_are_refused_in_one_line() {
     let before = status(&mut server);
     for (line, wanted) in lines {
         let reply = server.line(line);
-        assert_eq!((reply.lines, reply.then), (vec![format!("error {wanted}")], Then::Nothing), "{line}");
+        assert_eq!((reply.lines, reply.action), (vec![format!("error {wanted}")], ServerAction::Nothing), "{line}");
     }
     let long = server.line(&"x".repeat(100_000)).lines;
     assert!(long.len() == 1 && long[0].len() < 200);

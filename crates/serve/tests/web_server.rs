@@ -3,8 +3,8 @@
 
 use afbc_plant::EffectsState;
 use afbc_scenario::built_in;
-use afbc_serve::web::{Admission, CONNECTIONS_MAX, PAGES_MAX, Token, WebDoor};
-use afbc_serve::{Door, Server, TimeFlow, TimeRate, fleet};
+use afbc_serve::web::{Admission, CONNECTIONS_MAX, PAGES_MAX, Token, WebServer};
+use afbc_serve::{Server, ServerHook, TimeFlow, TimeRate, fleet};
 use std::io::{Read, Write};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
@@ -16,10 +16,10 @@ const KEY: &str = "Upgrade: websocket\r\nConnection: keep-alive, Upgrade\r\nSec-
 
 struct Flight {
     server: Server,
-    door: WebDoor,
+    web: WebServer,
     began: Instant,
     lines: Vec<String>,
-    /// Longest duration of one call of the door.
+    /// Longest duration of one call of the web server.
     longest: Duration,
 }
 
@@ -29,19 +29,19 @@ impl Flight {
         let server = Server::new(&fleet(&scenario, 1).unwrap(), 1).unwrap();
         let token = token.map(|token| Token::chosen(token).unwrap());
         let admission = Admission { loopback: token.is_none(), token };
-        let door = WebDoor::open(SocketAddr::from((Ipv4Addr::LOCALHOST, 0)), admission).unwrap();
-        Flight { server, door, began: Instant::now(), lines: Vec::new(), longest: Duration::ZERO }
+        let web = WebServer::open(SocketAddr::from((Ipv4Addr::LOCALHOST, 0)), admission).unwrap();
+        Flight { server, web, began: Instant::now(), lines: Vec::new(), longest: Duration::ZERO }
     }
 
     /// Flies for this many milliseconds of real time.
     fn fly(&mut self, milliseconds: u64) {
         let end = Instant::now() + Duration::from_millis(milliseconds);
         while Instant::now() < end {
-            let Flight { server, door, lines, .. } = self;
-            let turn = Instant::now();
-            let _ = door.turn(server, FLOW, self.began.elapsed(), &mut |line| lines.push(line.to_owned()));
-            self.longest = self.longest.max(turn.elapsed());
-            let _ = self.server.step(|vehicle, bytes| self.door.sent(vehicle, bytes), |_| ());
+            let Flight { server, web, lines, .. } = self;
+            let update = Instant::now();
+            let _ = web.update(server, FLOW, self.began.elapsed(), &mut |line| lines.push(line.to_owned()));
+            self.longest = self.longest.max(update.elapsed());
+            let _ = self.server.step(|vehicle, bytes| self.web.sent(vehicle, bytes), |_| ());
             std::thread::sleep(Duration::from_micros(500));
         }
     }
@@ -60,7 +60,7 @@ impl Flight {
     }
 
     fn connect(&self) -> TcpStream {
-        let stream = TcpStream::connect(self.door.address()).unwrap();
+        let stream = TcpStream::connect(self.web.address()).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(8))).unwrap();
         stream
     }
@@ -81,13 +81,13 @@ impl Flight {
     }
 
     fn get(&mut self, target: &str, lines: &str) -> String {
-        let host = self.door.address();
+        let host = self.web.address();
         self.ask(&format!("GET {target} HTTP/1.1\r\nHost: {host}\r\n{lines}\r\n"))
     }
 
     /// Opens a WebSocket; returns it after the server has accepted it.
     fn socket(&mut self, query: &str) -> TcpStream {
-        let (mut stream, host) = (self.connect(), self.door.address());
+        let (mut stream, host) = (self.connect(), self.web.address());
         write!(stream, "GET /socket{query} HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\n{KEY}\r\n").unwrap();
         let connected = |flight: &Self| flight.lines.iter().filter(|line| line.ends_with("connected")).count();
         let before = connected(self);
@@ -131,7 +131,7 @@ fn the_page_and_its_files_are_served() {
     for (target, expected) in [("/../Cargo.toml", "404"), ("/nothing", "404"), ("/socket", "426")] {
         assert_eq!(status(&flight.get(target, "")), expected, "{target}");
     }
-    let host = flight.door.address();
+    let host = flight.web.address();
     assert_eq!(status(&flight.ask(&format!("POST / HTTP/1.1\r\nHost: {host}\r\n\r\n"))), "405");
 }
 
@@ -139,7 +139,7 @@ fn the_page_and_its_files_are_served() {
 #[test]
 fn pages_of_other_sites_get_nothing() {
     let mut flight = Flight::new(None);
-    let port = flight.door.address().port();
+    let port = flight.web.address().port();
     for (host, expected) in [
         (format!("127.0.0.1:{port}"), "200"),
         (format!("localhost:{port}"), "200"),
@@ -153,7 +153,7 @@ fn pages_of_other_sites_get_nothing() {
     ] {
         assert_eq!(status(&flight.ask(&format!("GET / HTTP/1.1\r\nHost: {host}\r\n\r\n"))), expected, "{host}");
     }
-    let host = flight.door.address();
+    let host = flight.web.address();
     for origin in ["http://evil.example", "null", "http://127.0.0.1:1", "https://localhost"] {
         let answer = flight.get("/socket", &format!("Origin: {origin}\r\n{KEY}"));
         assert_eq!(status(&answer), "403", "{origin}");
@@ -174,7 +174,7 @@ fn other_addresses_need_the_token() {
     assert!(drawn.iter().all(|token| token.len() == 36 && drawn.iter().filter(|it| *it == token).count() == 1));
 
     let mut flight = Flight::new(Some(TOKEN));
-    assert!(flight.door.url().ends_with(&format!("/?token={TOKEN}")));
+    assert!(flight.web.url().ends_with(&format!("/?token={TOKEN}")));
     let refused = flight.get("/", "");
     assert_eq!(status(&refused), "401");
     assert!(refused.ends_with("with ?token= and what follows\n"), "{refused}");
@@ -247,7 +247,7 @@ fn hostile_clients_cost_the_flight_nothing() {
     many.iter().for_each(|stream| stream.set_nonblocking(true).unwrap());
     flight.fly_until("their end", |_| many.iter().filter(|it| is_closed(it)).count() >= many.len() - CONNECTIONS_MAX);
     drop(many);
-    // The limit also holds in debug builds and on busy machines; it shows that the door never waits.
+    // The limit also holds in debug builds and on busy machines; it shows that the web server never waits.
     assert!(flight.longest < Duration::from_millis(250), "{:?}", flight.longest);
     drop(held);
     let _ = good.write_all(&frame(1, br#"{"do":"line","text":"battery 0.5"}"#));
@@ -260,7 +260,7 @@ fn hostile_clients_cost_the_flight_nothing() {
 #[test]
 fn slow_strangers_keep_no_holder_out() {
     let mut flight = Flight::new(Some(TOKEN));
-    let host = flight.door.address();
+    let host = flight.web.address();
     let page = flight.get(&format!("/?token={TOKEN}"), "");
     let files: Vec<String> = page.split('"').filter(|it| it.ends_with(".js")).map(str::to_owned).collect();
     assert!(!files.is_empty());

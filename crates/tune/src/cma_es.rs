@@ -12,8 +12,8 @@ use libm::{exp, log, sqrt};
 
 /// A search for the minimum of a function of several numbers.
 #[derive(Clone, Debug)]
-pub(super) struct Search {
-    coordinates: Vec<Coordinate>,
+pub(super) struct CmaEs {
+    coordinates: Vec<SearchCoordinate>,
     /// Step size sigma.
     step: f64,
     generation: u32,
@@ -22,7 +22,7 @@ pub(super) struct Search {
 
 /// State of the search along one coordinate.
 #[derive(Clone, Copy, Debug)]
-struct Coordinate {
+struct SearchCoordinate {
     mean: f64,
     /// Diagonal element of the covariance matrix C.
     variance: f64,
@@ -32,12 +32,12 @@ struct Coordinate {
     path: f64,
 }
 
-impl Search {
+impl CmaEs {
     /// Starts a search at `start` with the initial step size `step` in every coordinate.
     pub(super) fn new(start: &[f64], step: f64, seed: u64) -> Self {
-        let at = |&mean: &f64| Coordinate { mean, variance: 1.0, step_path: 0.0, path: 0.0 };
+        let at = |&mean: &f64| SearchCoordinate { mean, variance: 1.0, step_path: 0.0, path: 0.0 };
         let noise = Noise::new(seed, NoiseStream::Scenario);
-        Search { coordinates: start.iter().map(at).collect(), step, generation: 0, noise }
+        CmaEs { coordinates: start.iter().map(at).collect(), step, generation: 0, noise }
     }
 
     /// Returns the mean of the search.
@@ -53,7 +53,7 @@ impl Search {
     /// Draws the points of the next generation.
     pub(super) fn ask(&mut self) -> Vec<Vec<f64>> {
         let population = self.population();
-        let Search { coordinates, step, noise, .. } = self;
+        let CmaEs { coordinates, step, noise, .. } = self;
         let point = |_| coordinates.iter().map(|c| c.mean + *step * sqrt(c.variance) * noise.normal()).collect();
         (0..population).map(point).collect()
     }
@@ -117,7 +117,7 @@ mod tests {
 
     /// Returns `f` at the mean of a search that starts at all ones and takes `evaluations`.
     fn minimum(f: impl Fn(&[f64]) -> f64, n: usize, evaluations: usize) -> f64 {
-        let mut search = Search::new(&vec![1.0; n], 0.5, 1);
+        let mut search = CmaEs::new(&vec![1.0; n], 0.5, 1);
         for _ in 0..evaluations / search.population() {
             let mut points = search.ask();
             points.sort_by(|a, b| f(a).total_cmp(&f(b)));

@@ -1,9 +1,9 @@
 //! Flights that gains must survive whatever their cost. They show weaknesses that the training flights do not, since
 //! those fly the vehicle that the law knows.
 
+use crate::builder::{self, FlightBuilder, TrainingFlight};
 use crate::fast;
-use crate::maker::{self, Maker, TrainingFlight};
-use crate::scale::Scale;
+use crate::scale::VehicleScale;
 use afbc::Profile;
 use afbc_plant::noise::{Noise, NoiseStream};
 use afbc_plant::{Drag, Environment, PlantParameter, PlantParameterChange, Sensing, Turbulence};
@@ -88,11 +88,11 @@ pub fn conditions() -> Result<Vec<Condition>, Box<dyn Error>> {
 /// # Errors
 /// The first number out of range, if the vehicle cannot fly such a flight.
 pub fn conditions_on(vehicle: &Vehicle) -> Result<Vec<Condition>, Box<dyn Error>> {
-    if maker::is_paper(vehicle) {
+    if builder::is_paper(vehicle) {
         return conditions();
     }
-    let maker = Maker::new(Some(vehicle));
-    let Scale { length, time, wind, .. } = maker.scale;
+    let builder = FlightBuilder::new(Some(vehicle));
+    let VehicleScale { length, time, wind, .. } = builder.scale;
     let condition = |scenario, end_m| Condition {
         scenario,
         rmse: Vector4::from(IN_CONTROL) * length.max(1.0),
@@ -101,16 +101,16 @@ pub fn conditions_on(vehicle: &Vehicle) -> Result<Vec<Condition>, Box<dyn Error>
         of_afbc: false,
         by_rule: false,
     };
-    let built = |name| maker::read(name)?.on(vehicle, Profile::Flight);
+    let built = |name| builder::read(name)?.on(vehicle, Profile::Flight);
     let mut breeze = built("wind")?;
     let air = &mut breeze.realism.wind;
     air.steady_m_s *= wind;
     air.gusts.iter_mut().for_each(|gust| gust.velocity_m_s *= wind);
-    air.turbulence = Some(maker.turbulence(Turbulence::LIGHT));
+    air.turbulence = Some(builder.turbulence(Turbulence::LIGHT));
     let mut step = built("step")?;
     step.realism.rotors.time_constant_s *= 1.5;
     (step.realism.rotors.delay_s, step.sensing.delay_s) = (0.004, 0.004);
-    let mut sampled = maker.hardware()?;
+    let mut sampled = builder.hardware()?;
     sampled.sensing = Sensing { period_s: 0.01, delay_s: 0.01, ..Sensing::DEFAULT };
     (sampled.name, sampled.duration_s, sampled.flight_core) = ("sampled".into(), 12.0, true);
     let near_m = 0.05 * length.max(1.0);
@@ -119,20 +119,20 @@ pub fn conditions_on(vehicle: &Vehicle) -> Result<Vec<Condition>, Box<dyn Error>
         condition(breeze, 1.3 * length.max(1.0)),
         condition(step, near_m),
         Condition { rmse: Vector4::repeat(near_m), ..condition(sampled, 2.0 * near_m) },
-        condition(fast::lemniscate(&maker, "lemniscate-hard", 2.5, 0.8)?, 1.3 * length.max(1.0)),
+        condition(fast::lemniscate(&builder, "lemniscate-hard", 2.5, 0.8)?, 1.3 * length.max(1.0)),
     ];
     for index in 0..DRAWN {
-        conditions.push(condition(drawn(&maker, index, time)?, length.max(1.0)));
+        conditions.push(condition(drawn(&builder, index, time)?, length.max(1.0)));
     }
     Ok(conditions)
 }
 
 /// Returns a random flight in turbulence on a vehicle that differs from the law's model. The flights resemble the
 /// campaign `robustness`, but never ask for more than the rotors can carry.
-fn drawn(maker: &Maker<'_>, index: u64, time: f64) -> Result<Scenario, Box<dyn Error>> {
+fn drawn(builder: &FlightBuilder<'_>, index: u64, time: f64) -> Result<Scenario, Box<dyn Error>> {
     let mut noise = Noise::new(SEED + index, NoiseStream::Scenario);
     let mut between = |low: f64, high: f64| low + (high - low) * noise.uniform();
-    let scale = &maker.scale;
+    let scale = &builder.scale;
     // Only one of thrust and mass may be at its worst.
     let thrust = between(scale.thrust(0.6), 1.2);
     let mass = between(0.7, scale.mass(1.3)).min((thrust / scale.thrust(0.6)).max(0.7));
@@ -154,12 +154,12 @@ fn drawn(maker: &Maker<'_>, index: u64, time: f64) -> Result<Scenario, Box<dyn E
         },
         _ => Trajectory::Hover { position_m: from_m, yaw_rad: between(-1.0, 1.0) },
     };
-    let mut scenario = maker.scenario(TrainingFlight { trajectory, ..TrainingFlight::new("drawn", HARD_S) })?;
+    let mut scenario = builder.scenario(TrainingFlight { trajectory, ..TrainingFlight::new("drawn", HARD_S) })?;
     scenario.name = format!("drawn-{index}");
     scenario.seed = SEED + index;
     let changes = changes.into_iter().map(change).collect();
     scenario.environment = Environment::new(*scenario.environment.nominal(), changes, Vec::new())?;
-    scenario.realism.wind.turbulence = Some(maker.turbulence(Turbulence::MODERATE));
+    scenario.realism.wind.turbulence = Some(builder.turbulence(Turbulence::MODERATE));
     scenario.realism.rotors.time_constant_s *= between(0.5, 1.5);
     scenario.sensing.delay_s = between(0.0, 0.004 * time);
     Ok(scenario)

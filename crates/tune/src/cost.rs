@@ -1,7 +1,7 @@
 //! The cost of a contender's flights.
 
 use crate::fast;
-use crate::scale::Scale;
+use crate::scale::VehicleScale;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
 use afbc_sim::metrics::Metrics;
@@ -28,7 +28,7 @@ pub fn cost(scenario: &Scenario, run: &FlightResult) -> f64 {
         return LOST * (2.0 - end_s / scenario.duration_s);
     }
     let Metrics { rmse, max_abs, mean_abs_delta_u: jumps, .. } = &run.metrics;
-    let Scale { length, weight, .. } = Scale::of(scenario.vehicle_file.as_ref());
+    let VehicleScale { length, weight, .. } = VehicleScale::of(scenario.vehicle_file.as_ref());
     let errors = rmse.xyz().norm() / (POSITION_M * length) + rmse.w / YAW_RAD;
     // 0.03 stands for unnoticeable errors. Without it, the geometric mean would reward the last micrometre of an easy
     // flight.

@@ -1,7 +1,7 @@
 //! Fast flights, near the limits of a vehicle: lemniscates and circles.
 
-use crate::maker::{Maker, TrainingFlight};
-use crate::scale::Scale;
+use crate::builder::{FlightBuilder, TrainingFlight};
+use crate::scale::VehicleScale;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
 use afbc_scenario::trajectory::{Sine, Trajectory};
@@ -30,26 +30,26 @@ pub(crate) fn free<'a>(scenario: &Scenario, contender: &'a Contender) -> Cow<'a,
 }
 
 /// Returns a lemniscate at 60 % and a circle at 50 % of the largest horizontal acceleration.
-pub(crate) fn training(maker: &Maker<'_>) -> Result<[Scenario; 2], Box<dyn Error>> {
-    Ok([lemniscate(maker, "lemniscate", 3.0, 0.6)?, circle(maker, "circle", 2.0, 0.5)?])
+pub(crate) fn training(builder: &FlightBuilder<'_>) -> Result<[Scenario; 2], Box<dyn Error>> {
+    Ok([lemniscate(builder, "lemniscate", 3.0, 0.6)?, circle(builder, "circle", 2.0, 0.5)?])
 }
 
 /// Returns a lemniscate and a circle of other sizes and speeds.
-pub(crate) fn held_out(maker: &Maker<'_>) -> Result<[Scenario; 2], Box<dyn Error>> {
-    Ok([lemniscate(maker, "lemniscate-short", 2.0, 0.5)?, circle(maker, "circle-wide", 3.0, 0.6)?])
+pub(crate) fn held_out(builder: &FlightBuilder<'_>) -> Result<[Scenario; 2], Box<dyn Error>> {
+    Ok([lemniscate(builder, "lemniscate-short", 2.0, 0.5)?, circle(builder, "circle-wide", 3.0, 0.6)?])
 }
 
 /// Returns a lemniscate at the fraction `share` of the largest horizontal acceleration. Its half length is `half_m` on
 /// the paper's vehicle.
 pub(crate) fn lemniscate(
-    maker: &Maker<'_>,
+    builder: &FlightBuilder<'_>,
     name: &'static str,
     half_m: f64,
     share: f64,
 ) -> Result<Scenario, Box<dyn Error>> {
-    let Scale { length, time, .. } = maker.scale;
+    let VehicleScale { length, time, .. } = builder.scale;
     let half_m = half_m * length;
-    let rate = sqrt(share * maker.scale.horizontal_m_s2() / (LEMNISCATE * half_m)).min(RATE_RAD_S / time);
+    let rate = sqrt(share * builder.scale.horizontal_m_s2() / (LEMNISCATE * half_m)).min(RATE_RAD_S / time);
     let sine = |amplitude_m, rate| Sine { amplitude_m, period_s: TAU / rate, phase_rad: 0.0 };
     let trajectory = Trajectory::Lissajous {
         centre_m: Vector3::new(0.0, 0.0, 3.0),
@@ -58,24 +58,24 @@ pub(crate) fn lemniscate(
     };
     // At least one period after errors begin to count.
     let duration_s = libm::ceil((5.0 + TAU / rate).max(12.0));
-    maker.scenario(TrainingFlight { trajectory, ..TrainingFlight::new(name, duration_s) })
+    builder.scenario(TrainingFlight { trajectory, ..TrainingFlight::new(name, duration_s) })
 }
 
 /// Returns a circle at the fraction `share` of the largest horizontal acceleration, with a banked start. Its radius is
 /// `radius_m` on the paper's vehicle.
 pub(crate) fn circle(
-    maker: &Maker<'_>,
+    builder: &FlightBuilder<'_>,
     name: &'static str,
     radius_m: f64,
     share: f64,
 ) -> Result<Scenario, Box<dyn Error>> {
-    let Scale { length, time, .. } = maker.scale;
+    let VehicleScale { length, time, .. } = builder.scale;
     let radius_m = radius_m * length;
-    let rate = sqrt(share * maker.scale.horizontal_m_s2() / radius_m).min(RATE_RAD_S / time);
+    let rate = sqrt(share * builder.scale.horizontal_m_s2() / radius_m).min(RATE_RAD_S / time);
     let trajectory =
         Trajectory::Circle { centre_m: Vector3::new(0.0, 0.0, 3.0), radius_m, period_s: TAU / rate, yaw_rad: 0.0 };
-    let mut scenario = maker.scenario(TrainingFlight { trajectory, ..TrainingFlight::new(name, 12.0) })?;
+    let mut scenario = builder.scenario(TrainingFlight { trajectory, ..TrainingFlight::new(name, 12.0) })?;
     // The circle begins at +x of its centre, and the thrust must lean towards the centre.
-    scenario.initial.attitude_rad.y = -maker.scale.tilt_rad(radius_m * rate * rate);
+    scenario.initial.attitude_rad.y = -builder.scale.tilt_rad(radius_m * rate * rate);
     Ok(scenario)
 }

@@ -32,7 +32,7 @@ const COMMAND: &str = "tune";
 const NAME: &str = "fleet";
 
 /// A search for the gains of one law on one vehicle.
-pub struct Search {
+pub struct GainSearch {
     vehicle: Vehicle,
     start: Contender,
     training: Vec<Scenario>,
@@ -44,7 +44,7 @@ pub struct Search {
 pub type Costs = Vec<(String, [f64; 2])>;
 
 /// An error that can cross threads.
-type Failure = Box<dyn Error + Send + Sync>;
+type SendError = Box<dyn Error + Send + Sync>;
 
 /// Everything that determines the results in a folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,12 +60,12 @@ pub struct FleetManifest {
     /// Starting gains of the searches: `by hand` or `flying`.
     pub start: String,
     /// The folder's searches.
-    pub searches: Vec<Planned>,
+    pub searches: Vec<PlannedSearch>,
 }
 
 /// One search of a [`FleetManifest`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Planned {
+pub struct PlannedSearch {
     /// Name of the vehicle.
     pub vehicle: String,
     /// Name of the law.
@@ -79,7 +79,7 @@ pub struct Planned {
 pub struct FleetOutcome {
     /// Description of the search.
     #[serde(flatten)]
-    pub planned: Planned,
+    pub planned: PlannedSearch,
     /// Number of contenders tried.
     pub tries: usize,
     /// Costs of the starting and the found gains over the training flights, times the factors of the conditions.
@@ -98,13 +98,13 @@ pub struct FleetOutcome {
 
 /// A file with a checksum.
 #[derive(Serialize, Deserialize)]
-struct Page<T> {
+struct ChecksummedFile<T> {
     #[serde(flatten)]
     page: T,
     checksum: String,
 }
 
-impl Search {
+impl GainSearch {
     /// Prepares a search for the gains of a law on `vehicle`. It starts at hand-tuned gains scaled by rule or, if
     /// `flying`, at the vehicle's present gains.
     ///
@@ -118,7 +118,7 @@ impl Search {
         };
         let bare = |scenario| without_gains(scenario, vehicle);
         let conditions = conditions_on(vehicle)?.into_iter();
-        Ok(Search {
+        Ok(GainSearch {
             vehicle: vehicle.clone(),
             start,
             training: training_on(vehicle)?.into_iter().map(bare).collect(),
@@ -130,7 +130,7 @@ impl Search {
     }
 
     /// Returns the search's entry in a manifest.
-    pub fn planned(&self) -> Planned {
+    pub fn planned(&self) -> PlannedSearch {
         let conditions: Vec<_> = self
             .conditions
             .iter()
@@ -138,7 +138,7 @@ impl Search {
                 (scenario, rmse, end_m, jumps_n, of_afbc, by_rule)
             })
             .collect();
-        Planned {
+        PlannedSearch {
             vehicle: self.vehicle.name.clone(),
             law: self.start.kind().name().into(),
             fingerprint: afbc_files::seal::hash_of(&(&self.training, &self.held_out, conditions, &self.start)),
@@ -202,25 +202,30 @@ fn without_gains(mut scenario: Scenario, vehicle: &Vehicle) -> Scenario {
 }
 
 /// A folder of results.
-pub struct Results {
-    place: Folder,
+pub struct FleetResults {
+    folder: Folder,
     course: SearchOptions,
     manifest: FleetManifest,
 }
 
-impl Results {
+impl FleetResults {
     /// Opens the folder at `path` for the results of `searches`, and creates it if needed.
     ///
     /// # Errors
     /// One line if the folder cannot be written or holds anything else. Nothing has been changed then.
-    pub fn open(path: &Path, searches: &[Search], course: SearchOptions, flying: bool) -> Result<Self, Box<dyn Error>> {
+    pub fn open(
+        path: &Path,
+        searches: &[GainSearch],
+        course: SearchOptions,
+        flying: bool,
+    ) -> Result<Self, Box<dyn Error>> {
         let manifest = FleetManifest {
             program: env!("CARGO_PKG_VERSION").into(),
             budget: course.budget,
             step: course.step,
             seed: course.seed,
             start: if flying { "flying" } else { "by hand" }.into(),
-            searches: searches.iter().map(Search::planned).collect(),
+            searches: searches.iter().map(GainSearch::planned).collect(),
         };
         let cured = |error| match error {
             files::Error::Foreign { path, whose } => {
@@ -236,22 +241,22 @@ impl Results {
                 format!("{}: holds searches {what}; choose another folder, or delete it", path.display()).into()
             );
         }
-        let place = Folder::open(path, COMMAND, NAME, false).map_err(cured)?;
+        let folder = Folder::open(path, COMMAND, NAME, false).map_err(cured)?;
         if held.is_none() {
-            place.add(&manifest.searches.iter().map(file_name).collect::<Vec<_>>())?;
-            place.add(&[MANIFEST, GAINS])?;
-            place_sealed(&place, MANIFEST, |out| put(out, &manifest))?;
+            folder.add(&manifest.searches.iter().map(file_name).collect::<Vec<_>>())?;
+            folder.add(&[MANIFEST, GAINS])?;
+            write_sealed(&folder, MANIFEST, |out| put(out, &manifest))?;
         }
-        Ok(Results { place, course, manifest })
+        Ok(FleetResults { folder, course, manifest })
     }
 
     /// Returns the result of a search, if it is finished.
     ///
     /// # Errors
     /// One line if the search's file cannot be read, is damaged or belongs to another search.
-    pub fn outcome(&self, search: &Search) -> Result<Option<FleetOutcome>, Box<dyn Error>> {
+    pub fn outcome(&self, search: &GainSearch) -> Result<Option<FleetOutcome>, Box<dyn Error>> {
         let planned = search.planned();
-        let path = self.place.path().join(file_name(&planned));
+        let path = self.folder.path().join(file_name(&planned));
         match read::<FleetOutcome>(&path)? {
             Some(outcome) if outcome.planned != planned => {
                 Err(format!("{}: the result of another search; delete it, and start again", path.display()).into())
@@ -267,7 +272,7 @@ impl Results {
     /// The first error. Finished searches are kept.
     pub fn complete(
         &self,
-        searches: &[Search],
+        searches: &[GainSearch],
         stop: &AtomicBool,
         tried: impl Fn(usize) + Sync,
     ) -> Result<Option<Vec<FleetOutcome>>, Box<dyn Error>> {
@@ -304,14 +309,14 @@ impl Results {
     }
 
     /// Runs one search and writes its file.
-    fn search(&self, search: &Search, stop: &AtomicBool, tried: &(impl Fn(usize) + Sync)) -> Result<(), Failure> {
+    fn search(&self, search: &GainSearch, stop: &AtomicBool, tried: &(impl Fn(usize) + Sync)) -> Result<(), SendError> {
         let goes_on = |tries| {
             tried(tries);
             !stop.load(Ordering::Relaxed)
         };
         let outcome = search.run(self.course, goes_on).map_err(|error| error.to_string())?;
         let Some(outcome) = outcome else { return Ok(()) };
-        Ok(place_sealed(&self.place, &file_name(&outcome.planned), |out| put(out, &outcome))?)
+        Ok(write_sealed(&self.folder, &file_name(&outcome.planned), |out| put(out, &outcome))?)
     }
 
     /// Writes the gains of each vehicle among `outcomes` as tables for its vehicle file. Returns the paths.
@@ -319,7 +324,7 @@ impl Results {
     /// # Errors
     /// If a file cannot be written, or was changed after it was written.
     pub fn write_gains(&self, outcomes: &[FleetOutcome]) -> Result<Vec<PathBuf>, Box<dyn Error>> {
-        let folder = self.place.path().join(GAINS);
+        let folder = self.folder.path().join(GAINS);
         fs::create_dir_all(&folder).map_err(|source| files::Error::Write { path: folder.clone(), source })?;
         let mut paths = Vec::new();
         for vehicle in self.vehicles() {
@@ -332,7 +337,7 @@ impl Results {
                     let cure = "move it, and start again";
                     return Err(format!("{}: changed since it was written; {cure}", path.display()).into());
                 }
-                Err(_) => files::place(&path, |out| out.write_all(text.as_bytes()))
+                Err(_) => files::write_atomically(&path, |out| out.write_all(text.as_bytes()))
                     .map_err(|source| files::Error::Write { path: path.clone(), source })?,
             }
             paths.push(path);
@@ -374,7 +379,7 @@ impl FleetManifest {
             ("seed", self.seed.to_string(), wanted.seed.to_string()),
             ("start", self.start.clone(), wanted.start.clone()),
         ];
-        let name = |searches: &[Planned]| searches.iter().map(file_name).collect::<Vec<_>>();
+        let name = |searches: &[PlannedSearch]| searches.iter().map(file_name).collect::<Vec<_>>();
         match pairs.into_iter().find(|(_, held, wanted)| held != wanted) {
             Some((what, held, wanted)) => format!("with {what} {held}, not {wanted}"),
             None if name(&self.searches) != name(&wanted.searches) => "of other laws or vehicles".into(),
@@ -383,21 +388,21 @@ impl FleetManifest {
     }
 }
 
-fn file_name(planned: &Planned) -> String {
+fn file_name(planned: &PlannedSearch) -> String {
     format!("{}.{}.json", planned.vehicle, planned.law)
 }
 
 /// Writes a file with its own checksum. Such a checksum locates damage better than the folder's.
-fn place_sealed(
-    place: &Folder,
+fn write_sealed(
+    folder: &Folder,
     name: &str,
     fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
 ) -> Result<(), files::Error> {
-    files::place(&place.path().join(name), fill).map_err(|source| place.error(name, source))
+    files::write_atomically(&folder.path().join(name), fill).map_err(|source| folder.error(name, source))
 }
 
 fn put(out: &mut dyn Write, page: &impl Serialize) -> io::Result<()> {
-    seal::json(out, &Page { page, checksum: seal::OPEN.into() })
+    seal::json(out, &ChecksummedFile { page, checksum: seal::OPEN.into() })
 }
 
 /// Reads a file and verifies its checksum. Returns none if there is no file.
@@ -410,6 +415,6 @@ fn read<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<Option<T>, Box<dyn Er
     };
     let damaged = |problem: String| format!("{}: damaged ({problem}); delete it, and start again", path.display());
     seal::verify(&mut io::Cursor::new(&bytes)).map_err(|error| damaged(error.to_string()))?;
-    let page: Page<T> = serde_json::from_slice(&bytes).map_err(|error| damaged(error.to_string()))?;
+    let page: ChecksummedFile<T> = serde_json::from_slice(&bytes).map_err(|error| damaged(error.to_string()))?;
     Ok(Some(page.page))
 }

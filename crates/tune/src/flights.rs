@@ -5,13 +5,13 @@
 //! flights use an estimate from the sensors of the built-in scenarios `mocap` and `outdoor`. Three are fast, and one
 //! turns corners.
 //!
-//! On another vehicle, rotors, battery, drag and ground are the vehicle's own. [`Scale`] scales the flights: times by
-//! the rotors' lag, lengths and accelerations by the spare thrust, and wind by the drag. Losses of thrust and payloads
-//! leave the same share of the reserve.
+//! On another vehicle, rotors, battery, drag and ground are the vehicle's own. [`VehicleScale`] scales the flights:
+//! times by the rotors' lag, lengths and accelerations by the spare thrust, and wind by the drag. Losses of thrust and
+//! payloads leave the same share of the reserve.
 
+use crate::builder::{FlightBuilder, ONSET_S, TrainingFlight, read};
 use crate::fast;
-use crate::maker::{Maker, ONSET_S, TrainingFlight, read};
-use crate::scale::Scale;
+use crate::scale::VehicleScale;
 use afbc_plant::instruments::{BarometerModel, GnssModel, ImuModel, MagnetometerModel, TrackerModel};
 use afbc_plant::{
     BatteryModel, Contact, Environment, GroundEffect, Gust, GustKind, InstrumentSuite, Payload, PlantParameter,
@@ -33,7 +33,7 @@ const SETTLING_S: f64 = 0.5;
 /// # Errors
 /// None in practice, since a test flies these flights.
 pub fn training() -> Result<Vec<Scenario>, Box<dyn Error>> {
-    Maker::new(None).training()
+    FlightBuilder::new(None).training()
 }
 
 /// Returns the flights used in the search for gains of `vehicle`. For the paper's vehicle, with any gains in its file,
@@ -42,7 +42,7 @@ pub fn training() -> Result<Vec<Scenario>, Box<dyn Error>> {
 /// # Errors
 /// The first number out of range, if the vehicle cannot fly such a flight.
 pub fn training_on(vehicle: &Vehicle) -> Result<Vec<Scenario>, Box<dyn Error>> {
-    Maker::new(Some(vehicle)).training()
+    FlightBuilder::new(Some(vehicle)).training()
 }
 
 /// Returns the held-out flights on the paper's vehicle. The search does not use them, so they show overfitting.
@@ -50,7 +50,7 @@ pub fn training_on(vehicle: &Vehicle) -> Result<Vec<Scenario>, Box<dyn Error>> {
 /// # Errors
 /// None in practice, since a test flies these flights.
 pub fn held_out() -> Result<Vec<Scenario>, Box<dyn Error>> {
-    Maker::new(None).held_out()
+    FlightBuilder::new(None).held_out()
 }
 
 /// Returns the held-out flights on `vehicle`. For the paper's vehicle, these are the flights of [`held_out`].
@@ -58,11 +58,11 @@ pub fn held_out() -> Result<Vec<Scenario>, Box<dyn Error>> {
 /// # Errors
 /// Those of [`training_on`].
 pub fn held_out_on(vehicle: &Vehicle) -> Result<Vec<Scenario>, Box<dyn Error>> {
-    Maker::new(Some(vehicle)).held_out()
+    FlightBuilder::new(Some(vehicle)).held_out()
 }
-impl Maker<'_> {
+impl FlightBuilder<'_> {
     fn training(&self) -> Result<Vec<Scenario>, Box<dyn Error>> {
-        let Scale { length, time, .. } = self.scale;
+        let VehicleScale { length, time, .. } = self.scale;
         let to = Vector3::new(0.6, -0.4, 1.0) * length;
         let eight =
             |name, change| TrainingFlight { trajectory: self.eight(8.0), change, ..TrainingFlight::new(name, 15.0) };
@@ -118,7 +118,7 @@ impl Maker<'_> {
     }
 
     fn held_out(&self) -> Result<Vec<Scenario>, Box<dyn Error>> {
-        let Scale { length, time, wind: air, .. } = self.scale;
+        let VehicleScale { length, time, wind: air, .. } = self.scale;
         let fast =
             |name, change| TrainingFlight { trajectory: self.eight(6.0), change, ..TrainingFlight::new(name, 20.0) };
         let mut delayed = self.windy(fast("delayed", None))?;
@@ -184,7 +184,7 @@ impl Maker<'_> {
     /// Returns a flight with short pushes of at most 0.1 s. Each changes the velocity by about `strength` times 2 m/s,
     /// or the rates by about `strength` times 2 rad/s.
     fn upset(&self, name: &'static str, strength: f64) -> Result<Scenario, Box<dyn Error>> {
-        let Scale { length, time, .. } = self.scale;
+        let VehicleScale { length, time, .. } = self.scale;
         let (speed, rate) = (length / time, 1.0 / time);
         let pushes = [
             (Axis::Roll, 60.0 * rate, 0.03),
@@ -205,7 +205,7 @@ impl Maker<'_> {
 
     /// Returns a course with corners in wind. Each leg takes one second and is followed by a stop of two.
     fn course(&self, name: &'static str, leg_m: f64) -> Result<Scenario, Box<dyn Error>> {
-        let Scale { length, time, wind, .. } = self.scale;
+        let VehicleScale { length, time, wind, .. } = self.scale;
         let leg_m = leg_m * length;
         let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)];
         let corner = |(k, (x, y)): (u32, (f64, f64))| {
@@ -226,7 +226,7 @@ impl Maker<'_> {
 
     /// Returns a tour of five corners in still air. Each leg takes two seconds, without a stop.
     fn legs(&self, name: &'static str, leg_m: f64) -> Result<Scenario, Box<dyn Error>> {
-        let Scale { length, time, .. } = self.scale;
+        let VehicleScale { length, time, .. } = self.scale;
         let corners = [(0.0, 0.0, 0.0), (1.0, 0.2, 0.2), (0.3, -0.8, 0.0), (-0.5, 0.3, -0.2), (0.4, 0.6, 0.1)];
         let corner = |(k, (x, y, z)): (u32, (f64, f64, f64))| Waypoint {
             time_s: 4.0 + 2.0 * time * f64::from(k),
@@ -275,7 +275,7 @@ impl Maker<'_> {
     /// of the centre of mass on the paper's vehicle.
     fn payload(&self, name: &'static str, flight: TrainingFlight, ahead_m: f64) -> Result<Scenario, Box<dyn Error>> {
         let scenario = self.windy(TrainingFlight { name, ..flight })?;
-        let Scale { arm, .. } = self.scale;
+        let VehicleScale { arm, .. } = self.scale;
         // Scaled like 20 % more mass, so that the payload takes the same share of the reserve.
         let share = 0.2 * ((self.scale.mass(1.2) - 1.0) / (1.2 - 1.0));
         let payload = Payload {
@@ -333,7 +333,7 @@ impl Maker<'_> {
 
     /// Returns a nearly horizontal figure of eight. Its period is `period_s` on the paper's vehicle.
     fn eight(&self, period_s: f64) -> Trajectory {
-        let Scale { length, time, .. } = self.scale;
+        let VehicleScale { length, time, .. } = self.scale;
         let period_s = period_s * time;
         let sine = |amplitude_m, period_s| Sine { amplitude_m: amplitude_m * length, period_s, phase_rad: 0.0 };
         let sines = [sine(1.5, period_s), sine(0.75, 0.5 * period_s), sine(0.3, period_s)];

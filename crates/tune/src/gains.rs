@@ -13,11 +13,11 @@ use core::fmt::Write;
 const GROUPS: [&[Axis]; 4] = [&[Axis::Z], &[Axis::X, Axis::Y], &[Axis::Roll, Axis::Pitch], &[Axis::Yaw]];
 
 /// Function that is called with the place, range and value of a gain.
-type Visit<'a> = &'a mut dyn FnMut(&str, &Range, &mut f32);
+type GainVisitor<'a> = &'a mut dyn FnMut(&str, &Range, &mut f32);
 
 /// Visits every tuned gain of `contender` except those that are 0. A gain of 0 switches a part of its law off, and
 /// stays 0.
-fn each_tunable(contender: &mut Contender, visit: Visit) {
+fn each_tunable(contender: &mut Contender, visit: GainVisitor) {
     let law = &mut contender.law;
     if !law.kind().in_cascade() {
         return each_tuned("", law, |_| true, visit);
@@ -29,7 +29,7 @@ fn each_tunable(contender: &mut Contender, visit: Visit) {
 }
 
 /// Visits the gains of the first axis of `group`, then copies them to the others.
-fn each_of_group(law: &mut Law, group: &[Axis], visit: Visit) {
+fn each_of_group(law: &mut Law, group: &[Axis], visit: GainVisitor) {
     let [first, others @ ..] = group else { return };
     let place = group.iter().map(|axis| axis.name()).collect::<Vec<_>>().join(", ");
     let delta_max = |law: &Law| if let Law::Afbc(gains) = law { gains[*first].safeguards.delta_max } else { 0.0 };
@@ -58,7 +58,7 @@ fn each_of_axis(law: &mut Law, axis: Axis, mut show: impl FnMut(&mut f32)) {
 }
 
 /// Visits every parameter that is `wanted`, tuned and not 0.
-fn each_tuned(place: &str, parameters: &mut impl Declared, wanted: impl Fn(&Declaration) -> bool, visit: Visit) {
+fn each_tuned(place: &str, parameters: &mut impl Declared, wanted: impl Fn(&Declaration) -> bool, visit: GainVisitor) {
     let Ok(()) = parameters.visit_mut(&mut |declaration, value| {
         if let (true, DeclaredValueMut::Single([gain])) = (declaration.tuned && wanted(declaration), value)
             && *gain > 0.0
@@ -123,7 +123,7 @@ pub(super) fn changes(start: &Contender, found: &Contender) -> Vec<GainChange> {
 
 /// One key of a scenario file.
 #[derive(PartialEq)]
-struct Key {
+struct GainKey {
     table: String,
     key: &'static str,
     value: String,
@@ -138,7 +138,7 @@ pub fn fragment(contender: &Contender) -> String {
         (profile, keys)
     });
     let own = keys(contender);
-    let differing = |base: &[Key]| own.iter().filter(|key| !base.contains(key)).count();
+    let differing = |base: &[GainKey]| own.iter().filter(|key| !base.contains(key)).count();
     let (profile, base) = profiles
         .iter()
         .min_by_key(|(_, base)| differing(base))
@@ -203,11 +203,11 @@ fn quoted(name: &str) -> String {
 }
 
 /// Returns all keys of a contender in a scenario file. The time step is left out, since it belongs to the whole file.
-fn keys(contender: &Contender) -> Vec<Key> {
+fn keys(contender: &Contender) -> Vec<GainKey> {
     let mut keys = Vec::new();
     // Groups of a law's gains are subtables of `gains`. The settings are tables beside it.
     let mut put = |table: String, key, value: DeclaredValue<'_>, tuned| {
-        keys.push(Key { table, key, value: words::value(&value), tuned });
+        keys.push(GainKey { table, key, value: words::value(&value), tuned });
         Ok::<(), Infallible>(())
     };
     let Ok(()) = contender.law.visit(&mut |Declaration { group, range, tuned, .. }, value| {

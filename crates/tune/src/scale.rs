@@ -21,7 +21,7 @@ const THRUST_SHARE: f64 = 0.85;
 
 /// Factors from the paper's vehicle to another one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Scale {
+pub(crate) struct VehicleScale {
     /// Factor of times: slowness of the vehicle, from the lag of its rotors.
     pub(crate) time: f64,
     /// Factor of lengths: the factor of horizontal accelerations times the square of `time`, but at most three times
@@ -43,10 +43,10 @@ pub(crate) struct Scale {
     gravity_m_s2: f64,
 }
 
-impl Scale {
+impl VehicleScale {
     /// Returns the factors of the paper's vehicle.
     pub(crate) fn paper() -> Self {
-        Scale {
+        VehicleScale {
             time: 1.0,
             length: 1.0,
             acceleration: 1.0,
@@ -61,7 +61,7 @@ impl Scale {
 
     /// Returns the factors of `vehicle`; for none, those of the paper's vehicle.
     pub(crate) fn of(vehicle: Option<&Vehicle>) -> Self {
-        let Some(vehicle) = vehicle else { return Scale::paper() };
+        let Some(vehicle) = vehicle else { return VehicleScale::paper() };
         let (own, paper) = (&vehicle.parameters, &Parameters::<f64>::PAPER);
         let thrust_to_weight = vehicle.force_max_n * vehicle.rotors.len() as f64 / own.weight_n();
         let time = f64::from(slowness(vehicle.lag_s()));
@@ -75,7 +75,7 @@ impl Scale {
         let [linear, square] = rates(&Drag::PAPER, paper, PAPER_ROTORS);
         let taken_m_s2 = share * (linear + square * WIND_M_S) * WIND_M_S;
         let wind = drag.map_or(1.0, |rates| speed(rates, taken_m_s2) / WIND_M_S);
-        Scale {
+        VehicleScale {
             time,
             length,
             acceleration: length / (time * time),
@@ -159,11 +159,11 @@ mod tests {
     #[test]
     fn every_factor_is_1_for_the_papers_vehicle() {
         let paper = afbc_vehicles::built_in("paper").unwrap().read().unwrap();
-        let scale = Scale::of(Some(&paper));
+        let scale = VehicleScale::of(Some(&paper));
         let factors = [scale.time, scale.length, scale.acceleration, scale.arm, scale.weight, scale.wind];
         // The file's largest force is computed from a rotor speed, so it differs by rounding.
         assert!(factors.iter().all(|factor| (factor - 1.0).abs() < 1e-12), "{scale:?}");
-        let scale = Scale::paper();
+        let scale = VehicleScale::paper();
         assert_eq!((scale.thrust(0.6), scale.mass(1.3), scale.mass(0.8)), (0.6, 1.3, 0.8));
     }
 
@@ -171,7 +171,7 @@ mod tests {
     fn weak_rotors_lose_less_and_carry_less() {
         for vehicle in ["crazyflie", "iris"] {
             let vehicle = afbc_vehicles::built_in(vehicle).unwrap().read().unwrap();
-            let scale = Scale::of(Some(&vehicle));
+            let scale = VehicleScale::of(Some(&vehicle));
             assert!(scale.thrust(0.6) * scale.sustained > 1.1, "{}", vehicle.name);
             assert!(scale.sustained / scale.mass(1.3) > 1.1, "{}", vehicle.name);
             assert!((0.6..1.0).contains(&scale.thrust(0.6)) && (1.0..1.3).contains(&scale.mass(1.3)));

@@ -1,6 +1,6 @@
 //! Search for the best gains.
 
-use crate::cma_es::Search;
+use crate::cma_es::CmaEs;
 use crate::conditions::{Condition, FAILED, factor};
 use crate::cost::{LOST, costs, flown, mean};
 use crate::gains::{self, GainChange};
@@ -62,7 +62,7 @@ pub fn search(
     let before = of(&first);
     let mut trial = Trial { flights, conditions, order: order(&first.0), bearable: lost(&first.0) };
     let (mut best, mut after, mut evaluations) = (start.clone(), before, 1);
-    let mut search = Search::new(&gains::point(start), step, seed);
+    let mut search = CmaEs::new(&gains::point(start), step, seed);
     // The mean of the search is often better than any point around it. Once the mean has moved, the last try is
     // reserved for it.
     let mut kept = 0;
@@ -73,7 +73,7 @@ pub fn search(
         let is_whole = points.len() == search.population();
         let generation = rated(start, &trial, points);
         evaluations += generation.len();
-        if let Some(Rated { costs, contender, cost, .. }) =
+        if let Some(RatedContender { costs, contender, cost, .. }) =
             generation.first().filter(|rated| !rated.given_up && rated.cost < after)
         {
             (best, after, trial.bearable) = (contender.clone(), *cost, lost(costs));
@@ -121,7 +121,7 @@ struct Trial<'a> {
 }
 
 /// A contender with its costs.
-struct Rated {
+struct RatedContender {
     cost: f64,
     costs: Vec<f64>,
     given_up: bool,
@@ -151,12 +151,12 @@ impl Trial<'_> {
 }
 
 /// Returns contenders with the gains of `points` and their costs, cheapest first.
-fn rated(start: &Contender, trial: &Trial<'_>, points: Vec<Vec<f64>>) -> Vec<Rated> {
+fn rated(start: &Contender, trial: &Trial<'_>, points: Vec<Vec<f64>>) -> Vec<RatedContender> {
     let rated = |mut point: Vec<f64>| {
         let contender = gains::contender(start, &mut point);
         // Invalid combinations of gains cost more than any other.
         let (cost, costs, given_up) = trial.rate(&contender).unwrap_or((f64::MAX, Vec::new(), true));
-        Rated { cost, costs, given_up, contender, point }
+        RatedContender { cost, costs, given_up, contender, point }
     };
     let mut rated: Vec<_> = points.into_par_iter().map(rated).collect();
     rated.sort_by(|a, b| a.cost.total_cmp(&b.cost));

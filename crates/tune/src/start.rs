@@ -1,6 +1,6 @@
 //! Starting points of the search: hand-tuned gains, so that the same command always finds the same gains.
 
-use crate::maker::is_paper;
+use crate::builder::is_paper;
 use afbc::disturbance::DisturbanceObserver;
 use afbc::reference::ReferenceModel;
 use afbc::{Profile, Settings};

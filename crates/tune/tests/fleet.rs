@@ -3,7 +3,7 @@
 
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::ControllerKind;
-use afbc_tune::fleet::{Results, Search};
+use afbc_tune::fleet::{FleetResults, GainSearch};
 use afbc_tune::{
     LOST, SearchOptions, by_hand_on, conditions_on, costs, held_out, held_out_on, search, training, training_on,
 };
@@ -110,9 +110,10 @@ fn an_interrupted_fleet_resumes_to_the_same_bytes() {
     let base = std::env::temp_dir().join(format!("afbc-tune-fleet-{}", std::process::id()));
     let course = SearchOptions { budget: 2, step: 0.3, seed: 1 };
     let kinds = [ControllerKind::Pid, ControllerKind::Indi];
-    let searches: Vec<_> = kinds.into_iter().map(|kind| Search::new(kind, &vehicle("racer"), false).unwrap()).collect();
+    let searches: Vec<_> =
+        kinds.into_iter().map(|kind| GainSearch::new(kind, &vehicle("racer"), false).unwrap()).collect();
     let run = |folder: &Path, stops: bool| {
-        let results = Results::open(folder, &searches, course, false).unwrap();
+        let results = FleetResults::open(folder, &searches, course, false).unwrap();
         let stop = AtomicBool::new(false);
         let ended = results.complete(&searches, &stop, |tries| {
             if stops && tries > 0 {
@@ -134,13 +135,13 @@ fn an_interrupted_fleet_resumes_to_the_same_bytes() {
     let read = afbc_vehicles::parse("racer.toml", &text, "racer").unwrap();
     afbc_scenario::contender::Law::on(ControllerKind::Indi, &read, afbc::Profile::Flight).unwrap();
 
-    let refused = |course, searches: &[Search]| {
-        Results::open(&whole, searches, course, false).err().map(|error| error.to_string()).unwrap()
+    let refused = |course, searches: &[GainSearch]| {
+        FleetResults::open(&whole, searches, course, false).err().map(|error| error.to_string()).unwrap()
     };
     assert!(refused(SearchOptions { seed: 2, ..course }, &searches).contains("with seed 1, not 2"));
     assert!(refused(course, searches.get(..1).unwrap()).contains("other laws or vehicles"));
     std::fs::write(whole.join("racer.pid.json"), "{}").unwrap();
-    let results = Results::open(&whole, &searches, course, false).unwrap();
+    let results = FleetResults::open(&whole, &searches, course, false).unwrap();
     assert!(results.outcome(searches.first().unwrap()).unwrap_err().to_string().contains("damaged"));
     std::fs::remove_dir_all(base).unwrap();
 }

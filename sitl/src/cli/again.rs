@@ -1,7 +1,7 @@
 //! `sitl again`: repeats the command in a manifest, and compares the results.
 
 use super::manifest::{self, NAME, ResultsManifest, WITH_VALUE, WITHOUT_VALUE};
-use super::terminal::{Failure, print, say};
+use super::terminal::{CommandError, print, say};
 use afbc_files::seal::hash_of_file;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Args, Command as CliCommand};
@@ -22,7 +22,7 @@ const RESUMES: &str = "campaign";
 /// one's own: it can name scenarios, vehicles and what else decides results, and nothing that writes elsewhere. Exits
 /// with 1 if a file differs.
 #[derive(Args, Debug)]
-pub(crate) struct Again {
+pub(crate) struct AgainArgs {
     /// manifest.json of a folder of results, or the folder
     manifest: PathBuf,
 
@@ -31,9 +31,9 @@ pub(crate) struct Again {
     out: Option<PathBuf>,
 }
 
-impl Again {
+impl AgainArgs {
     /// Runs the command, compares the results and prints the differences.
-    pub(super) fn run(self, program: CliCommand) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self, program: CliCommand) -> Result<ExitCode, CommandError> {
         let before = manifest::read(&self.manifest)?;
         let command =
             checked(&before.command, &program).map_err(|problem| format!("{}: {problem}", self.manifest.display()))?;

@@ -1,9 +1,9 @@
 //! `sitl bring-up`: checks a board step by step.
 
-use super::terminal::{Failure, print, say};
-use crate::network::Network;
-use crate::serial::Serial;
-use afbc_files::Output;
+use super::terminal::{CommandError, print, say};
+use crate::network::NetworkBoard;
+use crate::serial::SerialBoard;
+use afbc_files::OutputFile;
 use afbc_ground::bring_up::{BringUpOptions, BringUpStep, Verdict, bring_up};
 use afbc_hil::Autopilot;
 use afbc_onboard::BAUD;
@@ -19,10 +19,10 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// Asks the board for its version, parameters, sensors, ticks and noise at rest over MAVLink, leads through turns by
 /// hand, and gives a verdict on each step. It never arms and changes no parameter. See docs/bring-up.md.
 #[derive(Args, Debug)]
-pub(crate) struct BringUp {
+pub(crate) struct BringUpArgs {
     /// How the board is connected: serial:DEVICE[:BAUD], udp:HOST:PORT or tcp:HOST:PORT
     #[arg(long, value_name = "CONNECTION", default_value = "serial:/dev/ttyACM0")]
-    connect: Connection,
+    connect: BoardAddress,
 
     /// File to write; one that is there already is not overwritten
     #[arg(long, short, value_name = "FILE", default_value = "bring-up.md")]
@@ -43,13 +43,13 @@ pub(crate) struct BringUp {
 
 /// Address of the board.
 #[derive(Clone, Debug)]
-enum Connection {
+enum BoardAddress {
     Serial(String, u32),
     Udp(String),
     Tcp(String),
 }
 
-impl FromStr for Connection {
+impl FromStr for BoardAddress {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -57,22 +57,22 @@ impl FromStr for Connection {
             Some(("serial", rest)) if !rest.is_empty() => Ok(match rest.rsplit_once(':') {
                 Some((device, baud)) => {
                     let baud = baud.parse().map_err(|_| format!("{baud} is no baud rate, such as {BAUD}"))?;
-                    Connection::Serial(device.into(), baud)
+                    BoardAddress::Serial(device.into(), baud)
                 }
-                None => Connection::Serial(rest.into(), BAUD),
+                None => BoardAddress::Serial(rest.into(), BAUD),
             }),
-            Some(("udp", address)) => Ok(Connection::Udp(address.into())),
-            Some(("tcp", address)) => Ok(Connection::Tcp(address.into())),
+            Some(("udp", address)) => Ok(BoardAddress::Udp(address.into())),
+            Some(("tcp", address)) => Ok(BoardAddress::Tcp(address.into())),
             _ => Err("write serial:DEVICE[:BAUD], udp:HOST:PORT or tcp:HOST:PORT".into()),
         }
     }
 }
 
-impl BringUp {
+impl BringUpArgs {
     /// Runs the steps and writes the log.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let out = self.out.display();
-        let output = Output::new(&self.out, "--out")?;
+        let output = OutputFile::new(&self.out, "--out")?;
         if !self.yes {
             confirm()?;
         }
@@ -88,7 +88,7 @@ impl BringUp {
             ("with somebody's hands", if self.yes { "no" } else { "yes" }.into()),
         ];
         log.head = head.map(|(what, value)| (what.into(), value)).into();
-        output.place(|to| to.write_all(log.page().as_bytes()))?;
+        output.write(|to| to.write_all(log.page().as_bytes()))?;
         let line = |step: &BringUpStep| {
             let because =
                 if step.reasons.is_empty() { String::new() } else { format!(": {}", step.reasons.join("; ")) };
@@ -101,21 +101,21 @@ impl BringUp {
     }
 }
 
-impl Connection {
+impl BoardAddress {
     /// Connects; also returns a description of the connection.
-    fn open(&self) -> Result<(Box<dyn Autopilot>, String), Failure> {
+    fn open(&self) -> Result<(Box<dyn Autopilot>, String), CommandError> {
         Ok(match self {
-            Connection::Serial(device, baud) => {
-                (Box::new(Serial::open(device, *baud)?) as _, format!("{device}, {baud} baud"))
+            BoardAddress::Serial(device, baud) => {
+                (Box::new(SerialBoard::open(device, *baud)?) as _, format!("{device}, {baud} baud"))
             }
-            Connection::Udp(address) => (Box::new(Network::udp(address)?), format!("UDP, {address}")),
-            Connection::Tcp(address) => (Box::new(Network::tcp(address)?), format!("TCP, {address}")),
+            BoardAddress::Udp(address) => (Box::new(NetworkBoard::udp(address)?), format!("UDP, {address}")),
+            BoardAddress::Tcp(address) => (Box::new(NetworkBoard::tcp(address)?), format!("TCP, {address}")),
         })
     }
 }
 
 /// Asks the user to confirm that the propellers are off.
-fn confirm() -> Result<(), Failure> {
+fn confirm() -> Result<(), CommandError> {
     say("Are the propellers off? Type yes:");
     let mut answer = String::new();
     stdin().read_line(&mut answer)?;
@@ -174,10 +174,10 @@ mod tests {
             ("udp:127.0.0.1:18570", "Udp(\"127.0.0.1:18570\")"),
             ("tcp:[::1]:5760", "Tcp(\"[::1]:5760\")"),
         ] {
-            assert_eq!(format!("{:?}", text.parse::<Connection>().ok()), format!("Some({shown})"));
+            assert_eq!(format!("{:?}", text.parse::<BoardAddress>().ok()), format!("Some({shown})"));
         }
         for text in ["", "/dev/ttyACM0", "serial:", "serial:/dev/ttyACM0:fast", "usb:1"] {
-            assert!(text.parse::<Connection>().is_err(), "{text}");
+            assert!(text.parse::<BoardAddress>().is_err(), "{text}");
         }
     }
 }

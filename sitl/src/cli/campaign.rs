@@ -1,15 +1,15 @@
 //! `sitl campaign`, `sitl merge` and `sitl campaigns`.
 
-use super::flying::{Flying, report};
-use super::json::Json;
-use super::place::Place;
-use super::progress::Progress;
-use super::target::Target;
-use super::terminal::{Failure, columns, print, say};
-use super::vehicle::OnVehicle;
+use super::flight_args::{FlightArgs, report};
+use super::json::JsonArgs;
+use super::output_folder::OutputFolderArgs;
+use super::progress::CommandProgress;
+use super::target::TargetArg;
+use super::terminal::{CommandError, columns, print, say};
+use super::vehicle::VehicleArgs;
 use super::{described, interrupt, json, manifest};
 use afbc_campaign::subject::SubjectKind;
-use afbc_campaign::{self as campaign, BUILT_IN, Campaign as Plan, CampaignFolder, Manifest, Shard, Summary, built_in};
+use afbc_campaign::{self as campaign, BUILT_IN, Campaign, CampaignFolder, CampaignSummary, Manifest, Shard, built_in};
 use afbc_files::read::BuiltIn;
 use afbc_report::{campaign as report, for_terminal};
 use afbc_sim::LogRate;
@@ -29,9 +29,9 @@ const SHARD: &str = "--shard";
 /// See
 /// docs/campaigns.md.
 #[derive(Args, Debug)]
-pub(crate) struct Campaign {
+pub(crate) struct CampaignArgs {
     /// Name of a built-in campaign, or path of a campaign file
-    campaign: Target,
+    campaign: TargetArg,
 
     /// Fly only the first N flights
     #[arg(long, value_name = "N", conflicts_with = "flight", value_parser = value_parser!(u64).range(1..))]
@@ -58,24 +58,24 @@ pub(crate) struct Campaign {
     log_hz: Option<LogRate>,
 
     #[command(flatten)]
-    on: OnVehicle,
+    on: VehicleArgs,
 
     #[command(flatten)]
-    place: Place,
+    place: OutputFolderArgs,
 
     #[command(flatten)]
-    json: Json,
+    json: JsonArgs,
 }
 
-impl Campaign {
+impl CampaignArgs {
     /// Flies the campaign, writes the results and prints a summary.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let plan = self.on.campaign(self.campaign.campaign()?)?;
         let flights = self.flights.unwrap_or(plan.flights);
         if flights > plan.flights {
             return Err(format!("--flights {flights}: the campaign has only {}; fly fewer", plan.flights).into());
         }
-        let plan = Plan { flights, ..plan };
+        let plan = Campaign { flights, ..plan };
         if let Some(flight) = self.flight {
             return self.fly_again(&plan, flight);
         }
@@ -94,12 +94,12 @@ impl Campaign {
         let folder = CampaignFolder::open(&out, Manifest::new(&plan, shard), self.place.force)?;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
         // The first call reports flights of earlier runs.
-        let progress: OnceLock<Progress> = OnceLock::new();
+        let progress: OnceLock<CommandProgress> = OnceLock::new();
         let done = |done| {
             let mut first = false;
             let begin = || {
                 first = true;
-                Progress::new(&plan.name, "flights", flights, done)
+                CommandProgress::new(&plan.name, "flights", flights, done)
             };
             let progress = progress.get_or_init(begin);
             if !first {
@@ -117,7 +117,7 @@ impl Campaign {
     }
 
     /// Flies one flight, and writes its full results.
-    fn fly_again(self, plan: &Plan, flight: u64) -> Result<ExitCode, Failure> {
+    fn fly_again(self, plan: &Campaign, flight: u64) -> Result<ExitCode, CommandError> {
         if flight >= plan.flights {
             return Err(
                 format!("--flight {flight}: the campaign has flights 0 to {}; choose one", plan.flights - 1).into()
@@ -134,7 +134,7 @@ impl Campaign {
         }
         let name = scenario.name.clone();
         let open = || self.place.open(&name);
-        let (folder, flown) = Flying { duration: None, log_hz: self.log_hz }.fly(vec![scenario], open)?;
+        let (folder, flown) = FlightArgs { duration: None, log_hz: self.log_hz }.fly(vec![scenario], open)?;
         report(&folder, &flown, &[], self.json)?;
         Ok(ExitCode::from(u8::from(flown.iter().any(|flown| flown.run.lost.is_some()))))
     }
@@ -156,21 +156,21 @@ fn useful(wanted: Option<u64>, flights: u64) -> usize {
 }
 
 /// Command that makes a campaign's results, and the scenarios that it flies.
-type Origin = (Vec<String>, Vec<manifest::FlownWords>);
+type ResultsOrigin = (Vec<String>, Vec<manifest::FlownJson>);
 
 /// Writes and prints the results of all flights. Writes a manifest too, if the origin of the results is known.
 fn conclude(
     folder: &CampaignFolder,
-    summary: &Summary,
-    origin: Option<Origin>,
+    summary: &CampaignSummary,
+    origin: Option<ResultsOrigin>,
     target: &str,
-    json: Json,
-) -> Result<ExitCode, Failure> {
+    json: JsonArgs,
+) -> Result<ExitCode, CommandError> {
     let out = folder.path();
-    let mut files = report::write(folder.place(), summary)?;
+    let mut files = report::write(folder.output_folder(), summary)?;
     if let Some((command, flown)) = origin {
         files.extend(folder.sealed());
-        manifest::write_as(folder.place(), &files, command, summary.manifest.fingerprint.clone(), flown)?;
+        manifest::write_as(folder.output_folder(), &files, command, summary.manifest.fingerprint.clone(), flown)?;
     }
     if json.json {
         json::print_written(|out| report::json(out, summary))?;
@@ -185,7 +185,7 @@ fn conclude(
 
 /// Join the parts of a campaign flown by `sitl campaign --shard`, with the same result as on one machine
 #[derive(Args, Debug)]
-pub(crate) struct Merge {
+pub(crate) struct MergeArgs {
     /// Folders of all parts
     #[arg(required = true, value_name = "DIR")]
     shards: Vec<PathBuf>,
@@ -199,12 +199,12 @@ pub(crate) struct Merge {
     force: bool,
 
     #[command(flatten)]
-    json: Json,
+    json: JsonArgs,
 }
 
-impl Merge {
+impl MergeArgs {
     /// Merges the parts, writes the results and prints a summary.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         interrupt::ends_with("stopped; the same command starts again".into())?;
         let (folder, summary) = campaign::merge(&self.shards, &self.out, self.force)?;
         conclude(&folder, &summary, whole(&self.shards), &summary.manifest.target(), self.json)
@@ -212,7 +212,7 @@ impl Merge {
 }
 
 /// Returns the command that flies all parts at once: the command of the first part without its shard option, if known.
-fn whole(parts: &[PathBuf]) -> Option<Origin> {
+fn whole(parts: &[PathBuf]) -> Option<ResultsOrigin> {
     let part = manifest::read(parts.first()?).ok()?;
     let mut command = part.command;
     let shard = command.iter().position(|word| word == SHARD || word.starts_with(&format!("{SHARD}=")))?;
@@ -225,18 +225,18 @@ fn whole(parts: &[PathBuf]) -> Option<Origin> {
 ///
 /// `sitl campaigns robustness > my.toml` writes a campaign file to edit and to fly with `sitl campaign my.toml`.
 #[derive(Args, Debug)]
-pub(crate) struct Campaigns {
+pub(crate) struct CampaignsArgs {
     /// Built-in campaign to print
     #[arg(conflicts_with = "json")]
     name: Option<String>,
 
     #[command(flatten)]
-    json: Json,
+    json: JsonArgs,
 }
 
-impl Campaigns {
+impl CampaignsArgs {
     /// Prints the list or the file.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         match self.name {
             Some(name) => print(built_in(&name).ok_or_else(|| SubjectKind::Campaign.unknown(&name))?.text)?,
             None => {
@@ -251,7 +251,7 @@ impl Campaigns {
     }
 }
 
-fn line(plan: &Plan) -> String {
-    let Plan { name, flights, description, .. } = plan;
+fn line(plan: &Campaign) -> String {
+    let Campaign { name, flights, description, .. } = plan;
     format!("{name:<12}{flights:>6} flights  {description}\n")
 }

@@ -1,6 +1,6 @@
 //! All commands except `paper`.
 
-use super::terminal::Failure;
+use super::terminal::CommandError;
 use super::{
     again, bring_up, campaign, compare, fly, hitl, mcap, params, pil, plot, replay, results, scenarios, serve, shell,
     suite, tune, vehicle,
@@ -9,57 +9,57 @@ use clap::{Command, Subcommand};
 use std::process::ExitCode;
 
 #[derive(Debug, Subcommand)]
-pub(super) enum Other {
-    Fly(fly::Fly),
-    Campaign(campaign::Campaign),
-    Merge(campaign::Merge),
-    Compare(compare::Compare),
-    Again(again::Again),
-    Tune(tune::Tune),
-    Check(scenarios::Check),
-    Scenarios(scenarios::Scenarios),
-    Campaigns(campaign::Campaigns),
-    Suites(suite::Suites),
-    Vehicles(vehicle::Vehicles),
-    Params(params::Params),
-    Plot(plot::Plot),
-    Results(results::Results),
-    Replay(replay::Replay),
-    Mcap(mcap::Mcap),
-    Serve(serve::Serve),
-    Pil(pil::Pil),
-    Hitl(hitl::Hitl),
-    BringUp(bring_up::BringUp),
-    Completions(shell::Completions),
-    Man(shell::Man),
+pub(super) enum ExtraCommand {
+    Fly(fly::FlyArgs),
+    Campaign(campaign::CampaignArgs),
+    Merge(campaign::MergeArgs),
+    Compare(compare::CompareArgs),
+    Again(again::AgainArgs),
+    Tune(tune::TuneArgs),
+    Check(scenarios::CheckArgs),
+    Scenarios(scenarios::ScenariosArgs),
+    Campaigns(campaign::CampaignsArgs),
+    Suites(suite::SuitesArgs),
+    Vehicles(vehicle::VehiclesArgs),
+    Params(params::ParamsArgs),
+    Plot(plot::PlotArgs),
+    Results(results::ResultsArgs),
+    Replay(replay::ReplayArgs),
+    Mcap(mcap::McapArgs),
+    Serve(serve::ServeArgs),
+    Pil(pil::PilArgs),
+    Hitl(hitl::HitlArgs),
+    BringUp(bring_up::BringUpArgs),
+    Completions(shell::CompletionsArgs),
+    Man(shell::ManArgs),
 }
 
-impl Other {
+impl ExtraCommand {
     /// Runs the command; `program` is the whole command line's definition.
-    pub(super) fn run(self, program: Command) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self, program: Command) -> Result<ExitCode, CommandError> {
         match self {
-            Other::Fly(fly) => fly.run(),
-            Other::Campaign(campaign) => campaign.run(),
-            Other::Merge(merge) => merge.run(),
-            Other::Compare(compare) => compare.run(),
-            Other::Again(again) => again.run(program),
-            Other::Tune(tune) => tune.run(),
-            Other::Check(check) => check.run(),
-            Other::Scenarios(scenarios) => scenarios.run(),
-            Other::Campaigns(campaigns) => campaigns.run(),
-            Other::Suites(suites) => suites.run(),
-            Other::Vehicles(vehicles) => vehicles.run(),
-            Other::Params(params) => params.run(),
-            Other::Plot(plot) => plot.run(),
-            Other::Results(results) => results.run(),
-            Other::Replay(replay) => replay.run(),
-            Other::Mcap(mcap) => mcap.run(),
-            Other::Serve(serve) => serve.run(),
-            Other::Pil(pil) => pil.run(),
-            Other::Hitl(hitl) => hitl.run(),
-            Other::BringUp(bring_up) => bring_up.run(),
-            Other::Completions(completions) => completions.run(),
-            Other::Man(man) => man.run(program),
+            ExtraCommand::Fly(fly) => fly.run(),
+            ExtraCommand::Campaign(campaign) => campaign.run(),
+            ExtraCommand::Merge(merge) => merge.run(),
+            ExtraCommand::Compare(compare) => compare.run(),
+            ExtraCommand::Again(again) => again.run(program),
+            ExtraCommand::Tune(tune) => tune.run(),
+            ExtraCommand::Check(check) => check.run(),
+            ExtraCommand::Scenarios(scenarios) => scenarios.run(),
+            ExtraCommand::Campaigns(campaigns) => campaigns.run(),
+            ExtraCommand::Suites(suites) => suites.run(),
+            ExtraCommand::Vehicles(vehicles) => vehicles.run(),
+            ExtraCommand::Params(params) => params.run(),
+            ExtraCommand::Plot(plot) => plot.run(),
+            ExtraCommand::Results(results) => results.run(),
+            ExtraCommand::Replay(replay) => replay.run(),
+            ExtraCommand::Mcap(mcap) => mcap.run(),
+            ExtraCommand::Serve(serve) => serve.run(),
+            ExtraCommand::Pil(pil) => pil.run(),
+            ExtraCommand::Hitl(hitl) => hitl.run(),
+            ExtraCommand::BringUp(bring_up) => bring_up.run(),
+            ExtraCommand::Completions(completions) => completions.run(),
+            ExtraCommand::Man(man) => man.run(program),
         }
     }
 }

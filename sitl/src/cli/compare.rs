@@ -1,10 +1,10 @@
 //! `sitl compare`: flies several controllers in the same scenarios.
 
+use super::comparison_output::ComparisonOutputArgs;
 use super::over_seeds::{fly, record};
-use super::target::Target;
-use super::terminal::Failure;
-use super::vehicle::OnVehicle;
-use super::written::Output;
+use super::target::TargetArg;
+use super::terminal::CommandError;
+use super::vehicle::VehicleArgs;
 use super::{interrupt, random, rough, suite};
 use afbc_campaign::compare::{self, choose, standard};
 use afbc_campaign::suite::suite_at;
@@ -25,10 +25,10 @@ use std::process::ExitCode;
 /// what it is not told; how good its estimate is stands in out/rough-estimate. A lost vehicle is part of the comparison
 /// and does not change the exit code.
 #[derive(Args, Debug)]
-pub(crate) struct Compare {
+pub(crate) struct CompareArgs {
     /// Built-in scenarios or scenario files; the contenders of all of them fly each one
     #[arg(value_name = "SCENARIO")]
-    scenarios: Vec<Target>,
+    scenarios: Vec<TargetArg>,
 
     /// Fly this suite instead: name of a built-in one (`sitl suites`), or path of a file
     #[arg(long, value_name = "SUITE", conflicts_with = "scenarios")]
@@ -49,18 +49,18 @@ pub(crate) struct Compare {
     against: Option<String>,
 
     #[command(flatten)]
-    on: OnVehicle,
+    on: VehicleArgs,
 
     #[command(flatten)]
-    output: Output,
+    output: ComparisonOutputArgs,
 
     #[command(flatten)]
-    random: random::Options,
+    random: random::RandomArgs,
 }
 
-impl Compare {
+impl CompareArgs {
     /// Flies, writes the results and prints a table.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         if let Some(path) = &self.suite {
             let own = self.random.own()?;
             let known = compare::standard_and_monitored();
@@ -70,7 +70,7 @@ impl Compare {
                 [] if own.is_empty() => known,
                 names => choose(&known, names)?,
             };
-            let Compare { random, seeds, against, output, .. } = self;
+            let CompareArgs { random, seeds, against, output, .. } = self;
             let names = contenders.iter().chain(&own).map(|contender| contender.name.as_str());
             flies(against.as_deref(), &names.collect::<Vec<_>>())?;
             if is_rough {
@@ -99,8 +99,8 @@ impl Compare {
         if let Some(option) = self.random.given() {
             return Err(format!("{option}: only --suite random takes it; leave it out").into());
         }
-        let named = if self.scenarios.is_empty() { &[Target::from("hardware")][..] } else { &self.scenarios };
-        let mut scenarios = named.iter().map(Target::scenario).collect::<Result<Vec<_>, _>>()?;
+        let named = if self.scenarios.is_empty() { &[TargetArg::from("hardware")][..] } else { &self.scenarios };
+        let mut scenarios = named.iter().map(TargetArg::scenario).collect::<Result<Vec<_>, _>>()?;
         let own = if self.scenarios.is_empty() { standard() } else { compare::contenders(&scenarios) };
         let contenders = if self.controllers.is_empty() { own } else { choose(&own, &self.controllers)? };
         for scenario in &mut scenarios {
@@ -124,7 +124,7 @@ impl Compare {
 }
 
 /// Checks that `against` names one of the contenders.
-fn flies(against: Option<&str>, names: &[&str]) -> Result<(), Failure> {
+fn flies(against: Option<&str>, names: &[&str]) -> Result<(), CommandError> {
     let Some(against) = against.filter(|against| !names.contains(against)) else { return Ok(()) };
     let cure = match nearest(against, names.iter().copied()) {
         Some(similar) => format!("did you mean {similar}?"),

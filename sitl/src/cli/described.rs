@@ -10,36 +10,36 @@ use serde::Serialize;
 
 /// Summary of a contender.
 #[derive(Serialize)]
-struct Who<'a> {
+struct ContenderJson<'a> {
     name: &'a str,
     controller: &'static str,
     profile: Option<&'static str>,
 }
 
-fn who<'a>(contenders: &'a [Contender]) -> Vec<Who<'a>> {
+fn who<'a>(contenders: &'a [Contender]) -> Vec<ContenderJson<'a>> {
     let who = |contender: &'a Contender| {
         let (controller, profile) = (contender.kind().name(), contender.profile().map(Profile::name));
-        Who { name: &contender.name, controller, profile }
+        ContenderJson { name: &contender.name, controller, profile }
     };
     contenders.iter().map(who).collect()
 }
 
 /// Summary of a scenario.
 #[derive(Serialize)]
-struct ScenarioWords<'a> {
+struct ScenarioJson<'a> {
     kind: &'static str,
     name: &'a str,
     description: &'a str,
     duration_s: f64,
     plant: &'static str,
     seed: u64,
-    contenders: Vec<Who<'a>>,
+    contenders: Vec<ContenderJson<'a>>,
 }
 
 /// Returns the summary of a scenario.
 pub(crate) fn scenario(scenario: &Scenario) -> impl Serialize + '_ {
     let Scenario { name, description, duration_s, model, seed, contenders, .. } = scenario;
-    ScenarioWords {
+    ScenarioJson {
         kind: "scenario",
         name,
         description,
@@ -52,7 +52,7 @@ pub(crate) fn scenario(scenario: &Scenario) -> impl Serialize + '_ {
 
 /// Summary of a vehicle.
 #[derive(Serialize)]
-struct VehicleWords<'a> {
+struct VehicleJson<'a> {
     kind: &'static str,
     name: &'a str,
     description: &'a str,
@@ -63,12 +63,12 @@ struct VehicleWords<'a> {
 /// Returns the summary of a vehicle.
 pub(crate) fn vehicle(vehicle: &Vehicle) -> impl Serialize + '_ {
     let Vehicle { name, description, rotors, parameters, .. } = vehicle;
-    VehicleWords { kind: "vehicle", name, description, rotors: rotors.len(), mass_kg: parameters.mass_kg }
+    VehicleJson { kind: "vehicle", name, description, rotors: rotors.len(), mass_kg: parameters.mass_kg }
 }
 
 /// Summary of a campaign.
 #[derive(Serialize)]
-struct CampaignWords<'a> {
+struct CampaignJson<'a> {
     kind: &'static str,
     name: &'a str,
     description: &'a str,
@@ -76,13 +76,13 @@ struct CampaignWords<'a> {
     seed: u64,
     duration_s: f64,
     plant: &'static str,
-    contenders: Vec<Who<'a>>,
+    contenders: Vec<ContenderJson<'a>>,
     trajectories: Vec<&'a str>,
-    drawn: Vec<Drawn>,
+    drawn: Vec<DrawnJson>,
 }
 
 #[derive(Serialize)]
-struct Drawn {
+struct DrawnJson {
     name: &'static str,
     ends: [f64; 2],
 }
@@ -91,8 +91,8 @@ struct Drawn {
 pub(crate) fn campaign(campaign: &Campaign) -> impl Serialize + '_ {
     let Campaign { name, description, flights, seed, scenario, trajectories, spreads, .. } = campaign;
     let drawn =
-        spreads.iter().filter_map(|spread| Some(Drawn { name: spread.quantity()?.range.name, ends: spread.ends }));
-    CampaignWords {
+        spreads.iter().filter_map(|spread| Some(DrawnJson { name: spread.quantity()?.range.name, ends: spread.ends }));
+    CampaignJson {
         kind: "campaign",
         name,
         description,
@@ -108,18 +108,18 @@ pub(crate) fn campaign(campaign: &Campaign) -> impl Serialize + '_ {
 
 /// Result of a search for gains.
 #[derive(Serialize)]
-struct Tuned {
+struct TunedJson {
     controller: &'static str,
     seed: u64,
     tries: usize,
     cost_before: f64,
     cost_after: f64,
-    gains: Vec<Gain>,
+    gains: Vec<GainJson>,
     contender_toml: String,
 }
 
 #[derive(Serialize)]
-struct Gain {
+struct GainJson {
     name: String,
     before: f32,
     after: f32,
@@ -128,8 +128,8 @@ struct Gain {
 /// Returns the result of a search with this seed; `name` is the contender's name.
 pub(crate) fn tuned(found: &SearchResult, name: &str, seed: u64) -> impl Serialize {
     let SearchResult { contender, before, after, evaluations, changes } = found;
-    let gain = |GainChange { name, from, to }: &GainChange| Gain { name: name.clone(), before: *from, after: *to };
-    Tuned {
+    let gain = |GainChange { name, from, to }: &GainChange| GainJson { name: name.clone(), before: *from, after: *to };
+    TunedJson {
         controller: contender.kind().name(),
         seed,
         tries: *evaluations,

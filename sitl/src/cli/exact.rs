@@ -1,11 +1,11 @@
 //! `sitl replay --exact`: replays an exact log with the firmware's code.
 
+use super::comparison_output::show;
 use super::interrupt;
-use super::json::{self, Json};
-use super::place::Place;
-use super::progress::Progress;
-use super::terminal::{Failure, print, say};
-use super::written::show;
+use super::json::{self, JsonArgs};
+use super::output_folder::OutputFolderArgs;
+use super::progress::CommandProgress;
+use super::terminal::{CommandError, print, say};
 use afbc_replay::exact::{SettingChange, replay};
 use afbc_report::exact as report;
 use afbc_report::exact::{ReplayedLog, problem, table, write};
@@ -21,7 +21,7 @@ const QUIET_KB: u64 = 16 * 1024;
 
 /// Options of an exact replay.
 #[derive(Args, Debug)]
-pub(super) struct Exact {
+pub(super) struct ExactReplayArgs {
     /// The log is an exact log: run the firmware's own code over it, and compare every motor command
     #[arg(long)]
     pub(super) exact: bool,
@@ -36,13 +36,14 @@ pub(super) struct Exact {
     vehicle: Option<PathBuf>,
 }
 
-impl Exact {
+impl ExactReplayArgs {
     /// Replays the log, writes the results and prints them.
-    pub(super) fn run(&self, path: &Path, place: &Place, json: Json) -> Result<ExitCode, Failure> {
+    pub(super) fn run(&self, path: &Path, place: &OutputFolderArgs, json: JsonArgs) -> Result<ExitCode, CommandError> {
         let vehicle = self.vehicle.as_deref().map(vehicle_named).transpose()?;
         let name = path.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
         let all = path.metadata().map_or(0, |metadata| metadata.len()) / KB;
-        let progress = if all > QUIET_KB { Progress::new(&name, "KB", all, 0) } else { Progress::hidden() };
+        let progress =
+            if all > QUIET_KB { CommandProgress::new(&name, "KB", all, 0) } else { CommandProgress::hidden() };
         let mut rest = 0;
         let replayed = replay(path, vehicle.as_ref(), &self.changes, |bytes| {
             rest += bytes;

@@ -1,9 +1,9 @@
 //! `sitl tune --fleet`: searches gains of several laws on several vehicles.
 
-use super::progress::Progress;
-use super::terminal::{Failure, INTERRUPTED, print, say};
+use super::progress::CommandProgress;
+use super::terminal::{CommandError, INTERRUPTED, print, say};
 use afbc_scenario::contender::{ControllerKind, Law};
-use afbc_tune::fleet::{FleetOutcome, GAINS, Results, Search};
+use afbc_tune::fleet::{FleetOutcome, FleetResults, GAINS, GainSearch};
 use afbc_tune::{SearchOptions, is_paper};
 use afbc_vehicles::Vehicle;
 use std::fmt::Write as _;
@@ -17,7 +17,7 @@ const BEGIN: &str = "# Gains found by `sitl tune --fleet`, up to the line of the
 const END: &str = "# End of the gains found by `sitl tune --fleet`.";
 
 /// Parameters of the searches.
-pub(super) struct Fleet<'a> {
+pub(super) struct FleetArgs<'a> {
     pub(super) folder: &'a Path,
     /// Names of laws; all laws if empty.
     pub(super) laws: &'a [String],
@@ -30,8 +30,8 @@ pub(super) struct Fleet<'a> {
     pub(super) write: Option<&'a Path>,
 }
 
-impl Fleet<'_> {
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+impl FleetArgs<'_> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let laws = laws(self.laws)?;
         let vehicles = if self.vehicles.is_empty() {
             afbc_vehicles::BUILT_IN.iter().map(afbc_files::read::BuiltIn::read).collect::<Result<_, _>>()?
@@ -53,10 +53,10 @@ impl Fleet<'_> {
         let mut searches = Vec::new();
         for vehicle in &vehicles {
             for kind in &laws {
-                searches.push(Search::new(*kind, vehicle, self.flying)?);
+                searches.push(GainSearch::new(*kind, vehicle, self.flying)?);
             }
         }
-        let results = Results::open(self.folder, &searches, self.course, self.flying)?;
+        let results = FleetResults::open(self.folder, &searches, self.course, self.flying)?;
         let mut done = 0;
         for search in &searches {
             done += u64::from(results.outcome(search)?.is_some());
@@ -65,7 +65,7 @@ impl Fleet<'_> {
         let stopper = Arc::clone(&stop);
         ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
         let (each, all) = (self.course.budget as u64, searches.len() as u64);
-        let progress = Progress::new("tune --fleet", "tried", each * all, each * done);
+        let progress = CommandProgress::new("tune --fleet", "tried", each * all, each * done);
         let outcomes = results.complete(&searches, &stop, |tries| progress.add(tries as u64))?;
         drop(progress);
         let Some(outcomes) = outcomes else {
@@ -85,7 +85,7 @@ impl Fleet<'_> {
                 // The new file is parsed first, so that no file that cannot fly is written.
                 let read = afbc_vehicles::parse(&path.display().to_string(), &whole, &vehicle.name)?;
                 Law::on(ControllerKind::Afbc, &read, afbc::Profile::Flight)?;
-                afbc_files::place(&path, |out| out.write_all(whole.as_bytes()))
+                afbc_files::write_atomically(&path, |out| out.write_all(whole.as_bytes()))
                     .map_err(|source| format!("{}: cannot be written ({source}); make it writable", path.display()))?;
                 let _ = writeln!(text, "{}: written", path.display());
             }
@@ -102,7 +102,7 @@ fn written(vehicles: &[Vehicle]) -> impl Iterator<Item = &Vehicle> {
 
 /// Returns the laws with these names. Without names, returns all laws except backstepping, which flies with AFBC's
 /// gains.
-fn laws(names: &[String]) -> Result<Vec<ControllerKind>, Failure> {
+fn laws(names: &[String]) -> Result<Vec<ControllerKind>, CommandError> {
     let all = ControllerKind::all().into_iter();
     if names.is_empty() {
         return Ok(all.filter(|kind| *kind != ControllerKind::Backstepping).collect());
@@ -116,7 +116,7 @@ fn laws(names: &[String]) -> Result<Vec<ControllerKind>, Failure> {
 
 /// Returns the path of the vehicle's file in `folder`, and its text with `gains` between the marker lines. If the file
 /// has no marker lines, they are appended.
-fn with_gains(folder: &Path, vehicle: &str, gains: &str) -> Result<(PathBuf, String), Failure> {
+fn with_gains(folder: &Path, vehicle: &str, gains: &str) -> Result<(PathBuf, String), CommandError> {
     let path = folder.join(format!("{vehicle}.toml"));
     let text = std::fs::read_to_string(&path).map_err(|error| {
         format!("{}: cannot be read ({error}); --write takes the folder of the vehicles' files", path.display())

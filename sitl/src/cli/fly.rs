@@ -1,14 +1,14 @@
 //! `sitl fly`: flies one scenario, or a plan of a ground station.
 
-use super::aboard::{AboardLogs, LogOutputs, aboard};
-use super::flying::{Flying, report};
-use super::json::Json;
+use super::firmware_flight::{FirmwareLogs, LogOutputs, firmware_flight};
+use super::flight_args::{FlightArgs, report};
+use super::json::JsonArgs;
 use super::mcap::FlightMcap;
-use super::place::Place;
+use super::output_folder::OutputFolderArgs;
 use super::plan::PlanFlight;
-use super::target::{Target, is_plan};
-use super::terminal::{Failure, say};
-use super::vehicle::OnVehicle;
+use super::target::{TargetArg, is_plan};
+use super::terminal::{CommandError, say};
+use super::vehicle::VehicleArgs;
 use afbc_scenario::Scenario;
 use clap::Args;
 use std::path::PathBuf;
@@ -21,9 +21,9 @@ use std::process::ExitCode;
 /// options then --vehicle, --duration, --exact-log, --ulog and --mcap apply. It exits with 1 if the mission is not
 /// completed.
 #[derive(Args, Debug)]
-pub(crate) struct Fly {
+pub(crate) struct FlyArgs {
     /// Name of a built-in scenario, or path of a scenario file or of a plan
-    scenario: Target,
+    scenario: TargetArg,
 
     /// Fly only this law or contender; may be given more than once. A law that the scenario lacks flies with its
     /// default gains
@@ -49,21 +49,21 @@ pub(crate) struct Fly {
     seed: Option<u64>,
 
     #[command(flatten)]
-    on: OnVehicle,
+    on: VehicleArgs,
 
     #[command(flatten)]
-    flying: Flying,
+    flying: FlightArgs,
 
     #[command(flatten)]
-    place: Place,
+    place: OutputFolderArgs,
 
     #[command(flatten)]
-    json: Json,
+    json: JsonArgs,
 }
 
-impl Fly {
+impl FlyArgs {
     /// Flies, writes the results and prints a table.
-    pub(super) fn run(mut self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(mut self) -> Result<ExitCode, CommandError> {
         if is_plan(self.scenario.path()) {
             return self.fly_plan();
         }
@@ -75,7 +75,7 @@ impl Fly {
         let scenario = Scenario { seed: self.seed.unwrap_or(scenario.seed), ..scenario };
         let name = scenario.name.clone();
         let is_logged = self.mcap.is_some() || self.exact_log.is_some() || self.ulog.is_some();
-        let firmware = is_logged.then(|| aboard(&scenario, self.flying.duration)).transpose()?;
+        let firmware = is_logged.then(|| firmware_flight(&scenario, self.flying.duration)).transpose()?;
         // Checked before the flights, so that a file that cannot be written costs no flight; created once everything
         // else is right.
         let mcap = FlightMcap::plan(self.mcap, &mut self.ulog)?;
@@ -83,7 +83,7 @@ impl Fly {
         let mut logs = None;
         let open = || {
             let folder = self.place.open(&name)?;
-            logs = Some(AboardLogs::create(&outputs)?);
+            logs = Some(FirmwareLogs::create(&outputs)?);
             Ok(folder)
         };
         let (folder, flown) = self.flying.fly(vec![scenario], open)?;
@@ -97,9 +97,9 @@ impl Fly {
     }
 }
 
-impl Fly {
-    fn fly_plan(self) -> Result<ExitCode, Failure> {
-        let Fly { scenario, controllers, seed, exact_log, ulog, mcap, on, flying, json, .. } = self;
+impl FlyArgs {
+    fn fly_plan(self) -> Result<ExitCode, CommandError> {
+        let FlyArgs { scenario, controllers, seed, exact_log, ulog, mcap, on, flying, json, .. } = self;
         let path = scenario.path().to_path_buf();
         if !controllers.is_empty() || json.json || flying.log_hz.is_some() || seed.is_some() {
             let options = "--controller, --seed, --log-hz and --json";

@@ -1,9 +1,9 @@
 //! `sitl hitl`: flies a real board over a serial port.
 
-use super::in_the_loop::{InTheLoop, Recorder, outcome};
-use super::target::Target;
-use super::terminal::{Failure, print};
-use crate::serial::{self, Serial};
+use super::in_the_loop::{InTheLoopArgs, LoopRecorder, outcome};
+use super::target::TargetArg;
+use super::terminal::{CommandError, print};
+use crate::serial::{self, SerialBoard};
 use afbc_hil::{LoopEnd, MessagePeriods, Station};
 use afbc_onboard::BAUD;
 use afbc_sim::flight::Sample;
@@ -18,10 +18,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// The board flies a simulated vehicle, but ITS MOTOR OUTPUTS ARE LIVE: remove the propellers, or leave the motors
 /// unpowered. Ctrl-C disarms. See docs/hitl.md.
 #[derive(Args, Debug)]
-pub(crate) struct Hitl {
+pub(crate) struct HitlArgs {
     /// Name of a built-in scenario, or path of a scenario file
     #[arg(default_value = "paper")]
-    scenario: Target,
+    scenario: TargetArg,
 
     /// Serial port of the board
     #[arg(long, value_name = "DEVICE", required_unless_present = "list")]
@@ -36,12 +36,12 @@ pub(crate) struct Hitl {
     list: bool,
 
     #[command(flatten)]
-    flying: InTheLoop,
+    flying: InTheLoopArgs,
 }
 
-impl Hitl {
+impl HitlArgs {
     /// Flies and prints the results.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let Some(port) = self.port.filter(|_| !self.list) else {
             let ports = serial::ports()?;
             print(&if ports.is_empty() { "no serial port\n".into() } else { ports.join("\n") + "\n" })?;
@@ -53,8 +53,8 @@ impl Hitl {
         let stop = Arc::new(AtomicBool::new(false));
         let stopper = Arc::clone(&stop);
         ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
-        let mut serial = Serial::open(&port, self.baud)?;
-        let mut recorder = Recorder::new(&scenario, output.as_ref())?;
+        let mut serial = SerialBoard::open(&port, self.baud)?;
+        let mut recorder = LoopRecorder::new(&scenario, output.as_ref())?;
         print(&format!(
             "{}: {} s in real time; {} baud carry a state every {} ms ({:.0} Hz), a setpoint every {} ms\n",
             scenario.name,

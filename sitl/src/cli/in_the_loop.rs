@@ -1,9 +1,9 @@
 //! Options, log and output that `pil` and `hitl` share.
 
-use super::target::Target;
-use super::terminal::Failure;
-use super::vehicle::OnVehicle;
-use afbc_files::Output;
+use super::target::TargetArg;
+use super::terminal::CommandError;
+use super::vehicle::VehicleArgs;
+use afbc_files::OutputFile;
 use afbc_hil::{Error, Log, LoopEnd};
 use afbc_scenario::{DURATION, Scenario};
 use afbc_sim::flight::Sample;
@@ -21,13 +21,13 @@ use std::time::Duration;
 
 /// Options of every flight in the loop.
 #[derive(Args, Clone, Debug)]
-pub(crate) struct InTheLoop {
+pub(crate) struct InTheLoopArgs {
     /// Length of the flight in seconds, instead of the scenario's
     #[arg(long, value_name = "SECONDS")]
     duration: Option<f64>,
 
     #[command(flatten)]
-    pub(super) on: OnVehicle,
+    pub(super) on: VehicleArgs,
 
     /// Log the flight to this CSV file, which must not exist, 100 rows per second
     #[arg(long, value_name = "CSV")]
@@ -35,7 +35,7 @@ pub(crate) struct InTheLoop {
 }
 
 /// Formats the end of the flight and, if it was completed, its errors next to those of a flight without a link.
-pub(crate) fn outcome(scenario: &Scenario, metrics: &Metrics, end: &LoopEnd) -> Result<String, Failure> {
+pub(crate) fn outcome(scenario: &Scenario, metrics: &Metrics, end: &LoopEnd) -> Result<String, CommandError> {
     let LoopEnd { lost, interrupted, disarmed } = end;
     let mut text = match (lost, interrupted) {
         (None, false) => {
@@ -51,9 +51,9 @@ pub(crate) fn outcome(scenario: &Scenario, metrics: &Metrics, end: &LoopEnd) -> 
     Ok(text)
 }
 
-impl InTheLoop {
+impl InTheLoopArgs {
     /// Returns the scenario; fails if the firmware cannot fly it.
-    pub(crate) fn scenario(&self, target: &Target) -> Result<Scenario, Failure> {
+    pub(crate) fn scenario(&self, target: &TargetArg) -> Result<Scenario, CommandError> {
         let mut scenario = self.on.put(target.scenario()?)?;
         scenario.duration_s = self.duration.unwrap_or(scenario.duration_s);
         DURATION.check(scenario.duration_s)?;
@@ -62,13 +62,13 @@ impl InTheLoop {
     }
 
     /// Returns the output file of the log, if a log is requested.
-    pub(crate) fn output(&self) -> Result<Option<Output>, Failure> {
-        Ok(self.out.as_deref().map(|out| Output::new(out, "--out")).transpose()?)
+    pub(crate) fn output(&self) -> Result<Option<OutputFile>, CommandError> {
+        Ok(self.out.as_deref().map(|out| OutputFile::new(out, "--out")).transpose()?)
     }
 }
 
 /// Log, metrics and progress of a flight.
-pub(crate) struct Recorder {
+pub(crate) struct LoopRecorder {
     metrics: Accumulator,
     log: Option<Log>,
     progress: LiveProgress,
@@ -85,14 +85,14 @@ struct LiveProgress {
 /// Time between updates of the progress bar.
 const PROGRESS_EVERY: Duration = Duration::from_millis(100);
 
-impl Recorder {
+impl LoopRecorder {
     /// Creates the recorder of a flight of `scenario`, and its log file.
-    pub(crate) fn new(scenario: &Scenario, output: Option<&Output>) -> Result<Self, Failure> {
-        let create = |output: &Output| Ok::<_, Failure>(Log::new(output.create()?, scenario.rotors.len())?);
+    pub(crate) fn new(scenario: &Scenario, output: Option<&OutputFile>) -> Result<Self, CommandError> {
+        let create = |output: &OutputFile| Ok::<_, CommandError>(Log::new(output.create()?, scenario.rotors.len())?);
         let log = output.map(create).transpose()?;
         let steps = (scenario.duration_s * 1000.0).round() as u64;
         let progress = LiveProgress::new(steps);
-        Ok(Recorder { metrics: Accumulator::default(), log, progress, failure: None })
+        Ok(LoopRecorder { metrics: Accumulator::default(), log, progress, failure: None })
     }
 
     /// Records one step; aborts the flight if the step cannot be logged.

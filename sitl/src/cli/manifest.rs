@@ -1,6 +1,6 @@
 //! `manifest.json` in a folder of results: inputs, command, and machine that made them.
 
-use super::terminal::Failure;
+use super::terminal::CommandError;
 use afbc_files::Folder;
 use afbc_files::seal::{self, hash_of, hash_of_file};
 use afbc_scenario::Scenario;
@@ -33,9 +33,9 @@ pub(super) struct ResultsManifest {
     /// Hash of version, scenarios, vehicles, contenders with their gains, and seeds.
     pub(super) fingerprint: String,
     /// Scenarios that were flown.
-    pub(super) flown: Vec<FlownWords>,
+    pub(super) flown: Vec<FlownJson>,
     /// Machine that made the results; results do not depend on it.
-    pub(super) machine: Machine,
+    pub(super) machine: HostMachine,
     /// Hash of each file of the results.
     pub(super) results: BTreeMap<String, String>,
     checksum: String,
@@ -43,7 +43,7 @@ pub(super) struct ResultsManifest {
 
 /// Scenario that was flown.
 #[derive(Debug, Serialize, Deserialize)]
-pub(super) struct FlownWords {
+pub(super) struct FlownJson {
     name: String,
     /// Seeds of each contender's flights.
     seeds: Vec<u64>,
@@ -52,7 +52,7 @@ pub(super) struct FlownWords {
 }
 
 #[derive(Debug, Serialize, Deserialize)]
-pub(super) struct Machine {
+pub(super) struct HostMachine {
     os: String,
     architecture: String,
     cores: usize,
@@ -69,11 +69,11 @@ pub(super) fn commit() -> Option<String> {
 }
 
 /// Scenario, and the seeds of each contender's flights.
-pub(super) type Flown<'a> = (&'a Scenario, Vec<u64>);
+pub(super) type FlownScenario<'a> = (&'a Scenario, Vec<u64>);
 
 /// Returns the manifest's entry for a scenario.
-pub(super) fn words((scenario, seeds): &Flown<'_>) -> Result<FlownWords, serde_json::Error> {
-    Ok(FlownWords { name: scenario.name.clone(), seeds: seeds.clone(), scenario: serde_json::to_value(scenario)? })
+pub(super) fn words((scenario, seeds): &FlownScenario<'_>) -> Result<FlownJson, serde_json::Error> {
+    Ok(FlownJson { name: scenario.name.clone(), seeds: seeds.clone(), scenario: serde_json::to_value(scenario)? })
 }
 
 /// Writes the manifest of the results `files` in `folder`. All of `flown` enters the fingerprint; only `shown` is
@@ -81,9 +81,9 @@ pub(super) fn words((scenario, seeds): &Flown<'_>) -> Result<FlownWords, serde_j
 pub(super) fn write(
     folder: &Folder,
     files: &[PathBuf],
-    flown: &[Flown<'_>],
-    shown: &[Flown<'_>],
-) -> Result<(), Failure> {
+    flown: &[FlownScenario<'_>],
+    shown: &[FlownScenario<'_>],
+) -> Result<(), CommandError> {
     let shown = shown.iter().map(words).collect::<Result<_, serde_json::Error>>()?;
     write_as(folder, files, own_command(), hash_of(&(version(), flown)), shown)
 }
@@ -94,8 +94,8 @@ pub(super) fn write_as(
     files: &[PathBuf],
     command: Vec<String>,
     fingerprint: String,
-    flown: Vec<FlownWords>,
-) -> Result<(), Failure> {
+    flown: Vec<FlownJson>,
+) -> Result<(), CommandError> {
     let hash = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         Ok((name, hash_of_file(path)?))
@@ -106,7 +106,7 @@ pub(super) fn write_as(
         command,
         fingerprint,
         flown,
-        machine: Machine {
+        machine: HostMachine {
             os: env::consts::OS.into(),
             architecture: env::consts::ARCH.into(),
             cores: thread::available_parallelism().map_or(1, usize::from),
@@ -115,7 +115,7 @@ pub(super) fn write_as(
         checksum: seal::OPEN.into(),
     };
     folder.add(&[NAME])?;
-    folder.place(NAME, |out| seal::json(out, &manifest))?;
+    folder.write(NAME, |out| seal::json(out, &manifest))?;
     Ok(())
 }
 
@@ -143,7 +143,7 @@ fn command(arguments: impl Iterator<Item = String>) -> Vec<String> {
 }
 
 /// Reads the manifest at `path`, or the one in the folder `path`.
-pub(super) fn read(path: &Path) -> Result<ResultsManifest, Failure> {
+pub(super) fn read(path: &Path) -> Result<ResultsManifest, CommandError> {
     let path = if path.is_dir() { path.join(NAME) } else { path.to_path_buf() };
     let name = path.display();
     let cure = "name the manifest.json of a folder of results";

@@ -1,7 +1,7 @@
 //! `sitl mcap` and `sitl fly --mcap`: writes logs as MCAP.
 
-use super::terminal::{Failure, print, say};
-use afbc_files::Output;
+use super::terminal::{CommandError, print, say};
+use afbc_files::OutputFile;
 use afbc_replay::mcap::convert;
 use clap::Args;
 use std::fs;
@@ -11,7 +11,7 @@ use std::process::ExitCode;
 
 /// Convert a ULog, of --ulog or of PX4, to MCAP, for Foxglove, PlotJuggler, Rerun and ROS 2's tools
 #[derive(Args, Debug)]
-pub(crate) struct Mcap {
+pub(crate) struct McapArgs {
     /// Path of the log
     log: PathBuf,
 
@@ -20,22 +20,22 @@ pub(crate) struct Mcap {
     out: Option<PathBuf>,
 }
 
-impl Mcap {
+impl McapArgs {
     /// Converts the log.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let beside = || PathBuf::from(self.log.file_name().unwrap_or_default()).with_extension("mcap");
         let path = self.out.clone().unwrap_or_else(beside);
-        let line = converted(&self.log, &Output::new(&path, "--out")?)?;
+        let line = converted(&self.log, &OutputFile::new(&path, "--out")?)?;
         print(&format!("{line}\n"))?;
         Ok(ExitCode::SUCCESS)
     }
 }
 
 /// Converts a log, and returns a line about the result. Leaves no file behind if it fails.
-fn converted(log: &Path, output: &Output) -> Result<String, Failure> {
+fn converted(log: &Path, output: &OutputFile) -> Result<String, CommandError> {
     let mut bytes = Vec::new();
     let summary = convert(log, Cursor::new(&mut bytes))?;
-    output.place(|out| out.write_all(&bytes))?;
+    output.write(|out| out.write_all(&bytes))?;
     let damaged = match summary.damaged {
         0 => String::new(),
         pieces => format!("; {pieces} pieces of the log are damaged, and missing"),
@@ -46,7 +46,7 @@ fn converted(log: &Path, output: &Output) -> Result<String, Failure> {
 
 /// MCAP file of a flight, converted from its ULog after the flight.
 pub(super) struct FlightMcap {
-    output: Output,
+    output: OutputFile,
     /// ULog to convert.
     ulog: PathBuf,
     /// The same ULog, if it is only temporary.
@@ -65,17 +65,17 @@ impl Drop for TemporaryFile {
 
 impl FlightMcap {
     /// Plans the MCAP file at `path`, if any. Sets `ulog` to a temporary file if the flight's ULog was not requested.
-    pub(super) fn plan(path: Option<PathBuf>, ulog: &mut Option<PathBuf>) -> Result<Option<Self>, Failure> {
+    pub(super) fn plan(path: Option<PathBuf>, ulog: &mut Option<PathBuf>) -> Result<Option<Self>, CommandError> {
         let Some(path) = path else { return Ok(None) };
         // The process id keeps two simultaneous flights from sharing the file.
         let temporary = ulog.is_none().then(|| path.with_extension(format!("{}.ulg", std::process::id())));
-        let output = Output::new(&path, "--mcap")?;
+        let output = OutputFile::new(&path, "--mcap")?;
         let ulog = ulog.get_or_insert_with(|| temporary.clone().unwrap_or_default()).clone();
         Ok(Some(FlightMcap { output, ulog, _temporary: temporary.map(TemporaryFile) }))
     }
 
     /// Converts the log.
-    pub(super) fn finish(self) -> Result<(), Failure> {
+    pub(super) fn finish(self) -> Result<(), CommandError> {
         say(&converted(&self.ulog, &self.output)?);
         Ok(())
     }

@@ -4,20 +4,18 @@
     allow(dead_code, reason = "some of what commands share is used by those left out only")
 )]
 
-mod flying;
+mod comparison_output;
+mod flight_args;
 mod interrupt;
 mod json;
 mod manifest;
+mod output_folder;
 mod paper;
-mod place;
 mod program;
 mod progress;
 mod terminal;
-mod written;
 
 // Commands other than `sitl paper`.
-#[cfg(feature = "all")]
-mod aboard;
 #[cfg(feature = "all")]
 mod again;
 #[cfg(feature = "all")]
@@ -34,6 +32,8 @@ mod completion;
 mod described;
 #[cfg(feature = "all")]
 mod exact;
+#[cfg(feature = "all")]
+mod firmware_flight;
 #[cfg(feature = "all")]
 mod fleet;
 #[cfg(feature = "all")]
@@ -79,9 +79,9 @@ mod tune;
 #[cfg(feature = "all")]
 mod vehicle;
 
-use clap::{Command as Program, CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
-use terminal::Failure;
+use terminal::CommandError;
 
 /// Flies an adaptive fuzzy backstepping (AFBC) quadrotor controller and other controllers in simulation.
 ///
@@ -95,18 +95,18 @@ use terminal::Failure;
 )]
 pub(crate) struct Cli {
     #[command(subcommand)]
-    command: Option<Command>,
+    command: Option<CliCommand>,
 
     #[command(flatten, next_help_heading = "Options of `sitl paper`")]
-    paper: paper::Paper,
+    paper: paper::PaperArgs,
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
-    Paper(paper::Paper),
+enum CliCommand {
+    Paper(paper::PaperArgs),
     #[cfg(feature = "all")]
     #[command(flatten)]
-    Other(Box<commands::Other>),
+    Other(Box<commands::ExtraCommand>),
     #[cfg(not(feature = "all"))]
     #[command(external_subcommand)]
     Absent(Vec<String>),
@@ -114,7 +114,7 @@ enum Command {
 
 impl Cli {
     /// Returns the definition of the whole command line.
-    pub(crate) fn program() -> Program {
+    pub(crate) fn program() -> Command {
         program::prepared(Self::command())
     }
 
@@ -125,13 +125,13 @@ impl Cli {
     }
 
     /// Runs the command.
-    pub(crate) fn run(self) -> Result<ExitCode, Failure> {
-        match self.command.unwrap_or(Command::Paper(self.paper)) {
-            Command::Paper(paper) => paper.run(),
+    pub(crate) fn run(self) -> Result<ExitCode, CommandError> {
+        match self.command.unwrap_or(CliCommand::Paper(self.paper)) {
+            CliCommand::Paper(paper) => paper.run(),
             #[cfg(feature = "all")]
-            Command::Other(other) => other.run(Self::command()),
+            CliCommand::Other(other) => other.run(Self::command()),
             #[cfg(not(feature = "all"))]
-            Command::Absent(words) => {
+            CliCommand::Absent(words) => {
                 let name = words.first().map_or("", String::as_str);
                 Err(format!(
                     "{name}: this program was built for `paper` alone; `cargo run --release -- {name}` \

@@ -1,7 +1,7 @@
 //! `--write PAGE`: writes a table between two marker lines of a document.
 
-use super::terminal::Failure;
-use afbc_files::place;
+use super::terminal::CommandError;
+use afbc_files::write_atomically;
 use afbc_report::markers;
 use std::fs;
 use std::path::Path;
@@ -11,8 +11,8 @@ use std::path::Path;
 pub(crate) fn write(
     path: &Path,
     markers: [&str; 2],
-    table: impl FnOnce() -> Result<String, Failure>,
-) -> Result<(), Failure> {
+    table: impl FnOnce() -> Result<String, CommandError>,
+) -> Result<(), CommandError> {
     let name = path.display();
     let with = |table: &str| {
         let page = fs::read_to_string(path).map_err(|error| format!("{name}: cannot be read ({error})"))?;
@@ -26,6 +26,6 @@ pub(crate) fn write(
     with("")?;
     let page = with(&table()?)?;
     // If the path is a symbolic link, its target is written, and the link stays.
-    let written = fs::canonicalize(path).and_then(|path| place(&path, |out| out.write_all(page.as_bytes())));
+    let written = fs::canonicalize(path).and_then(|path| write_atomically(&path, |out| out.write_all(page.as_bytes())));
     Ok(written.map_err(|error| format!("{name}: cannot be written ({error})"))?)
 }

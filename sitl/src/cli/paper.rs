@@ -1,9 +1,9 @@
 //! `sitl paper`: the paper's experiment.
 
-use super::flying::{Flying, report};
-use super::json::Json;
-use super::place::Place;
-use super::terminal::Failure;
+use super::flight_args::{FlightArgs, report};
+use super::json::JsonArgs;
+use super::output_folder::OutputFolderArgs;
+use super::terminal::CommandError;
 use afbc_plant::PlantModel;
 use afbc_report::claims::claims;
 use afbc_scenario::Scenario;
@@ -18,18 +18,18 @@ use std::process::ExitCode;
 /// The paper does not define its gusts of "1.2 N" or the signs of its uncertain parameters; both can be chosen. Exits
 /// with 0 even if the `forces` reading loses the vehicle, as is known; any other loss gives 1.
 #[derive(Args, Debug)]
-pub(crate) struct Paper {
+pub(crate) struct PaperArgs {
     /// Reading of the gusts
     #[arg(long, value_enum, default_value = "persistent")]
-    reading: GustReading,
+    reading: GustReadingArg,
 
     #[arg(long, value_enum, value_name = "SIGN", default_value = "+", hide_possible_values = true)]
     #[arg(help = "Sign of the inertia's error of 75 % from 20 s to 40 s: +, - or both")]
-    inertia: Signs,
+    inertia: SignsArg,
 
     #[arg(long, value_enum, value_name = "SIGN", default_value = "-", hide_possible_values = true)]
     #[arg(help = "Sign of the thrust factor's error of 40 % from 20 s to 40 s: +, - or both")]
-    thrust: Signs,
+    thrust: SignsArg,
 
     /// Fly with nominal parameters
     #[arg(long, conflicts_with_all = ["inertia", "thrust"])]
@@ -37,20 +37,20 @@ pub(crate) struct Paper {
 
     /// Equations of motion: the paper's (6), or the full rigid body (1)-(5)
     #[arg(long, value_enum, default_value = "simplified")]
-    plant: Plants,
+    plant: PlantsArg,
 
     #[command(flatten)]
-    flying: Flying,
+    flying: FlightArgs,
 
     #[command(flatten)]
-    place: Place,
+    place: OutputFolderArgs,
 
     #[command(flatten)]
-    json: Json,
+    json: JsonArgs,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum GustReading {
+enum GustReadingArg {
     /// Accelerations that persist from their onset
     Persistent,
     /// Accelerations for one second each
@@ -64,7 +64,7 @@ enum GustReading {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Signs {
+enum SignsArg {
     #[value(name = "+")]
     Plus,
     #[value(name = "-")]
@@ -73,54 +73,54 @@ enum Signs {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Plants {
+enum PlantsArg {
     Simplified,
     RigidBody,
     Both,
 }
 
-impl GustReading {
+impl GustReadingArg {
     fn readings(self) -> Vec<Option<Reading>> {
         match self {
-            GustReading::Persistent => vec![Some(Reading::Persistent)],
-            GustReading::Pulses => vec![Some(Reading::Pulses)],
-            GustReading::Forces => vec![Some(Reading::Forces)],
-            GustReading::None => vec![None],
-            GustReading::All => Reading::ALL.map(Some).to_vec(),
+            GustReadingArg::Persistent => vec![Some(Reading::Persistent)],
+            GustReadingArg::Pulses => vec![Some(Reading::Pulses)],
+            GustReadingArg::Forces => vec![Some(Reading::Forces)],
+            GustReadingArg::None => vec![None],
+            GustReadingArg::All => Reading::ALL.map(Some).to_vec(),
         }
     }
 }
 
-impl Signs {
+impl SignsArg {
     fn include(self, sign: Sign) -> bool {
         match self {
-            Signs::Plus => sign == Sign::Plus,
-            Signs::Minus => sign == Sign::Minus,
-            Signs::Both => true,
+            SignsArg::Plus => sign == Sign::Plus,
+            SignsArg::Minus => sign == Sign::Minus,
+            SignsArg::Both => true,
         }
     }
 }
 
-impl Plants {
+impl PlantsArg {
     fn models(self) -> &'static [PlantModel] {
         match self {
-            Plants::Simplified => &[PlantModel::Simplified],
-            Plants::RigidBody => &[PlantModel::RigidBody],
-            Plants::Both => &[PlantModel::Simplified, PlantModel::RigidBody],
+            PlantsArg::Simplified => &[PlantModel::Simplified],
+            PlantsArg::RigidBody => &[PlantModel::RigidBody],
+            PlantsArg::Both => &[PlantModel::Simplified, PlantModel::RigidBody],
         }
     }
 }
 
-impl Paper {
+impl PaperArgs {
     /// Flies, writes the results and prints a table.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let (folder, flown) = self.flying.fly(self.scenarios()?, || self.place.open("paper"))?;
         report(&folder, &flown, &claims(&flown), self.json)?;
         Ok(ExitCode::from(u8::from(flown.iter().any(unexpectedly_lost))))
     }
 
     /// Returns the scenarios of all requested combinations.
-    fn scenarios(&self) -> Result<Vec<Scenario>, Failure> {
+    fn scenarios(&self) -> Result<Vec<Scenario>, CommandError> {
         let wanted = |u: &Uncertainty| self.inertia.include(u.inertia) && self.thrust.include(u.thrust);
         let uncertainties = if self.no_uncertainty {
             vec![None]

@@ -1,10 +1,10 @@
 //! `sitl params`: converts the parameters of a vehicle from and to files of ground stations.
 
-use super::terminal::{Failure, print, say};
-use afbc_files::read::params::{Format, ParameterEntry, read, written};
+use super::terminal::{CommandError, print, say};
+use afbc_files::read::params::{ParameterEntry, ParameterFormat, read, written};
 use afbc_files::read::words::out_of_range;
-use afbc_files::read::{FileError, Source};
-use afbc_files::{Flash, Output};
+use afbc_files::read::{FileError, SourceFile};
+use afbc_files::{FlashFile, OutputFile};
 use afbc_onboard::parameters::{Kept, Parameter, ParameterTable, RecordChange};
 use afbc_scenario::vehicle_named;
 use afbc_store::{Error, RecordName, Store, hash};
@@ -18,17 +18,17 @@ use std::process::ExitCode;
 ///
 /// See docs/storage.md.
 #[derive(Args, Debug)]
-pub(crate) struct Params {
+pub(crate) struct ParamsArgs {
     #[command(subcommand)]
-    action: Action,
+    action: ParamsAction,
 }
 
 #[derive(Debug, Subcommand)]
-enum Action {
+enum ParamsAction {
     /// Print all parameters, or write them to a file
     Export {
         #[command(flatten)]
-        of: Of,
+        of: ParameterSourceArgs,
         /// File to write; by its name .parm is MAVProxy's, anything else QGroundControl's [default: standard output]
         #[arg(long, short, value_name = "FILE")]
         out: Option<PathBuf>,
@@ -37,27 +37,27 @@ enum Action {
         force: bool,
         /// Format, whatever the file's name
         #[arg(long, value_enum)]
-        format: Option<Style>,
+        format: Option<ParameterFormatArg>,
     },
     /// Put the values of a file into a store, which is made if there is none; all of them, or none if one is refused
     Import {
         /// File of parameters, in either format
         file: PathBuf,
         #[command(flatten)]
-        of: Of,
+        of: ParameterSourceArgs,
     },
     /// Print what differs from the vehicle's defaults: in a file of parameters, or in the store
     Diff {
         /// File of parameters, in either format
         file: Option<PathBuf>,
         #[command(flatten)]
-        of: Of,
+        of: ParameterSourceArgs,
     },
 }
 
 /// Whose parameters.
 #[derive(Args, Clone, Debug)]
-struct Of {
+struct ParameterSourceArgs {
     /// Vehicle: name of a built-in one, or path of a file
     #[arg(long, value_name = "VEHICLE", default_value = "paper")]
     vehicle: PathBuf,
@@ -67,47 +67,48 @@ struct Of {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Style {
+enum ParameterFormatArg {
     Qgc,
     Mavproxy,
 }
 
-impl Params {
+impl ParamsArgs {
     /// Runs the requested action.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
-        let (Action::Export { of, .. } | Action::Import { of, .. } | Action::Diff { of, .. }) = &self.action;
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
+        let (ParamsAction::Export { of, .. } | ParamsAction::Import { of, .. } | ParamsAction::Diff { of, .. }) =
+            &self.action;
         let vehicle = vehicle_named(&of.vehicle)?;
         act(&self.action, &vehicle)?;
         Ok(ExitCode::SUCCESS)
     }
 }
 
-fn act(action: &Action, vehicle: &Vehicle) -> Result<(), Failure> {
+fn act(action: &ParamsAction, vehicle: &Vehicle) -> Result<(), CommandError> {
     let mut table = ParameterTable::new(vehicle.configuration()?);
     match action {
-        Action::Export { of, out, force, format } => {
+        ParamsAction::Export { of, out, force, format } => {
             if let Some(path) = &of.store {
-                load(&mut table, &mut open(path, vehicle, Flash::known)?, path)?;
+                load(&mut table, &mut open(path, vehicle, FlashFile::open_existing)?, path)?;
             }
             let mavproxy = out.as_ref().and_then(|out| out.extension()).is_some_and(|extension| extension == "parm");
             let format = match format {
-                Some(Style::Qgc) => Format::Qgc,
-                Some(Style::Mavproxy) => Format::Mavproxy,
-                None if mavproxy => Format::Mavproxy,
-                None => Format::Qgc,
+                Some(ParameterFormatArg::Qgc) => ParameterFormat::Qgc,
+                Some(ParameterFormatArg::Mavproxy) => ParameterFormat::Mavproxy,
+                None if mavproxy => ParameterFormat::Mavproxy,
+                None => ParameterFormat::Qgc,
             };
             let entries = table.iter().map(|it| (it.name, it.value, it.kind.number()));
             let text = written(format, &vehicle.name, entries);
             match out {
-                Some(out) => Output::forcible(out, "--out", *force)?.place(|to| to.write_all(text.as_bytes()))?,
+                Some(out) => OutputFile::forcible(out, "--out", *force)?.write(|to| to.write_all(text.as_bytes()))?,
                 None => print(&text)?,
             }
         }
-        Action::Import { file, of } => {
+        ParamsAction::Import { file, of } => {
             let Some(path) = &of.store else { return Err("--store: missing; name the file to import into".into()) };
             // First on a copy of the table, so that a rejected file neither creates nor changes a store.
             let changes = take(&mut table.clone(), file)?;
-            let mut store = open(path, vehicle, Flash::open)?;
+            let mut store = open(path, vehicle, FlashFile::open)?;
             store.make_room().map_err(|error| failed(path, &error))?;
             load(&mut table, &mut store, path)?;
             // Applied again, on top of the stored values.
@@ -117,9 +118,9 @@ fn act(action: &Action, vehicle: &Vehicle) -> Result<(), Failure> {
             }
             print(&format!("{}: {} parameters, {}\n", path.display(), changes.len(), differing(&table).len()))?;
         }
-        Action::Diff { file, of } => {
+        ParamsAction::Diff { file, of } => {
             if let Some(path) = &of.store {
-                load(&mut table, &mut open(path, vehicle, Flash::known)?, path)?;
+                load(&mut table, &mut open(path, vehicle, FlashFile::open_existing)?, path)?;
             }
             if let Some(file) = file {
                 take(&mut table, file)?;
@@ -132,7 +133,7 @@ fn act(action: &Action, vehicle: &Vehicle) -> Result<(), Failure> {
 }
 
 /// Stores the current value of a parameter.
-fn keep(table: &ParameterTable, store: &mut Store<Flash>, name: RecordName) -> Result<(), Unkept> {
+fn keep(table: &ParameterTable, store: &mut Store<FlashFile>, name: RecordName) -> Result<(), StoreError> {
     let (Some(now), Some(image)) = (table.get(name), table.default_of(name)) else { return Ok(()) };
     let change = RecordChange::Set(name, (now.value.to_bits() != image.value.to_bits()).then_some(now.value));
     match Kept::NOW.keep(store, change) {
@@ -145,28 +146,32 @@ fn keep(table: &ParameterTable, store: &mut Store<Flash>, name: RecordName) -> R
 }
 
 /// Error of storing a value in a file.
-type Unkept = Error<afbc_files::FlashError>;
+type StoreError = Error<afbc_files::FlashError>;
 
-fn failed(path: &Path, error: &Unkept) -> String {
+fn failed(path: &Path, error: &StoreError) -> String {
     format!("{}: {error}", path.display())
 }
 
-fn open(path: &Path, vehicle: &Vehicle, flash: fn(&Path) -> std::io::Result<Flash>) -> Result<Store<Flash>, Failure> {
+fn open(
+    path: &Path,
+    vehicle: &Vehicle,
+    flash: fn(&Path) -> std::io::Result<FlashFile>,
+) -> Result<Store<FlashFile>, CommandError> {
     let flash = flash(path).map_err(|error| format!("{}: {error}", path.display()))?;
     Ok(Store::open(flash, 0, hash(vehicle.name.as_bytes())).map_err(|error| failed(path, &error))?)
 }
 
 /// Sets `table` to the stored values; prints a notice about values that are not used.
-fn load(table: &mut ParameterTable, store: &mut Store<Flash>, path: &Path) -> Result<(), Failure> {
+fn load(table: &mut ParameterTable, store: &mut Store<FlashFile>, path: &Path) -> Result<(), CommandError> {
     let notice = |notice| say(&format!("{}: {notice}", path.display()));
     Ok(Kept::NOW.load(table, store, notice).map_err(|error| failed(path, &error))?)
 }
 
 /// Sets `table` to the values in a file; returns their names.
-fn take(table: &mut ParameterTable, file: &Path) -> Result<Vec<RecordName>, Failure> {
+fn take(table: &mut ParameterTable, file: &Path) -> Result<Vec<RecordName>, CommandError> {
     let shown = file.display().to_string();
     let text = fs::read_to_string(file).map_err(|error| format!("{shown}: cannot be read ({error})"))?;
-    let source = Source { file: &shown, text: &text };
+    let source = SourceFile { file: &shown, text: &text };
     let mut names = Vec::new();
     for ParameterEntry { name, value, at } in read(&shown, &text)? {
         let unknown = || FileError::at(source, at, &name, "no such parameter; `sitl params export` lists them");

@@ -1,11 +1,11 @@
 //! `sitl fly PLAN.plan`: flies a plan of QGroundControl.
 
-use super::aboard::{AboardLogs, LogOutputs};
+use super::firmware_flight::{FirmwareLogs, LogOutputs};
 use super::interrupt;
 use super::mcap::FlightMcap;
 use super::serve::unwritten;
-use super::terminal::{Failure, print, say};
-use super::vehicle::OnVehicle;
+use super::terminal::{CommandError, print, say};
+use super::vehicle::VehicleArgs;
 use afbc_serve::{QgcPlan, ServedVehicle, fleet, fly_plan};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -18,7 +18,7 @@ const LONGEST_S: f64 = 3600.0;
 /// Flight of a plan.
 pub(super) struct PlanFlight {
     pub(super) path: PathBuf,
-    pub(super) on: OnVehicle,
+    pub(super) on: VehicleArgs,
     pub(super) duration: Option<f64>,
     pub(super) exact_log: Option<PathBuf>,
     pub(super) ulog: Option<PathBuf>,
@@ -27,7 +27,7 @@ pub(super) struct PlanFlight {
 
 impl PlanFlight {
     /// Flies mission, geofence and rally points of the plan; exits with 1 if the mission is not completed.
-    pub(super) fn run(mut self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(mut self) -> Result<ExitCode, CommandError> {
         let file = self.path.display().to_string();
         let text = std::fs::read_to_string(&self.path).map_err(|error| format!("{file}: {error}"))?;
         let plan = QgcPlan::read(&file, &text)?;
@@ -43,8 +43,8 @@ impl PlanFlight {
         }
         let mcap = FlightMcap::plan(self.mcap, &mut self.ulog)?;
         interrupt::ends_it()?;
-        let AboardLogs { exact, ulog } =
-            AboardLogs::create(&LogOutputs::new(self.exact_log.as_deref(), self.ulog.as_deref())?)?;
+        let FirmwareLogs { exact, ulog } =
+            FirmwareLogs::create(&LogOutputs::new(self.exact_log.as_deref(), self.ulog.as_deref())?)?;
         exact.iter().for_each(|(_, file)| vehicle.record(file.clone()));
         ulog.into_iter().for_each(|(_, files)| vehicle.log(files));
         let end = fly_plan(&mut vehicle, &plan, self.duration.unwrap_or(LONGEST_S), &mut |line| say(line));

@@ -1,7 +1,7 @@
 //! `sitl plot`: draws figures for papers from logs.
 
-use super::terminal::{Failure, print};
-use afbc_files::Output;
+use super::terminal::{CommandError, print};
+use afbc_files::OutputFile;
 use afbc_plot::{
     FigureFormat, FigurePanel, LogColumns, PanelLine, PaperFigure, Points, axis_title, binned, over_seeds,
 };
@@ -20,7 +20,7 @@ const POINT_MM: f64 = INCH_MM / 72.0;
 /// and a band around it, and so it does for a campaign's results.parquet, over any quantity that it draws. See
 /// docs/papers.md.
 #[derive(Args, Debug)]
-pub(crate) struct Plot {
+pub(crate) struct PlotArgs {
     /// Logs, each with its name for the legend before an equals sign [default: the file's name]
     #[arg(required = true, value_name = "[NAME=]FILE")]
     logs: Vec<String>,
@@ -100,13 +100,13 @@ fn percent(text: &str) -> Result<f64, &'static str> {
 }
 
 /// Log and its name in the legend.
-struct Named {
+struct NamedLog {
     name: String,
     columns: LogColumns,
 }
 
 /// Lines of one name in a panel.
-struct Collected {
+struct PanelLines {
     name: String,
     column: usize,
     /// True for rows of a campaign, each of which is a flight; false for flights over time.
@@ -114,14 +114,14 @@ struct Collected {
     all: Vec<Points>,
 }
 
-impl Plot {
+impl PlotArgs {
     /// Reads the logs, draws and writes the figure.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let out = self.out.display();
         let Some(format) = FigureFormat::of(&self.out, self.dpi.into()) else {
             return Err(format!("--out {out}: the end of the name says the format; use .pdf, .svg or .png").into());
         };
-        let output = Output::forcible(&self.out, "--out", self.force)?;
+        let output = OutputFile::forcible(&self.out, "--out", self.force)?;
         let logs = self.logs()?;
         let x = match (&self.x, logs.first(), self.columns().next()) {
             (None, Some(first), Some(y)) => first.columns.usual_x(y)?,
@@ -135,7 +135,7 @@ impl Plot {
             let y_title = self.y_title.get(index).cloned().unwrap_or_else(usual);
             Ok(FigurePanel { y_title, lines: self.lines(&logs, &columns)? })
         });
-        let panels = panels.collect::<Result<Vec<_>, Failure>>()?;
+        let panels = panels.collect::<Result<Vec<_>, CommandError>>()?;
         let figure = PaperFigure {
             width_mm: self.width,
             panel_mm: self.height,
@@ -148,7 +148,7 @@ impl Plot {
             panels,
         };
         let bytes = figure.write(format).map_err(|problem| format!("--out {out}: {problem}"))?;
-        output.place(|to| to.write_all(&bytes))?;
+        output.write(|to| to.write_all(&bytes))?;
         print(&format!("{out}: {:.1} mm wide, {} panels\n", self.width, self.y.len()))?;
         Ok(ExitCode::SUCCESS)
     }
@@ -159,7 +159,7 @@ impl Plot {
     }
 
     /// Reads the logs.
-    fn logs(&self) -> Result<Vec<Named>, Failure> {
+    fn logs(&self) -> Result<Vec<NamedLog>, CommandError> {
         let split = |log: &String| match log.split_once('=') {
             // A file name may itself contain an equals sign.
             Some((name, path)) if !Path::new(log).exists() => (Some(name.to_owned()), PathBuf::from(path)),
@@ -171,14 +171,14 @@ impl Plot {
         let common = common(&stems);
         let read = |(name, path): (Option<String>, PathBuf)| {
             let name = name.unwrap_or_else(|| stem(&path).split_at(common).1.to_owned());
-            Ok(Named { name, columns: LogColumns::read(&path)? })
+            Ok(NamedLog { name, columns: LogColumns::read(&path)? })
         };
         split.into_iter().map(read).collect()
     }
 
     /// Returns the lines of a panel.
-    fn lines(&self, logs: &[Named], columns: &[&str]) -> Result<Vec<PanelLine>, Failure> {
-        let mut all: Vec<Collected> = Vec::new();
+    fn lines(&self, logs: &[NamedLog], columns: &[&str]) -> Result<Vec<PanelLine>, CommandError> {
+        let mut all: Vec<PanelLines> = Vec::new();
         let is_one_log = logs.iter().all(|log| logs.first().is_some_and(|first| first.name == log.name));
         for (column, y) in columns.iter().enumerate() {
             for log in logs {
@@ -193,7 +193,7 @@ impl Plot {
                     };
                     match all.iter_mut().find(|other| other.name == name && other.column == column) {
                         Some(known) => known.all.push(points),
-                        None => all.push(Collected { name, column, is_rows, all: vec![points] }),
+                        None => all.push(PanelLines { name, column, is_rows, all: vec![points] }),
                     }
                 }
             }
@@ -204,8 +204,8 @@ impl Plot {
                 names.push(one.name.clone());
             }
         });
-        let line = |collected: Collected| {
-            let Collected { name, column, is_rows, all } = collected;
+        let line = |collected: PanelLines| {
+            let PanelLines { name, column, is_rows, all } = collected;
             let place = names.iter().position(|other| *other == name).unwrap_or_default();
             let title = columns.get(column).map(|column| axis_title(column)).unwrap_or_default();
             // Columns of a single log get a colour each; columns of several logs get a dash pattern each.

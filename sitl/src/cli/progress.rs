@@ -16,26 +16,26 @@ const SILENCE: Duration = Duration::from_secs(5);
 const SILENCE_MAX: Duration = Duration::from_secs(30);
 
 /// Progress of a command.
-pub(crate) struct Progress {
-    shared: Arc<Shared>,
+pub(crate) struct CommandProgress {
+    shared: Arc<SharedProgress>,
     /// Stops the [thread](remind) that writes lines after a silence, when dropped.
     silence: Option<(Sender<()>, JoinHandle<()>)>,
 }
 
 /// State shared by all threads of the command.
-struct Shared {
+struct SharedProgress {
     name: String,
     unit: &'static str,
     total: u64,
     start: Instant,
     /// Progress bar; `None` without a terminal.
     bar: Option<ProgressBar>,
-    state: Mutex<State>,
+    state: Mutex<ProgressState>,
 }
 
 /// Mutable state.
-struct State {
-    count: Count,
+struct ProgressState {
+    count: UnitCount,
     /// Text between count and rate.
     note: String,
     /// Time of the last line.
@@ -44,21 +44,21 @@ struct State {
 
 /// Number of units done.
 #[derive(Clone, Copy, Default)]
-struct Count {
+struct UnitCount {
     done: u64,
     /// Number done by an earlier run, which is left out of the rate.
     before: u64,
 }
 
-impl Progress {
+impl CommandProgress {
     /// Creates the progress of `total` units, such as flights. An earlier run has done `before` of them. `name`
     /// identifies the progress in a log.
     pub(crate) fn new(name: &str, unit: &'static str, total: u64, before: u64) -> Self {
         let start = Instant::now();
         let bar = stderr().is_terminal().then(|| bar(total));
-        let count = Count { done: before, before };
-        let state = Mutex::new(State { count, note: String::new(), said: start });
-        let shared = Arc::new(Shared { name: name.into(), unit, total, start, bar, state });
+        let count = UnitCount { done: before, before };
+        let state = Mutex::new(ProgressState { count, note: String::new(), said: start });
+        let shared = Arc::new(SharedProgress { name: name.into(), unit, total, start, bar, state });
         shared.show(&mut shared.state(), true);
         let silence = shared.bar.is_none().then(|| {
             let (sender, end) = channel();
@@ -77,15 +77,16 @@ impl Progress {
             };
             (sender, std::thread::spawn(remind))
         });
-        Progress { shared, silence }
+        CommandProgress { shared, silence }
     }
 
     /// Creates hidden progress, for short commands.
     pub(crate) fn hidden() -> Self {
-        let state = Mutex::new(State { count: Count::default(), note: String::new(), said: Instant::now() });
+        let state =
+            Mutex::new(ProgressState { count: UnitCount::default(), note: String::new(), said: Instant::now() });
         let bar = Some(ProgressBar::hidden());
-        let shared = Shared { name: String::new(), unit: "", total: 0, start: Instant::now(), bar, state };
-        Progress { shared: Arc::new(shared), silence: None }
+        let shared = SharedProgress { name: String::new(), unit: "", total: 0, start: Instant::now(), bar, state };
+        CommandProgress { shared: Arc::new(shared), silence: None }
     }
 
     /// Adds to the number of units done.
@@ -107,7 +108,7 @@ impl Progress {
     }
 }
 
-impl Drop for Progress {
+impl Drop for CommandProgress {
     fn drop(&mut self) {
         if let Some(bar) = &self.shared.bar {
             bar.finish_and_clear();
@@ -120,13 +121,13 @@ impl Drop for Progress {
     }
 }
 
-impl Shared {
-    fn state(&self) -> MutexGuard<'_, State> {
+impl SharedProgress {
+    fn state(&self) -> MutexGuard<'_, ProgressState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Updates the bar. Without a bar, writes a line if one is `due`.
-    fn show(&self, state: &mut State, due: bool) {
+    fn show(&self, state: &mut ProgressState, due: bool) {
         let text = || words(state.count, self.total, self.unit, &state.note, self.start.elapsed());
         match &self.bar {
             Some(bar) if !bar.is_hidden() => {
@@ -152,7 +153,7 @@ fn bar(total: u64) -> ProgressBar {
 
 /// Formats `120 of 10000 flights, 60 per second, 165 s left`. Leaves rate and remaining time out before the first unit
 /// is done.
-fn words(Count { done, before }: Count, total: u64, unit: &str, note: &str, elapsed: Duration) -> String {
+fn words(UnitCount { done, before }: UnitCount, total: u64, unit: &str, note: &str, elapsed: Duration) -> String {
     let mut text = format!("{done} of {total} {unit}{note}");
     let (flown, seconds) = ((done - before) as f64, elapsed.as_secs_f64());
     if flown > 0.0 && seconds > 0.0 && done < total {
@@ -186,7 +187,7 @@ mod tests {
     use super::*;
 
     fn said(done: u64, before: u64, seconds: f64) -> String {
-        words(Count { done, before }, 10_000, "flights", "", Duration::from_secs_f64(seconds))
+        words(UnitCount { done, before }, 10_000, "flights", "", Duration::from_secs_f64(seconds))
     }
 
     #[test]

@@ -1,16 +1,16 @@
 //! `sitl compare --suite random`: random flights on several vehicles.
 
-use super::progress::Progress;
-use super::target::Target;
-use super::terminal::Failure;
-use super::written::Output;
+use super::comparison_output::ComparisonOutputArgs;
+use super::progress::CommandProgress;
+use super::target::TargetArg;
+use super::terminal::CommandError;
 use super::{interrupt, manifest, page};
 use afbc_campaign::compare;
-use afbc_campaign::random::{self, FLIGHTS, FlownDraw, NAME, Random, Seen};
+use afbc_campaign::random::{self, FLIGHTS, FeedbackSource, FlownRandomFlight, NAME, RandomFlights};
 use afbc_campaign::rough::NAME as ROUGH;
 use afbc_files::Folder;
 use afbc_files::read::BuiltIn;
-use afbc_report::random::{self as report, Judged};
+use afbc_report::random::{self as report, RandomResults};
 use afbc_report::suite::markers;
 use afbc_scenario::contender::Contender;
 use afbc_sim::LogRate;
@@ -26,7 +26,7 @@ pub(super) const DESCRIPTION: &str = "drawn from --seed: paths, speeds, wind, pa
 /// Options of the suite.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Options of `--suite random` and `--suite rough-estimate`")]
-pub(super) struct Options {
+pub(super) struct RandomArgs {
     /// First seed that flights are drawn from; --seeds takes those after it, too [default: 1]
     #[arg(long, value_name = "N", requires = "suite", value_parser = clap::value_parser!(u64).range(..1 << 53))]
     pub(super) seed: Option<u64>,
@@ -41,16 +41,16 @@ pub(super) struct Options {
 
     /// Fly on the vehicle's own estimate, by the instruments of this built-in scenario, instead of the truth
     #[arg(long, value_name = "SCENARIO", requires = "suite", num_args = 0..=1, default_missing_value = "mocap")]
-    on_estimate: Option<Instruments>,
+    on_estimate: Option<InstrumentsArg>,
 
     /// Fly the contenders of this scenario, with their own gains scaled by rule to each vehicle; laws only if named by
     /// --controllers
     #[arg(long, value_name = "SCENARIO", requires = "suite")]
-    from: Option<Target>,
+    from: Option<TargetArg>,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Instruments {
+enum InstrumentsArg {
     /// Inertial sensor and motion capture
     Mocap,
     /// Inertial sensor, GNSS, barometer, magnetometer
@@ -74,10 +74,10 @@ pub(super) const fn flights() -> usize {
     BUILT_IN.len() * FLIGHTS as usize
 }
 
-impl Options {
+impl RandomArgs {
     /// Returns the name of the first option that was given.
     pub(super) fn given(&self) -> Option<&'static str> {
-        let Options { seed, flights, duration, on_estimate, from } = self;
+        let RandomArgs { seed, flights, duration, on_estimate, from } = self;
         let all = [
             (seed.is_some(), "--seed"),
             (flights.is_some(), "--flights"),
@@ -89,7 +89,7 @@ impl Options {
     }
 
     /// Checks that the options given apply to the suite `name`, which is one of two.
-    pub(super) fn are_for(&self, name: &str) -> Result<(), Failure> {
+    pub(super) fn are_for(&self, name: &str) -> Result<(), CommandError> {
         let all = [
             (self.duration.is_some(), "--duration", ROUGH),
             (self.on_estimate.is_some(), "--on-estimate", NAME),
@@ -102,8 +102,13 @@ impl Options {
     }
 
     /// Returns the contenders of `--from`.
-    pub(super) fn own(&self) -> Result<Vec<Contender>, Failure> {
-        Ok(self.from.as_ref().map(Target::scenario).transpose()?.map_or_else(Vec::new, |scenario| scenario.contenders))
+    pub(super) fn own(&self) -> Result<Vec<Contender>, CommandError> {
+        Ok(self
+            .from
+            .as_ref()
+            .map(TargetArg::scenario)
+            .transpose()?
+            .map_or_else(Vec::new, |scenario| scenario.contenders))
     }
 
     /// Draws and flies. Then writes the results' folder and prints a table, or writes the tables into a page.
@@ -113,16 +118,16 @@ impl Options {
         contenders: [&[Contender]; 2],
         seeds: u64,
         against: &str,
-        output: &Output,
-    ) -> Result<ExitCode, Failure> {
+        output: &ComparisonOutputArgs,
+    ) -> Result<ExitCode, CommandError> {
         let seed = self.seed.unwrap_or(1);
-        let random = Random {
+        let random = RandomFlights {
             seeds: seed..seed + seeds,
             flights: self.flights.unwrap_or(FLIGHTS),
             seen: match self.on_estimate {
-                None => Seen::Truth,
-                Some(Instruments::Mocap) => Seen::Mocap,
-                Some(Instruments::Outdoor) => Seen::Outdoor,
+                None => FeedbackSource::Truth,
+                Some(InstrumentsArg::Mocap) => FeedbackSource::Mocap,
+                Some(InstrumentsArg::Outdoor) => FeedbackSource::Outdoor,
             },
             vehicles: match vehicle {
                 Some(vehicle) => vec![vehicle],
@@ -133,7 +138,7 @@ impl Options {
             let [begin, end] = markers(NAME);
             page::write(path, [&begin, &end], || {
                 let flown = fly(&random, contenders, || Ok(()))?;
-                Ok(report::markdown(&Judged::new(&random, &flown, against)))
+                Ok(report::markdown(&RandomResults::new(&random, &flown, against)))
             })?;
             return Ok(ExitCode::SUCCESS);
         }
@@ -143,7 +148,7 @@ impl Options {
             Ok(())
         })?;
         let Some(folder) = folder else { return Ok(ExitCode::SUCCESS) };
-        let judged = Judged::new(&random, &flown, against);
+        let judged = RandomResults::new(&random, &flown, against);
         let telling: Vec<_> = judged.telling().into_iter().cloned().collect();
         let log_every = LogRate::common(&telling)?;
         let again = compare::fly(telling, 1, log_every, &|| ())?;
@@ -158,25 +163,25 @@ impl Options {
 
 /// Writes the manifest of the files. All flights enter the fingerprint; the first flight of each vehicle is written
 /// out.
-fn record(folder: &Folder, files: &[PathBuf], flown: &[FlownDraw]) -> Result<(), Failure> {
+fn record(folder: &Folder, files: &[PathBuf], flown: &[FlownRandomFlight]) -> Result<(), CommandError> {
     let all = flown.iter().map(|flown| (&flown.flight.scenario, vec![flown.flight.scenario.seed]));
-    let all: Vec<manifest::Flown<'_>> = all.collect();
+    let all: Vec<manifest::FlownScenario<'_>> = all.collect();
     let mut vehicles = BTreeSet::new();
     let firsts = flown.iter().zip(&all).filter(|(flown, _)| vehicles.insert(flown.flight.vehicle.as_str()));
-    let firsts: Vec<manifest::Flown<'_>> = firsts.map(|(_, one)| one.clone()).collect();
+    let firsts: Vec<manifest::FlownScenario<'_>> = firsts.map(|(_, one)| one.clone()).collect();
     manifest::write(folder, files, &all, &firsts)
 }
 
 /// Draws all flights, calls `ready` once they are known to be valid, and flies them.
 fn fly(
-    random: &Random,
+    random: &RandomFlights,
     [contenders, own]: [&[Contender]; 2],
-    ready: impl FnOnce() -> Result<(), Failure>,
-) -> Result<Vec<FlownDraw>, Failure> {
+    ready: impl FnOnce() -> Result<(), CommandError>,
+) -> Result<Vec<FlownRandomFlight>, CommandError> {
     let drawn = random.under(contenders, own)?;
     interrupt::ends_it()?;
     ready()?;
-    let progress = Progress::new("compare", "flights", (drawn.len() * (contenders.len() + own.len())) as u64, 0);
+    let progress = CommandProgress::new("compare", "flights", (drawn.len() * (contenders.len() + own.len())) as u64, 0);
     let flown = random::fly(drawn, &|| progress.add(1))?;
     drop(progress);
     interrupt::is_too_late();

@@ -1,11 +1,11 @@
 //! `sitl replay`: runs a recorded flight through the estimator.
 
-use super::exact::Exact;
+use super::comparison_output::show;
+use super::exact::ExactReplayArgs;
 use super::interrupt;
-use super::json::Json;
-use super::place::Place;
-use super::terminal::Failure;
-use super::written::show;
+use super::json::JsonArgs;
+use super::output_folder::OutputFolderArgs;
+use super::terminal::CommandError;
 use afbc_estimator::Settings;
 use afbc_files::read::FileError;
 use afbc_replay::EstimatorStart;
@@ -21,7 +21,7 @@ use std::process::ExitCode;
 /// lacks is reported; only the inertial sensor's samples must be there. With --exact it is an exact log of this
 /// firmware, see docs/exact-log.md; exits with 1 if a tick gives something else than in the log.
 #[derive(Args, Debug)]
-pub(crate) struct Replay {
+pub(crate) struct ReplayArgs {
     /// Path of the log
     log: PathBuf,
 
@@ -35,13 +35,13 @@ pub(crate) struct Replay {
     compass_error: Option<f32>,
 
     #[command(flatten)]
-    exact: Exact,
+    exact: ExactReplayArgs,
 
     #[command(flatten)]
-    place: Place,
+    place: OutputFolderArgs,
 
     #[command(flatten)]
-    json: Json,
+    json: JsonArgs,
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
@@ -55,9 +55,9 @@ fn compass_error(text: &str) -> Result<f32, String> {
     error.ok_or_else(|| format!("it must be a number of rad, {} to {}", range.min, range.max))
 }
 
-impl Replay {
+impl ReplayArgs {
     /// Reads and replays the log, writes the results and prints them.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         interrupt::ends_it()?;
         if self.exact.exact {
             return self.exact.run(&self.log, &self.place, self.json);
@@ -73,7 +73,7 @@ impl Replay {
         let name = self.log.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
         let folder = self.place.open(&report::folder_name(&name))?;
         interrupt::is_too_late();
-        let replay = report::Replay { name: &name, recording: &recording, replayed: &replayed };
+        let replay = report::ReplayedRecording { name: &name, recording: &recording, replayed: &replayed };
         let written = report::write(&folder, &replay)?;
         show(&folder, written.len(), self.json, |out| report::json(out, &replay), || report::table(&replay))?;
         Ok(ExitCode::SUCCESS)

@@ -1,8 +1,8 @@
 //! `sitl results`: makes the table of `docs/reference/results.md`.
 
-use super::json::Json;
-use super::progress::Progress;
-use super::terminal::{Failure, print};
+use super::json::JsonArgs;
+use super::progress::CommandProgress;
+use super::terminal::{CommandError, print};
 use super::{interrupt, json, page};
 use afbc_report::flights;
 use afbc_report::results;
@@ -13,18 +13,18 @@ use std::process::ExitCode;
 
 /// Fly the paper's experiment in every reading and print the results as a Markdown table
 #[derive(Args, Debug)]
-pub(crate) struct Results {
+pub(crate) struct ResultsArgs {
     /// Write the table into this page instead, between its two markers
     #[arg(long, value_name = "PAGE", conflicts_with = "json")]
     write: Option<PathBuf>,
 
     #[command(flatten)]
-    json: Json,
+    json: JsonArgs,
 }
 
-impl Results {
+impl ResultsArgs {
     /// Flies, then prints or writes the table.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let Some(path) = self.write else {
             let flown = fly()?;
             match self.json.json {
@@ -42,11 +42,11 @@ impl Results {
 }
 
 /// Flies all scenarios of the table.
-fn fly() -> Result<Vec<(String, ScenarioFlight)>, Failure> {
+fn fly() -> Result<Vec<(String, ScenarioFlight)>, CommandError> {
     interrupt::ends_it()?;
     let scenarios = results::scenarios()?;
     let flights = scenarios.iter().map(|(_, scenario)| scenario.contenders.len() as u64).sum();
-    let progress = Progress::new("results", "flights", flights, 0);
+    let progress = CommandProgress::new("results", "flights", flights, 0);
     let flown = results::fly(scenarios, &|| progress.add(1))?;
     drop(progress);
     interrupt::is_too_late();

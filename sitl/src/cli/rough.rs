@@ -1,11 +1,11 @@
 //! `sitl compare --suite rough-estimate`: flights with sensor errors unknown to the vehicle.
 
-use super::progress::Progress;
+use super::comparison_output::ComparisonOutputArgs;
+use super::progress::CommandProgress;
 use super::random;
-use super::terminal::Failure;
-use super::written::Output;
+use super::terminal::CommandError;
 use super::{interrupt, manifest, page};
-use afbc_campaign::rough::{self, FlownRough, NAME, Rough};
+use afbc_campaign::rough::{self, FlownRoughFlight, NAME, RoughFlights};
 use afbc_files::read::BuiltIn;
 use afbc_report::rough::{self as report, RoughResults};
 use afbc_report::suite::markers;
@@ -30,17 +30,17 @@ pub(super) fn flights() -> usize {
 
 /// Draws and flies. Then writes the results' folder and prints a table, or writes the table into a page.
 pub(super) fn run(
-    options: &random::Options,
+    options: &random::RandomArgs,
     vehicle: Option<Vehicle>,
     contenders: &[Contender],
     seeds: u64,
-    output: &Output,
-) -> Result<ExitCode, Failure> {
+    output: &ComparisonOutputArgs,
+) -> Result<ExitCode, CommandError> {
     let [contender] = contenders else {
         return Err("--controllers: the estimate of one law at a time is judged; name one".into());
     };
     let seed = options.seed.unwrap_or(1);
-    let rough = Rough {
+    let rough = RoughFlights {
         seeds: seed..seed + seeds,
         flights: options.flights.unwrap_or(1),
         duration_s: options.duration,
@@ -65,12 +65,12 @@ pub(super) fn run(
     let Some(folder) = folder else { return Ok(ExitCode::SUCCESS) };
     let results = RoughResults::new(&rough, &flown);
     let written = report::write(&folder, &results)?;
-    let all: Vec<manifest::Flown<'_>> =
+    let all: Vec<manifest::FlownScenario<'_>> =
         flown.iter().map(|flown| (&flown.flight.scenario, vec![flown.flight.scenario.seed])).collect();
     // All flights enter the fingerprint; the first flight of each class is written out.
     let mut classes = BTreeSet::new();
     let firsts = flown.iter().zip(&all).filter(|(flown, _)| classes.insert(flown.flight.class));
-    let firsts: Vec<manifest::Flown<'_>> = firsts.map(|(_, one)| one.clone()).collect();
+    let firsts: Vec<manifest::FlownScenario<'_>> = firsts.map(|(_, one)| one.clone()).collect();
     manifest::write(&folder, &written, &all, &firsts)?;
     let object = |out: &mut Vec<u8>| report::json(out, &results);
     let tables = |format| report::tables(&results, format);
@@ -80,14 +80,14 @@ pub(super) fn run(
 
 /// Draws all flights, calls `ready` once they are known to be valid, and flies them.
 fn fly(
-    rough: &Rough,
+    rough: &RoughFlights,
     contender: &Contender,
-    ready: impl FnOnce() -> Result<(), Failure>,
-) -> Result<Vec<FlownRough>, Failure> {
+    ready: impl FnOnce() -> Result<(), CommandError>,
+) -> Result<Vec<FlownRoughFlight>, CommandError> {
     let drawn = rough.draw(contender)?;
     interrupt::ends_it()?;
     ready()?;
-    let progress = Progress::new("compare", "flights", drawn.len() as u64, 0);
+    let progress = CommandProgress::new("compare", "flights", drawn.len() as u64, 0);
     let flown = rough::fly(drawn, &|| progress.add(1))?;
     drop(progress);
     interrupt::is_too_late();

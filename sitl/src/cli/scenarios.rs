@@ -1,12 +1,12 @@
 //! `sitl scenarios` and `sitl check`.
 
-use super::json::Json;
-use super::target::Target;
-use super::terminal::{Failure, print};
+use super::json::JsonArgs;
+use super::target::TargetArg;
+use super::terminal::{CommandError, print};
 use super::{described, json};
 use afbc_campaign::Campaign;
 use afbc_campaign::subject::{Subject, SubjectKind};
-use afbc_files::Output;
+use afbc_files::OutputFile;
 use afbc_files::read::BuiltIn;
 use afbc_scenario::contender::Contender;
 use afbc_scenario::trajectory::{Trajectory, polynomial};
@@ -20,18 +20,18 @@ use std::process::ExitCode;
 ///
 /// `sitl scenarios hover > my.toml` writes a scenario file to edit and to fly with `sitl fly my.toml`.
 #[derive(Args, Debug)]
-pub(crate) struct Scenarios {
+pub(crate) struct ScenariosArgs {
     /// Built-in scenario to print
     #[arg(conflicts_with = "json")]
     name: Option<String>,
 
     #[command(flatten)]
-    json: Json,
+    json: JsonArgs,
 }
 
-impl Scenarios {
+impl ScenariosArgs {
     /// Prints the list or the file.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         match self.name {
             Some(name) => print(built_in(&name).ok_or_else(|| SubjectKind::Scenario.unknown(&name))?.text)?,
             None => {
@@ -53,9 +53,9 @@ fn line(scenario: &Scenario) -> String {
 
 /// Check a scenario, a campaign or a vehicle without flying it; exits with 2 and a line for every mistake
 #[derive(Args, Debug)]
-pub(crate) struct Check {
+pub(crate) struct CheckArgs {
     /// Name of a built-in scenario, campaign or vehicle, or path of a file
-    scenario: Target,
+    scenario: TargetArg,
 
     /// Also write the polynomials of a scenario's minimum-snap path, or of a path from a file, into this file, as the
     /// Crazyflie's tools do
@@ -67,12 +67,12 @@ pub(crate) struct Check {
     force: bool,
 
     #[command(flatten)]
-    json: Json,
+    json: JsonArgs,
 }
 
-impl Check {
+impl CheckArgs {
     /// Checks the file and prints a summary, or writes the polynomials of its path.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         if let Some(path) = self.polynomials {
             let scenario = self.scenario.scenario()?;
             let Trajectory::Polynomials(pieces) = &scenario.trajectory else {
@@ -80,8 +80,8 @@ impl Check {
                 return Err(format!("--polynomials: {} has none; {cure}", scenario.name).into());
             };
             let text = polynomial::written(pieces);
-            let output = Output::forcible(&path, "--polynomials", self.force)?;
-            output.place(|out| out.write_all(text.as_bytes()))?;
+            let output = OutputFile::forcible(&path, "--polynomials", self.force)?;
+            output.write(|out| out.write_all(text.as_bytes()))?;
             return Ok(ExitCode::SUCCESS);
         }
         match (self.scenario.any()?, self.json.json) {

@@ -1,14 +1,14 @@
 //! `sitl serve`: serves simulated vehicles over MAVLink.
 
-use super::target::Target;
-use super::terminal::{Failure, INTERRUPTED, print, say};
-use super::vehicle::OnVehicle;
-use afbc_files::Output;
+use super::target::TargetArg;
+use super::terminal::{CommandError, INTERRUPTED, print, say};
+use super::vehicle::VehicleArgs;
+use afbc_files::OutputFile;
 use afbc_hil::{LogFile, UlogFiles};
-use afbc_serve::web::{Admission, Token, WebDoor};
+use afbc_serve::web::{Admission, Token, WebServer};
 use afbc_serve::{
-    Addresses, Door, LineOutput, Lines, ParameterFile, Ports, RunEnd, Server, Then, TimeRate, VEHICLES_MAX, fleet,
-    guide, run,
+    Addresses, InputLines, Interfaces, LineOutput, ParameterFile, Ports, RunEnd, Server, ServerAction, ServerHook,
+    TimeRate, VEHICLES_MAX, fleet, guide, run,
 };
 use clap::{Args, value_parser};
 use std::ffi::OsString;
@@ -28,17 +28,17 @@ const MOST: i64 = VEHICLES_MAX as i64;
 /// It stands on the ground, outdoors in a breeze, until somebody arms and flies it. The firmware's own code flies it,
 /// on its own sensors. Lines on stdin change weather and faults; `help` lists them. See docs/serve.md.
 #[derive(Args, Debug)]
-pub(crate) struct Serve {
+pub(crate) struct ServeArgs {
     /// Name of a built-in scenario, or path of a scenario file: place, weather, instruments and faults come from it
     #[arg(long, value_name = "SCENARIO", default_value = "outdoor")]
-    scenario: Target,
+    scenario: TargetArg,
 
     /// Indoors, with a motion-capture system: --scenario mocap
     #[arg(long, conflicts_with = "scenario")]
     indoors: bool,
 
     #[command(flatten)]
-    on: OnVehicle,
+    on: VehicleArgs,
 
     /// Number of vehicles, side by side
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u8).range(1..=MOST))]
@@ -118,18 +118,19 @@ pub(crate) struct Serve {
     lines: Vec<String>,
 }
 
-impl Serve {
+impl ServeArgs {
     /// Serves until a signal or a command ends it.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
-        let target = if self.indoors { Target::from("mocap") } else { self.scenario.clone() };
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
+        let target = if self.indoors { TargetArg::from("mocap") } else { self.scenario.clone() };
         let mut scenario = self.on.put(target.scenario()?)?;
         scenario.seed = self.seed.unwrap_or(scenario.seed);
         let scenarios = fleet(&scenario, self.vehicles)?;
         let mut server = match &self.parameters {
             Some(path) => {
                 let files = (self.system..).map(|system| file(path, system, self.vehicles));
-                let keepers = files.zip(&scenarios).map(|(file, scenario)| ParameterFile::open(&file, scenario));
-                Server::kept(&scenarios, self.system, keepers.collect::<Result<_, _>>()?)?
+                let parameter_files =
+                    files.zip(&scenarios).map(|(file, scenario)| ParameterFile::open(&file, scenario));
+                Server::with_parameter_files(&scenarios, self.system, parameter_files.collect::<Result<_, _>>()?)?
             }
             None => Server::new(&scenarios, self.system)?,
         };
@@ -147,7 +148,7 @@ impl Serve {
             if let Some(problem) = answer.strip_prefix("error ") {
                 return Err(format!("--do '{line}': {problem}").into());
             }
-            if reply.then != Then::Nothing {
+            if reply.action != ServerAction::Nothing {
                 return Err(
                     format!("--do '{line}': it has no effect before the start; add a time, as in 'at 60 ...'").into()
                 );
@@ -157,37 +158,38 @@ impl Serve {
         // Peers on loopback are on this machine, so they are trusted like a wired link.
         server.set_wired(addresses.bind.is_loopback());
         let mut ports = Ports::open(&addresses, server.vehicles().len())?;
-        let mut door = self.web.map(|address| self.door(address)).transpose()?;
+        let mut web = self.web.map(|address| self.web_server(address)).transpose()?;
         let stop = Arc::new(AtomicBool::new(false));
         let stopper = Arc::clone(&stop);
         ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
         // Created only now, so that a refused command leaves no file behind.
-        let logs = exact_logs.iter().map(|output| Ok::<_, Failure>((output.path(), LogFile::create(output)?)));
+        let logs = exact_logs.iter().map(|output| Ok::<_, CommandError>((output.path(), LogFile::create(output)?)));
         let logs = logs.collect::<Result<Vec<_>, _>>()?;
         server.record(logs.iter().map(|(_, log)| log.clone()).collect());
         server.log(black_boxes.iter().map(|path| self.black_box(path)).collect::<Result<_, _>>()?);
         print(&format!("{}: {}", scenario.name, guide(&addresses, &ports.addresses()?, &server.systems())))?;
-        if let Some(door) = &door {
-            print(&format!("Open {} in a browser (docs/page.md).\n", door.url()))?;
+        if let Some(web) = &web {
+            print(&format!("Open {} in a browser (docs/page.md).\n", web.url()))?;
         }
 
         let rate = match self {
-            Serve { lockstep: true, .. } => TimeRate::Lockstep,
-            Serve { fast: true, .. } => TimeRate::Times(0.0),
-            Serve { speed, .. } => TimeRate::Times(speed),
+            ServeArgs { lockstep: true, .. } => TimeRate::Lockstep,
+            ServeArgs { fast: true, .. } => TimeRate::Times(0.0),
+            ServeArgs { speed, .. } => TimeRate::Times(speed),
         };
-        let door: &mut dyn Door = match &mut door {
-            Some(door) => door,
+        let hook: &mut dyn ServerHook = match &mut web {
+            Some(web) => web,
             None => &mut (),
         };
         let mut output = LineOutput::to(stdout())?;
         let answers = output.clone();
         let mut lines = match rate {
             // Time waits until the answers are read, so that none is lost.
-            TimeRate::Lockstep => Lines::paced(BufReader::new(stdin()), move || answers.wait_for_room()),
-            TimeRate::Times(_) => Lines::of(BufReader::new(stdin())),
+            TimeRate::Lockstep => InputLines::paced(BufReader::new(stdin()), move || answers.wait_for_room()),
+            TimeRate::Times(_) => InputLines::of(BufReader::new(stdin())),
         };
-        let end = run(&mut server, (&mut ports, door), rate, &mut lines, &stop, |line| output.line(line));
+        let end =
+            run(&mut server, Interfaces { ports: &mut ports, hook }, rate, &mut lines, &stop, |line| output.line(line));
         output.finish();
         server.end_logs().iter().for_each(|line| say(line));
         for (path, log) in logs {
@@ -197,7 +199,7 @@ impl Serve {
     }
 
     /// Opens the port of the page.
-    fn door(&self, address: SocketAddr) -> Result<WebDoor, Failure> {
+    fn web_server(&self, address: SocketAddr) -> Result<WebServer, CommandError> {
         let token = match &self.web_token {
             Some(path) => {
                 let failed = |why: String| format!("{}: {why}; change it, or leave out --web-token", path.display());
@@ -207,18 +209,18 @@ impl Serve {
             None if address.ip().is_loopback() => None,
             None => Some(Token::random()?),
         };
-        Ok(WebDoor::open(address, Admission::at(address.ip(), token)?)?)
+        Ok(WebServer::open(address, Admission::at(address.ip(), token)?)?)
     }
 
     /// Returns the output files of the exact logs, if requested.
-    fn exact_logs(&self) -> Result<Vec<Output>, Failure> {
+    fn exact_logs(&self) -> Result<Vec<OutputFile>, CommandError> {
         let Some(path) = &self.exact_log else { return Ok(Vec::new()) };
         let paths = (self.system..).take(self.vehicles.into()).map(|system| file(path, system, self.vehicles));
-        Ok(paths.map(|path| Output::new(&path, "--exact-log")).collect::<Result<_, _>>()?)
+        Ok(paths.map(|path| OutputFile::new(&path, "--exact-log")).collect::<Result<_, _>>()?)
     }
 
     /// Returns the files of the black boxes, or folders for them, if requested.
-    fn black_boxes(&self) -> Result<Vec<PathBuf>, Failure> {
+    fn black_boxes(&self) -> Result<Vec<PathBuf>, CommandError> {
         let Some(path) = &self.ulog else { return Ok(Vec::new()) };
         let of = |system: u8| match self.vehicles {
             1 => path.clone(),
@@ -227,7 +229,7 @@ impl Serve {
         };
         let paths: Vec<_> = (self.system..).take(self.vehicles.into()).map(of).collect();
         if !path.is_dir() {
-            paths.iter().try_for_each(|path| Output::new(path, "--ulog").map(drop))?;
+            paths.iter().try_for_each(|path| OutputFile::new(path, "--ulog").map(drop))?;
         }
         Ok(paths)
     }
@@ -241,7 +243,7 @@ impl Serve {
         UlogFiles::create(path)
     }
 
-    fn addresses(&self) -> Result<Addresses, Failure> {
+    fn addresses(&self) -> Result<Addresses, CommandError> {
         let all = |texts: &[String], option: &str| {
             let wanted = texts.iter().filter(|text| *text != "none");
             wanted.map(|text| address(text, option, self.bind)).collect::<Result<Vec<_>, _>>()
@@ -282,7 +284,7 @@ fn extension(path: &Path, system: u8) -> OsString {
 }
 
 /// Resolves the address of a peer, in the address family of `bind`.
-fn address(text: &str, option: &str, bind: IpAddr) -> Result<SocketAddr, Failure> {
+fn address(text: &str, option: &str, bind: IpAddr) -> Result<SocketAddr, CommandError> {
     let found = text.to_socket_addrs().map_err(|error| {
         format!("{option} {text}: no such address ({error}); write HOST:PORT, as in 127.0.0.1:14550, or none")
     })?;

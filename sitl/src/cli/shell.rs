@@ -1,7 +1,7 @@
 //! `sitl completions` and `sitl man`: shell completions and manual pages.
 
-use super::terminal::{Failure, print};
-use afbc_files::Output;
+use super::terminal::{CommandError, print};
+use afbc_files::OutputFile;
 use clap::{Args, Command};
 use clap_complete::Shell;
 use clap_complete::env::Shells;
@@ -20,14 +20,14 @@ const VARIABLE: &str = "COMPLETE";
 /// laws, so `sitl` must be in its path. bash: `sitl completions bash >~/.local/share/bash-completion/completions/sitl`;
 /// zsh: `sitl completions zsh >~/.zfunc/_sitl`; fish: `sitl completions fish >~/.config/fish/completions/sitl.fish`.
 #[derive(Args, Debug)]
-pub(crate) struct Completions {
+pub(crate) struct CompletionsArgs {
     /// The shell
     shell: Shell,
 }
 
-impl Completions {
+impl CompletionsArgs {
     /// Prints the completion script.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let (shell, mut script) = (self.shell.to_string(), Vec::new());
         let shells = Shells::builtins();
         let shell = shells.completer(&shell).ok_or_else(|| format!("{shell}: cannot be completed; use another"))?;
@@ -41,7 +41,7 @@ impl Completions {
 ///
 /// `sitl man ~/.local/share/man/man1`, then `man sitl` and `man sitl-fly`.
 #[derive(Args, Debug)]
-pub(crate) struct Man {
+pub(crate) struct ManArgs {
     /// An existing folder
     #[arg(value_name = "FOLDER")]
     folder: PathBuf,
@@ -51,10 +51,10 @@ pub(crate) struct Man {
     force: bool,
 }
 
-impl Man {
+impl ManArgs {
     /// Writes the pages of all commands.
-    pub(super) fn run(self, program: Command) -> Result<ExitCode, Failure> {
-        let Man { folder, force } = self;
+    pub(super) fn run(self, program: Command) -> Result<ExitCode, CommandError> {
+        let ManArgs { folder, force } = self;
         if !folder.is_dir() {
             return Err(format!("{}: no such folder; name a folder", folder.display()).into());
         }
@@ -62,10 +62,10 @@ impl Man {
         program.build();
         let mut outputs = Vec::new();
         for (name, text) in pages(&program)? {
-            outputs.push((Output::forcible(&folder.join(name), "the manual", force)?, text));
+            outputs.push((OutputFile::forcible(&folder.join(name), "the manual", force)?, text));
         }
         for (output, text) in outputs {
-            output.place(|out| out.write_all(&text))?;
+            output.write(|out| out.write_all(&text))?;
         }
         print(&format!("{}\n", folder.join("sitl.1").display()))?;
         Ok(ExitCode::SUCCESS)

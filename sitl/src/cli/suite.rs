@@ -1,7 +1,7 @@
 //! `sitl compare --suite` and `sitl suites`: flies or lists suites, which are named lists of flights.
 
-use super::terminal::{Failure, print};
-use super::written::Output;
+use super::comparison_output::ComparisonOutputArgs;
+use super::terminal::{CommandError, print};
 use super::{interrupt, over_seeds, page, random, rough};
 use afbc_campaign::compare::Comparison;
 use afbc_campaign::random::NAME;
@@ -18,14 +18,14 @@ use std::process::ExitCode;
 ///
 /// `sitl suites field > my.toml` writes a suite to edit and to fly with `sitl compare --suite my.toml`.
 #[derive(Args, Debug)]
-pub(crate) struct Suites {
+pub(crate) struct SuitesArgs {
     /// Built-in suite to print
     name: Option<String>,
 }
 
-impl Suites {
+impl SuitesArgs {
     /// Prints the list or the file.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         match self.name {
             Some(name) if [NAME, ROUGH].contains(&name.as_str()) => {
                 let cure = format!("fly it with `sitl compare --suite {name} --seed N`");
@@ -57,8 +57,8 @@ pub(super) fn run(
     contenders: &[Contender],
     seeds: Option<u64>,
     against: Option<&str>,
-    output: &Output,
-) -> Result<ExitCode, Failure> {
+    output: &ComparisonOutputArgs,
+) -> Result<ExitCode, CommandError> {
     if let Some(path) = &output.write {
         let [begin, end] = report::markers(&suite.name);
         page::write(path, [&begin, &end], || {
@@ -88,8 +88,8 @@ fn fly(
     contenders: &[Contender],
     seeds: Option<u64>,
     against: Option<&str>,
-    ready: impl FnOnce() -> Result<(), Failure>,
-) -> Result<Vec<Comparison>, Failure> {
+    ready: impl FnOnce() -> Result<(), CommandError>,
+) -> Result<Vec<Comparison>, CommandError> {
     let scenarios = suite.under(contenders)?;
     let log_every = LogRate::common(&scenarios)?;
     interrupt::ends_it()?;

@@ -1,6 +1,6 @@
 //! Scenario, campaign or vehicle named on the command line.
 
-use super::terminal::Failure;
+use super::terminal::CommandError;
 use afbc_campaign::Campaign;
 use afbc_campaign::subject::{self, Subject};
 use afbc_scenario::Scenario;
@@ -12,43 +12,43 @@ use std::path::{Path, PathBuf};
 
 /// Name of a built-in scenario, campaign or vehicle, or path of a file.
 #[derive(Clone, Debug)]
-pub(crate) struct Target(PathBuf);
+pub(crate) struct TargetArg(PathBuf);
 
-impl<P: Into<OsString>> From<P> for Target {
+impl<P: Into<OsString>> From<P> for TargetArg {
     fn from(path: P) -> Self {
-        Target(path.into().into())
+        TargetArg(path.into().into())
     }
 }
 
-impl fmt::Display for Target {
+impl fmt::Display for TargetArg {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.display().fmt(f)
     }
 }
 
-impl Target {
+impl TargetArg {
     /// Returns the argument as a path.
     pub(crate) fn path(&self) -> &Path {
         &self.0
     }
 
     /// Reads and checks the scenario.
-    pub(crate) fn scenario(&self) -> Result<Scenario, Failure> {
+    pub(crate) fn scenario(&self) -> Result<Scenario, CommandError> {
         Ok(subject::scenario(self.no_plan()?)?)
     }
 
     /// Reads and checks the campaign.
-    pub(crate) fn campaign(&self) -> Result<Campaign, Failure> {
+    pub(crate) fn campaign(&self) -> Result<Campaign, CommandError> {
         Ok(subject::campaign(self.no_plan()?)?)
     }
 
     /// Reads and checks the scenario, campaign or vehicle.
-    pub(crate) fn any(&self) -> Result<Subject, Failure> {
+    pub(crate) fn any(&self) -> Result<Subject, CommandError> {
         Ok(subject::any(self.no_plan()?)?)
     }
 
     /// Returns the argument as a path; fails if it is a ground station's plan.
-    fn no_plan(&self) -> Result<&Path, Failure> {
+    fn no_plan(&self) -> Result<&Path, CommandError> {
         match is_plan(&self.0) && self.0.exists() {
             true => {
                 Err(format!("{self}: a ground station's plan, not a scenario; fly it with `sitl fly {self}`").into())

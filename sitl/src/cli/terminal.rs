@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use terminal_size::Width;
 
 /// Error of a command, displayed as one line.
-pub(crate) type Failure = Box<dyn Error>;
+pub(crate) type CommandError = Box<dyn Error>;
 
 /// Exit code of an interrupted command.
 pub(crate) const INTERRUPTED: u8 = 130;
@@ -28,7 +28,7 @@ pub(crate) fn columns() -> usize {
 }
 
 /// Prints to stdout. A closed pipe, as in `sitl | head`, is not an error.
-pub(crate) fn print(text: &str) -> Result<(), Failure> {
+pub(crate) fn print(text: &str) -> Result<(), CommandError> {
     match io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(format!("stdout: cannot be written ({error}); send it elsewhere").into())

@@ -1,13 +1,13 @@
 //! `sitl tune`: searches for gains.
 
-use super::fleet::Fleet;
-use super::json::Json;
-use super::progress::Progress;
-use super::target::Target;
-use super::terminal::{Failure, print};
+use super::fleet::FleetArgs;
+use super::json::JsonArgs;
+use super::progress::CommandProgress;
+use super::target::TargetArg;
+use super::terminal::{CommandError, print};
 use super::{described, json};
 use afbc::Profile;
-use afbc_files::Output;
+use afbc_files::OutputFile;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::{Scenario, vehicle_named};
 use afbc_tune::{self as tune, SearchOptions, SearchResult};
@@ -25,7 +25,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// every vehicle: after Ctrl-C finished searches are kept, and the same command does what is missing. See
 /// docs/tuning.md.
 #[derive(Args, Debug)]
-pub(crate) struct Tune {
+pub(crate) struct TuneArgs {
     /// A law, to start from hand-tuned gains, or a contender of --from or the first --scenario, to start from its gains
     ///
     /// With --fleet, any number of laws; all but backstepping, which flies with AFBC's gains, if none is given.
@@ -42,11 +42,11 @@ pub(crate) struct Tune {
 
     /// Fly this built-in scenario or scenario file instead of the training flights; may be given more than once
     #[arg(long = "scenario", value_name = "SCENARIO")]
-    scenarios: Vec<Target>,
+    scenarios: Vec<TargetArg>,
 
     /// Start from a contender of this scenario, on the training flights, as to continue a search
     #[arg(long, value_name = "SCENARIO", conflicts_with = "scenarios")]
-    from: Option<Target>,
+    from: Option<TargetArg>,
 
     /// Start from the gains that fly: the profile's or, with --vehicle, those in its file
     #[arg(long, conflicts_with_all = ["scenarios", "from"])]
@@ -78,19 +78,19 @@ pub(crate) struct Tune {
     force: bool,
 
     #[command(flatten)]
-    json: Json,
+    json: JsonArgs,
 }
 
-impl Tune {
+impl TuneArgs {
     /// Searches, then prints or writes the gains.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
-        let scenarios = self.scenarios.iter().map(Target::scenario).collect::<Result<Vec<_>, _>>()?;
-        let from = self.from.as_ref().map(Target::scenario).transpose()?;
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
+        let scenarios = self.scenarios.iter().map(TargetArg::scenario).collect::<Result<Vec<_>, _>>()?;
+        let from = self.from.as_ref().map(TargetArg::scenario).transpose()?;
         let mut vehicles = self.vehicles.iter().map(|path| vehicle_named(path)).collect::<Result<Vec<_>, _>>()?;
         let course = SearchOptions { budget: self.budget as usize, step: self.step, seed: self.seed };
         if let Some(folder) = &self.fleet {
             let (laws, write) = (&self.contenders, self.write.as_deref());
-            return Fleet { folder, laws, vehicles, course, flying: self.flying, write }.run();
+            return FleetArgs { folder, laws, vehicles, course, flying: self.flying, write }.run();
         }
         let [contender] = self.contenders.as_slice() else {
             return Err("more than one controller; name one, or a folder with --fleet".into());
@@ -119,12 +119,12 @@ impl Tune {
             None => (tune::training()?, tune::held_out()?, tune::conditions()?),
         };
         // Checked before the search, which may take long.
-        let output = self.out.as_deref().map(|out| Output::forcible(out, "--out", self.force)).transpose()?;
+        let output = self.out.as_deref().map(|out| OutputFile::forcible(out, "--out", self.force)).transpose()?;
 
         let stop = Arc::new(AtomicBool::new(false));
         let stopper = Arc::clone(&stop);
         ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
-        let progress = Progress::new(&format!("tune {}", contender), "tried", u64::from(self.budget), 0);
+        let progress = CommandProgress::new(&format!("tune {}", contender), "tried", u64::from(self.budget), 0);
         let mut before = 0;
         let found = tune::search(&start, &training, &conditions, course, |tried, cost| {
             progress.note(format!(", least cost {cost:.4}"));
@@ -137,7 +137,7 @@ impl Tune {
         let report = || tune::report(&start, &found, [&training, &held_out], &conditions, self.seed);
         if let Some(output) = &output {
             let text = report()?;
-            if let Err(error) = output.place(|to| to.write_all(text.as_bytes())) {
+            if let Err(error) = output.write(|to| to.write_all(text.as_bytes())) {
                 // Printed instead, so that the result of a long search is not lost.
                 print(&text)?;
                 return Err(error.into());
@@ -158,7 +158,7 @@ impl Tune {
 
 /// Returns the contender `name` of `scenario` or, if it has none, the law of that name with hand-tuned gains. With a
 /// `vehicle`, a scenario's contender gets the vehicle's gains.
-fn start(name: &str, scenario: Option<&Scenario>, vehicle: Option<&Vehicle>) -> Result<Contender, Failure> {
+fn start(name: &str, scenario: Option<&Scenario>, vehicle: Option<&Vehicle>) -> Result<Contender, CommandError> {
     let own = scenario.map_or(&[][..], |scenario| &scenario.contenders);
     if let Some(contender) = own.iter().find(|contender| contender.name == name).cloned() {
         return Ok(match vehicle {
@@ -178,7 +178,7 @@ fn start(name: &str, scenario: Option<&Scenario>, vehicle: Option<&Vehicle>) -> 
 }
 
 /// Returns the law with the gains of the profile `flight`.
-fn flying(kind: ControllerKind, vehicle: Option<&Vehicle>) -> Result<Contender, Failure> {
+fn flying(kind: ControllerKind, vehicle: Option<&Vehicle>) -> Result<Contender, CommandError> {
     let contender = Contender::of(kind, Profile::Flight);
     Ok(match vehicle {
         Some(vehicle) => contender.on(vehicle, Profile::Flight)?,

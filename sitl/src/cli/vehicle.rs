@@ -1,7 +1,7 @@
 //! `--vehicle` and `sitl vehicles`: selects and lists vehicles.
 
-use super::target::Target;
-use super::terminal::{Failure, print};
+use super::target::TargetArg;
+use super::terminal::{CommandError, print};
 use afbc::Profile;
 use afbc_campaign::Campaign;
 use afbc_files::read::words::out_of_range;
@@ -14,21 +14,21 @@ use std::process::ExitCode;
 
 /// Of every command that flies.
 #[derive(Args, Clone, Debug)]
-pub(crate) struct OnVehicle {
+pub(crate) struct VehicleArgs {
     /// Fly this instead of the scenario's vehicle, with its gains of the profile `flight`: name of a built-in vehicle,
     /// or path of a vehicle file
     #[arg(long, value_name = "VEHICLE")]
     vehicle: Option<PathBuf>,
 }
 
-impl OnVehicle {
+impl VehicleArgs {
     /// Returns the requested vehicle, checked.
-    pub(crate) fn vehicle(&self) -> Result<Option<Vehicle>, Failure> {
+    pub(crate) fn vehicle(&self) -> Result<Option<Vehicle>, CommandError> {
         Ok(self.vehicle.as_deref().map(vehicle_named).transpose()?)
     }
 
     /// Returns the scenario on the requested vehicle, or unchanged.
-    pub(crate) fn put(&self, scenario: Scenario) -> Result<Scenario, Failure> {
+    pub(crate) fn put(&self, scenario: Scenario) -> Result<Scenario, CommandError> {
         match self.vehicle()? {
             Some(vehicle) => Ok(scenario.on(&vehicle, Profile::Flight)?),
             None => Ok(scenario),
@@ -36,7 +36,7 @@ impl OnVehicle {
     }
 
     /// Returns the campaign on the requested vehicle, or unchanged.
-    pub(crate) fn campaign(&self, campaign: Campaign) -> Result<Campaign, Failure> {
+    pub(crate) fn campaign(&self, campaign: Campaign) -> Result<Campaign, CommandError> {
         if self.vehicle.is_none() {
             return Ok(campaign);
         }
@@ -47,7 +47,7 @@ impl OnVehicle {
 
     /// Returns the vehicle as the firmware's build script expects it: the name of a built-in vehicle, or an absolute
     /// path.
-    pub(crate) fn for_firmware(&self) -> Result<Option<PathBuf>, Failure> {
+    pub(crate) fn for_firmware(&self) -> Result<Option<PathBuf>, CommandError> {
         let Some(path) = &self.vehicle else { return Ok(None) };
         let known = path.to_str().is_some_and(|name| built_in(name).is_some());
         // Absolute, since the build script runs in its package's folder.
@@ -55,7 +55,7 @@ impl OnVehicle {
     }
 
     /// Returns the arguments that select `target` and this vehicle.
-    pub(crate) fn arguments(&self, target: &Target) -> String {
+    pub(crate) fn arguments(&self, target: &TargetArg) -> String {
         self.vehicle.as_ref().map_or(target.to_string(), |path| format!("{target} --vehicle {}", path.display()))
     }
 }
@@ -65,14 +65,14 @@ impl OnVehicle {
 /// `sitl vehicles racer > my.toml` makes a vehicle file to change and to fly with `sitl fly hover --vehicle my.toml`.
 /// See docs/vehicles.md.
 #[derive(Args, Debug)]
-pub(crate) struct Vehicles {
+pub(crate) struct VehiclesArgs {
     /// Built-in vehicle to print
     name: Option<String>,
 }
 
-impl Vehicles {
+impl VehiclesArgs {
     /// Prints the list or the file.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         match self.name {
             Some(name) => print(built_in(&name).ok_or_else(|| FileError::whole(&name, unknown(&name)))?.text)?,
             None => {

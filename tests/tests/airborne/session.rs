@@ -2,7 +2,7 @@
 
 use super::{Tick, Truth};
 use afbc_comms::services::origin::EarthOrigin;
-use afbc_ground::{Client, Patience};
+use afbc_ground::{Client, RetryPolicy};
 use afbc_mavlink::{
     Address, Datum, Decoder, Downlink, GlobalPosition, Height, MissionItem, MissionType, Uplink, VehicleCommand,
 };
@@ -21,7 +21,7 @@ const TARGET_MS: u32 = 50;
 const TRY_MS: u32 = 250;
 const ARMS_MS: u32 = 30_000;
 /// Time in which the vehicle may ask for an item of a mission again, over links that lose most of it.
-const UPLOAD: Patience = Patience { answer_ms: 60_000, tries: 1 };
+const UPLOAD: RetryPolicy = RetryPolicy { answer_ms: 60_000, tries: 1 };
 
 /// A ground station or companion computer.
 struct Station {
@@ -122,8 +122,8 @@ impl Session {
         let mut sent = Vec::new();
         for (peer, station) in (1..).zip(&mut self.stations) {
             let Station { address, client, reaches, breaks, frames, stream } = station;
-            client.beat_every(reaches.then_some(HEARTBEAT_MS));
-            client.turn(time_ms.into());
+            client.set_heartbeat_period(reaches.then_some(HEARTBEAT_MS));
+            client.update(time_ms.into());
             if time_ms.is_multiple_of(TARGET_MS) {
                 stream.iter().for_each(|target| client.say(*target));
             }

@@ -1,6 +1,6 @@
 //! Serial NOR flash chip of 16 MiB: Winbond's W25Q128JV (revision F: commands in section 8, times in 9.6).
 
-use super::{CardTrouble, LogStorage};
+use super::{CardFaults, LogStorage};
 use rigless::chip::Timeline;
 use rigless::chip::spi::Peer;
 use rigless::snapshot::{Error, Reader, Store, Writer};
@@ -28,12 +28,12 @@ pub struct FlashChip {
     sectors: BTreeMap<usize, Vec<u8>>,
     /// Bytes received since the chip was selected.
     heard: Vec<u8>,
-    now: Now,
+    now: FlashState,
 }
 
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-struct Now {
-    trouble: CardTrouble,
+struct FlashState {
+    faults: CardFaults,
     busy_until_ns: u64,
     is_enabled: bool,
     written: u64,
@@ -41,7 +41,7 @@ struct Now {
 
 impl FlashChip {
     pub fn new() -> Self {
-        FlashChip { sectors: BTreeMap::new(), heard: Vec::new(), now: Now::default() }
+        FlashChip { sectors: BTreeMap::new(), heard: Vec::new(), now: FlashState::default() }
     }
 
     fn address(&self) -> usize {
@@ -78,9 +78,9 @@ impl FlashChip {
         };
         self.now.is_enabled = false;
         self.now.busy_until_ns = now_ns + takes_ns;
-        if let Some([at_ms, ms]) = self.now.trouble.stall_ms.filter(|[at_ms, _]| now_ns >= at_ms * 1_000_000) {
+        if let Some([at_ms, ms]) = self.now.faults.stall_ms.filter(|[at_ms, _]| now_ns >= at_ms * 1_000_000) {
             self.now.busy_until_ns += ms * 1_000_000;
-            self.now.trouble.stall_ms = None;
+            self.now.faults.stall_ms = None;
             println!("{:8.3} s  the chip stalls for {ms} ms, from {at_ms} ms on", now_ns as f64 * 1e-9);
         }
     }
@@ -89,7 +89,7 @@ impl FlashChip {
 impl Peer for FlashChip {
     fn transfer(&mut self, mosi: u32, _: u8, context: &mut Timeline<'_, '_>) -> u32 {
         let now_ns = context.now().0;
-        let is_out = self.now.trouble.out_ms.is_some_and(|[from, to]| (from..to).contains(&(now_ns / 1_000_000)));
+        let is_out = self.now.faults.out_ms.is_some_and(|[from, to]| (from..to).contains(&(now_ns / 1_000_000)));
         let place = self.heard.len();
         let command = *self.heard.first().unwrap_or(&(mosi as u8));
         let is_busy = now_ns < self.now.busy_until_ns;
@@ -121,8 +121,8 @@ impl Peer for FlashChip {
 }
 
 impl LogStorage for FlashChip {
-    fn trouble(&mut self, trouble: CardTrouble) {
-        self.now.trouble = trouble;
+    fn set_faults(&mut self, faults: CardFaults) {
+        self.now.faults = faults;
     }
 
     /// Fills the first sectors with data other than logs, up to `room` free bytes.

@@ -27,7 +27,7 @@ const USUAL_NS: u64 = 800_000;
 
 /// Faults of a card. Times count from power-up [ms].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct CardTrouble {
+pub struct CardFaults {
     /// Time and duration of a stall: the first block after the time takes longer by the duration.
     pub stall_ms: Option<[u64; 2]>,
     /// Times at which the card is removed and inserted again.
@@ -37,7 +37,7 @@ pub struct CardTrouble {
 /// Storage of logs.
 pub trait LogStorage {
     /// Sets the faults of the storage, replacing earlier ones.
-    fn trouble(&mut self, trouble: CardTrouble);
+    fn set_faults(&mut self, faults: CardFaults);
 
     /// Removes the card; does nothing to a flash chip.
     fn remove(&mut self) {}
@@ -56,7 +56,7 @@ pub trait LogStorage {
 #[derive(Debug)]
 pub struct CardSlot {
     card: MemoryCard,
-    trouble: CardTrouble,
+    faults: CardFaults,
     busy_until_ns: u64,
     was_out: bool,
     written: u64,
@@ -90,19 +90,13 @@ fn fill(volume: &mut [u8], room: u64) -> std::io::Result<()> {
 
 impl CardSlot {
     fn new() -> Self {
-        CardSlot {
-            card: formatted(None),
-            trouble: CardTrouble::default(),
-            busy_until_ns: 0,
-            was_out: false,
-            written: 0,
-        }
+        CardSlot { card: formatted(None), faults: CardFaults::default(), busy_until_ns: 0, was_out: false, written: 0 }
     }
 
     /// Returns whether the card is out, and whether it has just been removed or inserted. Either makes it lose its
     /// supply.
     fn is_out(&mut self, now_ns: u64) -> (bool, bool) {
-        let is_out = self.trouble.out_ms.is_some_and(|[from, to]| (from..to).contains(&(now_ns / 1_000_000)));
+        let is_out = self.faults.out_ms.is_some_and(|[from, to]| (from..to).contains(&(now_ns / 1_000_000)));
         let is_new = is_out != self.was_out;
         if is_new {
             println!("{:8.3} s  the card is {}", now_ns as f64 * 1e-9, if is_out { "out" } else { "in" });
@@ -116,21 +110,21 @@ impl CardSlot {
     fn write(&mut self, now_ns: u64) {
         self.written += 1;
         self.busy_until_ns = now_ns + USUAL_NS;
-        if let Some([at_ms, ms]) = self.trouble.stall_ms.filter(|[at_ms, _]| now_ns >= at_ms * 1_000_000) {
+        if let Some([at_ms, ms]) = self.faults.stall_ms.filter(|[at_ms, _]| now_ns >= at_ms * 1_000_000) {
             self.busy_until_ns += ms * 1_000_000;
-            self.trouble.stall_ms = None;
+            self.faults.stall_ms = None;
             println!("{:8.3} s  the card stalls for {ms} ms, from {at_ms} ms on", now_ns as f64 * 1e-9);
         }
     }
 }
 
 impl LogStorage for CardSlot {
-    fn trouble(&mut self, trouble: CardTrouble) {
-        self.trouble = trouble;
+    fn set_faults(&mut self, faults: CardFaults) {
+        self.faults = faults;
     }
 
     fn remove(&mut self) {
-        self.trouble = CardTrouble { out_ms: Some([0, u64::MAX]), ..CardTrouble::default() };
+        self.faults = CardFaults { out_ms: Some([0, u64::MAX]), ..CardFaults::default() };
     }
 
     fn fill(&mut self, room: u64) {
@@ -148,12 +142,12 @@ impl LogStorage for CardSlot {
 
 impl Store for CardSlot {
     fn store(&self, to: &mut Writer) -> Result<(), Error> {
-        to.put(&(self.trouble, self.busy_until_ns, self.was_out, self.written))?;
+        to.put(&(self.faults, self.busy_until_ns, self.was_out, self.written))?;
         self.card.store(to)
     }
 
     fn load(&mut self, from: &mut Reader) -> Result<(), Error> {
-        (self.trouble, self.busy_until_ns, self.was_out, self.written) = from.take()?;
+        (self.faults, self.busy_until_ns, self.was_out, self.written) = from.take()?;
         self.card.load(from)
     }
 }

@@ -19,7 +19,7 @@ const BUSY: u32 = 0x00;
 
 /// State of the host's transfer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-enum Heard {
+enum SpiTransfer {
     #[default]
     Nothing,
     /// Bytes left of a command frame; true if the command writes a block.
@@ -36,30 +36,30 @@ enum Heard {
 #[derive(Debug)]
 pub struct SpiSlot {
     pub slot: CardSlot,
-    heard: Heard,
+    heard: SpiTransfer,
 }
 
 impl SpiSlot {
     pub fn new() -> Self {
-        SpiSlot { slot: CardSlot::new(), heard: Heard::Nothing }
+        SpiSlot { slot: CardSlot::new(), heard: SpiTransfer::Nothing }
     }
 
     /// Follows the host's bytes, and counts each block that it writes.
     fn hear(&mut self, mosi: u8, answer: u32, now_ns: u64) {
         self.heard = match self.heard {
-            Heard::Nothing if mosi & 0xC0 == 0x40 => Heard::Frame(FRAME - 1, mosi == WRITE_BLOCK),
-            Heard::Nothing => Heard::Nothing,
-            Heard::Frame(1, true) => Heard::Waits,
-            Heard::Frame(1, false) => Heard::Nothing,
-            Heard::Frame(left, writes) => Heard::Frame(left - 1, writes),
-            Heard::Waits if mosi == START_BLOCK => Heard::Block(BLOCK),
-            Heard::Waits => Heard::Waits,
-            Heard::Block(1) => Heard::Verdict,
-            Heard::Block(left) => Heard::Block(left - 1),
-            Heard::Verdict if answer == REST => Heard::Verdict,
-            Heard::Verdict => {
+            SpiTransfer::Nothing if mosi & 0xC0 == 0x40 => SpiTransfer::Frame(FRAME - 1, mosi == WRITE_BLOCK),
+            SpiTransfer::Nothing => SpiTransfer::Nothing,
+            SpiTransfer::Frame(1, true) => SpiTransfer::Waits,
+            SpiTransfer::Frame(1, false) => SpiTransfer::Nothing,
+            SpiTransfer::Frame(left, writes) => SpiTransfer::Frame(left - 1, writes),
+            SpiTransfer::Waits if mosi == START_BLOCK => SpiTransfer::Block(BLOCK),
+            SpiTransfer::Waits => SpiTransfer::Waits,
+            SpiTransfer::Block(1) => SpiTransfer::Verdict,
+            SpiTransfer::Block(left) => SpiTransfer::Block(left - 1),
+            SpiTransfer::Verdict if answer == REST => SpiTransfer::Verdict,
+            SpiTransfer::Verdict => {
                 self.slot.write(now_ns);
-                Heard::Nothing
+                SpiTransfer::Nothing
             }
         };
     }
@@ -70,7 +70,7 @@ impl Peer for SpiSlot {
         let now_ns = context.now().0;
         let (is_out, is_new) = self.slot.is_out(now_ns);
         if is_new {
-            self.heard = Heard::Nothing;
+            self.heard = SpiTransfer::Nothing;
         }
         if is_out {
             return REST;
@@ -89,7 +89,7 @@ impl Peer for SpiSlot {
     }
 
     fn deselect(&mut self, context: &mut Timeline<'_, '_>) {
-        self.heard = Heard::Nothing;
+        self.heard = SpiTransfer::Nothing;
         self.slot.card.deselect(context);
     }
 }

@@ -19,7 +19,7 @@ const READS: u8 = 0x80;
 
 /// Phase of a transfer.
 #[derive(Debug, Default)]
-enum Phase {
+enum SpiPhase {
     #[default]
     Idle,
     Address,
@@ -32,49 +32,49 @@ enum Phase {
 
 /// BMI270 on SPI.
 #[derive(Debug)]
-pub struct Bmi270 {
+pub struct Bmi270Model {
     registers: Bmi270Registers,
-    phase: Phase,
+    phase: SpiPhase,
 }
 
-impl Bmi270 {
+impl Bmi270Model {
     pub fn new() -> Self {
         // No noise of its own: the plant's readings already have noise.
         let mut registers = Bmi270Registers::new(IDENTITY, |_, _| 0.0);
         registers.rates_deg_s = [0.0; 3];
         registers.force_g = [0.0, 0.0, 1.0];
-        Bmi270 { registers, phase: Phase::Idle }
+        Bmi270Model { registers, phase: SpiPhase::Idle }
     }
 
     /// Sets the measured rates [mdeg/s], specific force [1e-6 g] and temperature [0.01 degrees C], in the sensor's
     /// axes.
-    pub fn feel(&mut self, rate: [i32; 3], force: [i32; 3], temperature: i32) {
+    pub fn set_motion(&mut self, rate: [i32; 3], force: [i32; 3], temperature: i32) {
         self.registers.rates_deg_s = rate.map(|rate| f64::from(rate) * 1e-3);
         self.registers.force_g = force.map(|force| f64::from(force) * 1e-6);
         self.registers.temperature_c = f64::from(temperature) * 1e-2;
     }
 }
 
-impl Peer for Bmi270 {
+impl Peer for Bmi270Model {
     fn transfer(&mut self, mosi: u32, _: u8, context: &mut Timeline<'_, '_>) -> u32 {
         let now_us = context.now().0 / 1000;
         let byte = mosi as u8;
         let (phase, answer) = match std::mem::take(&mut self.phase) {
-            Phase::Idle => (Phase::Idle, 0xFF),
-            Phase::Address if byte & READS != 0 => (Phase::Dummy(byte & !READS), 0),
-            Phase::Address => (Phase::Writes(byte, Vec::new()), 0),
-            Phase::Dummy(register) => {
+            SpiPhase::Idle => (SpiPhase::Idle, 0xFF),
+            SpiPhase::Address if byte & READS != 0 => (SpiPhase::Dummy(byte & !READS), 0),
+            SpiPhase::Address => (SpiPhase::Writes(byte, Vec::new()), 0),
+            SpiPhase::Dummy(register) => {
                 let mut bytes = vec![0; REGISTERS - usize::from(register)];
                 self.registers.read(now_us, register, &mut bytes);
-                (Phase::Reads(bytes, 0), 0)
+                (SpiPhase::Reads(bytes, 0), 0)
             }
-            Phase::Reads(bytes, at) => {
+            SpiPhase::Reads(bytes, at) => {
                 let answer = bytes.get(at).copied().unwrap_or_default();
-                (Phase::Reads(bytes, at + 1), answer)
+                (SpiPhase::Reads(bytes, at + 1), answer)
             }
-            Phase::Writes(register, mut bytes) => {
+            SpiPhase::Writes(register, mut bytes) => {
                 bytes.push(byte);
-                (Phase::Writes(register, bytes), 0)
+                (SpiPhase::Writes(register, bytes), 0)
             }
         };
         self.phase = phase;
@@ -82,18 +82,18 @@ impl Peer for Bmi270 {
     }
 
     fn select(&mut self, _: &mut Timeline<'_, '_>) {
-        self.phase = Phase::Address;
+        self.phase = SpiPhase::Address;
     }
 
     fn deselect(&mut self, context: &mut Timeline<'_, '_>) {
-        if let Phase::Writes(register, bytes) = std::mem::take(&mut self.phase) {
+        if let SpiPhase::Writes(register, bytes) = std::mem::take(&mut self.phase) {
             self.registers.write(context.now().0 / 1000, register, &bytes);
         }
     }
 }
 
 /// Snapshots are taken between transfers, so the transfer's phase is not stored.
-impl Store for Bmi270 {
+impl Store for Bmi270Model {
     fn store(&self, to: &mut Writer) -> Result<(), Error> {
         let Bmi270Registers { registers, is_spi, reset_us, awake_us, loaded, started_us, on_us, .. } = &self.registers;
         to.put(&(registers.to_vec(), is_spi, reset_us, awake_us, loaded, started_us, on_us))

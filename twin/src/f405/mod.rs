@@ -19,10 +19,10 @@ use crate::card::{FlashChip, LogStorage, SpiSlot};
 use crate::impairments::Impairments;
 use crate::machine::{Divider, Machine, Signal};
 use crate::steady::SteadyPin;
-use crate::wire::Wire;
-use bmi270::Bmi270;
-use part::Part;
-use relabelled::Relabelled;
+use crate::wire::UartWire;
+use bmi270::Bmi270Model;
+use part::BoardChip;
+use relabelled::RelabelledImu;
 use rigless::chip::dps310::{Dps310, Sdo};
 use rigless::chip::icm42688p::Icm42688p;
 use rigless::chip::nmea;
@@ -46,7 +46,7 @@ use rigless::time::VirtualNanos;
 use serde::{Deserialize, Serialize};
 use std::num::{NonZeroU32, NonZeroU64};
 use std::ops::Range;
-use wiring::{Inertial, LogWiring, Sensors, StorageKind, Timer, UART4, WIRINGS, Wiring};
+use wiring::{InertialModel, LogWiring, Sensors, StorageKind, Timer, UART4, WIRINGS, Wiring};
 
 const CRYSTAL_HZ: u64 = 8_000_000;
 const RAIL_MV: u32 = 3_300;
@@ -70,7 +70,7 @@ const PRESSURE_NOISE: [&str; 1] = ["pressure.noise"];
 
 /// Newest readings given to the sensor models, in body axes.
 #[derive(Debug, Default, Serialize, Deserialize)]
-struct Handed {
+struct SensorReadings {
     rate: Sensed<i32, 3>,
     force: Sensed<i32, 3>,
     field: Sensed<i32, 3>,
@@ -80,9 +80,9 @@ struct Handed {
 /// Board described by a row of [`WIRINGS`].
 #[derive(Debug)]
 pub struct F405<const ROW: usize> {
-    mcu: Part,
+    mcu: BoardChip,
     impairments: Impairments,
-    handed: Handed,
+    handed: SensorReadings,
     sensed: Signals,
 }
 
@@ -92,9 +92,9 @@ impl<const ROW: usize> F405<ROW> {
     /// Returns the board at rest.
     fn new() -> Result<Self, Error> {
         let mut board = F405 {
-            mcu: Part::new(&Self::WIRING)?,
+            mcu: BoardChip::new(&Self::WIRING)?,
             impairments: Impairments::default(),
-            handed: Handed::default(),
+            handed: SensorReadings::default(),
             sensed: AT_REST,
         };
         let part = &mut board.mcu.stm32;
@@ -106,10 +106,10 @@ impl<const ROW: usize> F405<ROW> {
         if let Some(Sensors { imu, select: (port, pin), i2c, receiver, .. }) = Self::WIRING.sensors {
             let select = Select { port, pin: Pin::new(pin).expect("one of sixteen pins"), active: Level::Low };
             match imu {
-                Inertial::Icm42688p => part.spi[SPI].attach_selected(Icm42688p::new(), select),
-                Inertial::Bmi270 => part.spi[SPI].attach_selected(Bmi270::new(), select),
-                Inertial::Relabelled(identity) => {
-                    part.spi[SPI].attach_selected(Relabelled::new(identity), select);
+                InertialModel::Icm42688p => part.spi[SPI].attach_selected(Icm42688p::new(), select),
+                InertialModel::Bmi270 => part.spi[SPI].attach_selected(Bmi270Model::new(), select),
+                InertialModel::Relabelled(identity) => {
+                    part.spi[SPI].attach_selected(RelabelledImu::new(identity), select);
                 }
             }
             part.i2c[i2c].attach(Dps310::new(Sdo::Low));
@@ -226,22 +226,22 @@ impl<const ROW: usize> Edge for F405<ROW> {
     fn sense(&mut self, signals: &Signals) {
         self.sensed = *signals;
         let Some(Sensors { imu, quarter_turns, i2c, receiver, battery, .. }) = Self::WIRING.sensors else { return };
-        let F405 { mcu: Part { stm32: part, .. }, impairments, handed, .. } = self;
+        let F405 { mcu: BoardChip { stm32: part, .. }, impairments, handed, .. } = self;
         let rate = of_imu(handed.rate.hand(signals.angular_rate, &impairments.imus[0].rate), quarter_turns);
         let force = of_imu(handed.force.hand(signals.specific_force, &impairments.imus[0].force), quarter_turns);
         match imu {
-            Inertial::Icm42688p => {
+            InertialModel::Icm42688p => {
                 let chip: &mut Icm42688p = part.spi[SPI].chip_mut(IMU).expect("attached");
                 chip.set_rate(rate[0], rate[1], rate[2]);
                 chip.set_acceleration(force[0], force[1], force[2]);
                 chip.set_temperature(signals.temperature);
             }
-            Inertial::Bmi270 => {
-                let chip: &mut Bmi270 = part.spi[SPI].chip_mut(IMU).expect("attached");
-                chip.feel(rate, force, signals.temperature);
+            InertialModel::Bmi270 => {
+                let chip: &mut Bmi270Model = part.spi[SPI].chip_mut(IMU).expect("attached");
+                chip.set_motion(rate, force, signals.temperature);
             }
-            Inertial::Relabelled(_) => {
-                let chip: &mut Relabelled = part.spi[SPI].chip_mut(IMU).expect("attached");
+            InertialModel::Relabelled(_) => {
+                let chip: &mut RelabelledImu = part.spi[SPI].chip_mut(IMU).expect("attached");
                 chip.inner.set_rate(rate[0], rate[1], rate[2]);
                 chip.inner.set_acceleration(force[0], force[1], force[2]);
                 chip.inner.set_temperature(signals.temperature);
@@ -349,18 +349,18 @@ impl<const ROW: usize> Machine for F405<ROW> {
     }
 
     /// The second link is on USB.
-    fn attach_second_link(&mut self, _: Wire) -> bool {
+    fn attach_second_link(&mut self, _: UartWire) -> bool {
         false
     }
 
     /// The UART that the board reserves for a radio receiver.
-    fn attach_radio(&mut self, wire: Wire) -> Option<f32> {
+    fn attach_radio(&mut self, wire: UartWire) -> Option<f32> {
         self.mcu.stm32.usart[Self::WIRING.radio?].attach(wire);
         Some(0.0)
     }
 
     /// UART5, on all boards that have a UART for motor controllers.
-    fn attach_escs(&mut self, wire: Wire) {
+    fn attach_escs(&mut self, wire: UartWire) {
         if Self::WIRING.sensors.is_some() {
             self.mcu.stm32.usart[7].attach(wire);
         }

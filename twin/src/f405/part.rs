@@ -28,7 +28,7 @@ static WIRINGS: LazyLock<[Vec<Wire>; 2]> = LazyLock::new(|| {
 });
 
 #[derive(Debug)]
-pub struct Part {
+pub struct BoardChip {
     pub stm32: Stm32f427,
     /// Bus slot of the sensors' I2C, with control and count registers of the DMA stream that receives from it; below,
     /// the slot of DMA1.
@@ -36,7 +36,7 @@ pub struct Part {
     dma: usize,
 }
 
-impl Part {
+impl BoardChip {
     /// Creates the part of a board.
     pub fn new(wiring: &Wiring) -> Result<Self, Error> {
         let stm32 = Stm32f427::new()?;
@@ -45,7 +45,7 @@ impl Part {
             Some(Sensors { i2c, i2c_stream, .. }) => Some((stm32.bus().slot(I2C_INTERFACES[i2c])?, stream(i2c_stream))),
             None => None,
         };
-        let mut part = Part { stm32, i2c, dma };
+        let mut part = BoardChip { stm32, i2c, dma };
         part.wire();
         Ok(part)
     }
@@ -81,7 +81,7 @@ fn stream(number: usize) -> [Register; 2] {
     }
 }
 
-impl Mcu for Part {
+impl Mcu for BoardChip {
     fn bus(&self) -> &Bus {
         self.stm32.bus()
     }

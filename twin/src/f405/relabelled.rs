@@ -10,7 +10,7 @@ const WHO_AM_I: u8 = 0x75;
 const READS: u8 = 0x80;
 
 #[derive(Debug)]
-pub struct Relabelled {
+pub struct RelabelledImu {
     pub inner: Icm20608,
     identity: u8,
     /// Register of the next byte read; `None` outside a read.
@@ -19,14 +19,14 @@ pub struct Relabelled {
     is_first: bool,
 }
 
-impl Relabelled {
+impl RelabelledImu {
     /// Creates a part with this identity.
     pub fn new(identity: u8) -> Self {
-        Relabelled { inner: Icm20608::new(), identity, register: None, is_first: false }
+        RelabelledImu { inner: Icm20608::new(), identity, register: None, is_first: false }
     }
 }
 
-impl Peer for Relabelled {
+impl Peer for RelabelledImu {
     fn transfer(&mut self, mosi: u32, bits: u8, context: &mut Timeline<'_, '_>) -> u32 {
         let answer = self.inner.transfer(mosi, bits, context);
         if std::mem::take(&mut self.is_first) {
@@ -54,7 +54,7 @@ impl Peer for Relabelled {
 }
 
 /// Snapshots are taken between transfers, so the transfer's state is not stored.
-impl Store for Relabelled {
+impl Store for RelabelledImu {
     fn store(&self, to: &mut Writer) -> Result<(), Error> {
         self.inner.store(to)
     }

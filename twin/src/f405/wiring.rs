@@ -38,7 +38,7 @@ pub struct Uart {
 /// Sensors of a board: the IMU on SPI1, the others on one I2C.
 #[derive(Clone, Copy, Debug)]
 pub struct Sensors {
-    pub imu: Inertial,
+    pub imu: InertialModel,
     /// Port and pin of its chip select.
     pub select: (&'static str, u8),
     /// Clockwise quarter turns of the IMU, seen from above.
@@ -47,13 +47,13 @@ pub struct Sensors {
     pub i2c: usize,
     pub i2c_stream: usize,
     pub receiver: Uart,
-    pub battery: Battery,
+    pub battery: BatteryWiring,
 }
 
 /// Converter channels of the battery's voltage (by a divider of 11) and current, and the current per volt at the pin
 /// \[0.1 A/V\].
 #[derive(Clone, Copy, Debug)]
-pub struct Battery {
+pub struct BatteryWiring {
     pub channels: [u8; 2],
     pub deciamperes_per_volt: u32,
 }
@@ -75,7 +75,7 @@ pub enum StorageKind {
 
 /// Model of inertial sensor.
 #[derive(Clone, Copy, Debug)]
-pub enum Inertial {
+pub enum InertialModel {
     Icm42688p,
     Bmi270,
     /// An ICM-20608-G with the identity of another part of its family.
@@ -138,13 +138,13 @@ const SPEEDYBEE_V3: Wiring = Wiring {
     link: USART3,
     radio: Some(1),
     sensors: Some(Sensors {
-        imu: Inertial::Bmi270,
+        imu: InertialModel::Bmi270,
         select: ("GPIOA", 4),
         quarter_turns: 0,
         i2c: 1,
         i2c_stream: 3,
         receiver: USART6,
-        battery: Battery { channels: [10, 11], deciamperes_per_volt: 259 },
+        battery: BatteryWiring { channels: [10, 11], deciamperes_per_volt: 259 },
     }),
     logs: Some(LogWiring { storage: StorageKind::Card, spi: 1, select: ("GPIOA", 15) }),
     steady: &[RX2, RX3, RX5, RX6, QUIET_PC3],
@@ -158,13 +158,13 @@ const SPEEDYBEE_V4: Wiring = Wiring {
     link: USART3,
     radio: Some(1),
     sensors: Some(Sensors {
-        imu: Inertial::Icm42688p,
+        imu: InertialModel::Icm42688p,
         select: ("GPIOA", 4),
         quarter_turns: 1,
         i2c: 0,
         i2c_stream: 0,
         receiver: USART6,
-        battery: Battery { channels: [10, 11], deciamperes_per_volt: 250 },
+        battery: BatteryWiring { channels: [10, 11], deciamperes_per_volt: 250 },
     }),
     logs: Some(LogWiring { storage: StorageKind::Card, spi: 2, select: ("GPIOC", 14) }),
     steady: &[RX2, RX3, RX5, RX6, QUIET_PB11],
@@ -176,13 +176,13 @@ const SPEEDYBEE_V4: Wiring = Wiring {
 const SPEEDYBEE_MINI: Wiring = Wiring {
     name: "speedybeef405mini",
     sensors: Some(Sensors {
-        imu: Inertial::Icm42688p,
+        imu: InertialModel::Icm42688p,
         select: ("GPIOA", 4),
         quarter_turns: 3,
         i2c: 0,
         i2c_stream: 0,
         receiver: USART6,
-        battery: Battery { channels: [10, 11], deciamperes_per_volt: 400 },
+        battery: BatteryWiring { channels: [10, 11], deciamperes_per_volt: 400 },
     }),
     logs: Some(LogWiring { storage: StorageKind::Flash, spi: 2, select: ("GPIOC", 14) }),
     motors: [("M1", TIM4, 1), ("M2", TIM4, 2), ("M3", TIM3, 4), ("M4", TIM3, 3)],
@@ -195,13 +195,13 @@ const MATEK_SE: Wiring = Wiring {
     link: USART1,
     radio: Some(1),
     sensors: Some(Sensors {
-        imu: Inertial::Relabelled(0x68),
+        imu: InertialModel::Relabelled(0x68),
         select: ("GPIOA", 4),
         quarter_turns: 3,
         i2c: 0,
         i2c_stream: 0,
         receiver: USART6,
-        battery: Battery { channels: [10, 11], deciamperes_per_volt: 559 },
+        battery: BatteryWiring { channels: [10, 11], deciamperes_per_volt: 559 },
     }),
     logs: Some(LogWiring { storage: StorageKind::Card, spi: 2, select: ("GPIOC", 14) }),
     steady: &[RX1, RX2, RX5, RX6],
@@ -215,13 +215,13 @@ const MATEK_STD: Wiring = Wiring {
     link: USART1,
     radio: Some(1),
     sensors: Some(Sensors {
-        imu: Inertial::Icm42688p,
+        imu: InertialModel::Icm42688p,
         select: ("GPIOC", 2),
         quarter_turns: 2,
         i2c: 0,
         i2c_stream: 0,
         receiver: USART3,
-        battery: Battery { channels: [15, 14], deciamperes_per_volt: 559 },
+        battery: BatteryWiring { channels: [15, 14], deciamperes_per_volt: 559 },
     }),
     logs: Some(LogWiring { storage: StorageKind::Card, spi: 2, select: ("GPIOC", 1) }),
     steady: &[RX1, RX2, RX3, RX5],
@@ -235,13 +235,13 @@ const KAKUTE: Wiring = Wiring {
     link: USART1,
     radio: Some(2),
     sensors: Some(Sensors {
-        imu: Inertial::Relabelled(0x98),
+        imu: InertialModel::Relabelled(0x98),
         select: ("GPIOC", 4),
         quarter_turns: 3,
         i2c: 0,
         i2c_stream: 5,
         receiver: UART4,
-        battery: Battery { channels: [13, 12], deciamperes_per_volt: 364 },
+        battery: BatteryWiring { channels: [13, 12], deciamperes_per_volt: 364 },
     }),
     logs: None,
     steady: &[RX1, (1, 11, PulledUp), RX4, RX5],

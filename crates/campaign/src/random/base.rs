@@ -1,8 +1,8 @@
 //! A vehicle with sensors in still air, from which random flights are drawn.
 
-use super::change::Change;
-use super::flight::{DrawnFlight, Seen};
-use super::path::{DURATION_S, Path};
+use super::flight::{DrawnFlight, FeedbackSource};
+use super::mismatch::ModelMismatch;
+use super::path::{DURATION_S, UntimedPath};
 use super::power::{HEIGHT_M, Power};
 use crate::draw::mix;
 use afbc::Profile;
@@ -25,26 +25,26 @@ const HIGH_M: f64 = 10.0;
 const LEVEL_RAD: f64 = 0.6;
 
 /// A vehicle with its sensors in still air.
-pub(super) struct Base<'a> {
+pub(super) struct BaseVehicle<'a> {
     vehicle: &'a Vehicle,
-    seen: Seen,
+    seen: FeedbackSource,
     power: Power,
     /// Scenario without contenders.
     scenario: Scenario,
 }
 
-impl<'a> Base<'a> {
+impl<'a> BaseVehicle<'a> {
     /// Equips `vehicle` with the sensors that `seen` asks for.
     ///
     /// # Errors
     /// One line about the first value that the vehicle cannot fly with.
-    pub(super) fn new(vehicle: &'a Vehicle, seen: Seen) -> Result<Self, FileError> {
+    pub(super) fn new(vehicle: &'a Vehicle, seen: FeedbackSource) -> Result<Self, FileError> {
         let name = seen.scenario();
         let known = built_in(name).ok_or_else(|| FileError::whole(name, "no such scenario"))?.read()?;
         let calm = Environment::calm(known.vehicle).map_err(|error| FileError::whole(name, out_of_range(&error)))?;
         let mut still = Scenario { duration_s: DURATION_S, environment: calm, contenders: Vec::new(), ..known };
         still.realism.wind = Wind::default();
-        Ok(Base { vehicle, seen, power: Power::of(vehicle), scenario: still.on(vehicle, Profile::Flight)? })
+        Ok(BaseVehicle { vehicle, seen, power: Power::of(vehicle), scenario: still.on(vehicle, Profile::Flight)? })
     }
 
     /// Draws flight `number` of `seed`.
@@ -58,13 +58,13 @@ impl<'a> Base<'a> {
         let bits = mix(of_vehicle.wrapping_add(number)) >> 11;
         let mut noise = Noise::new(bits, NoiseStream::Scenario);
         let boldness = BOLDNESS_MIN + (1.0 - BOLDNESS_MIN) * noise.uniform();
-        let change = self.power.fitted(&Change::draw(&mut noise, vehicle));
+        let change = self.power.fitted(&ModelMismatch::draw(&mut noise, vehicle));
         // Outdoors the estimate is wrong by metres, and a vehicle that stands on the ground with a wrong position would
         // tip over.
-        let ground = vehicle.realism.contact.filter(|_| self.seen == Seen::Mocap);
+        let ground = vehicle.realism.contact.filter(|_| self.seen == FeedbackSource::Mocap);
         let stands_m = ground.map(|ground| ground.foot_depth_m - ground.sink_m);
-        let height_m = if self.seen == Seen::Outdoor { HIGH_M } else { HEIGHT_M };
-        let path = Path::draw(&mut noise, vehicle.parameters.arm_m, height_m, stands_m);
+        let height_m = if self.seen == FeedbackSource::Outdoor { HIGH_M } else { HEIGHT_M };
+        let path = UntimedPath::draw(&mut noise, vehicle.parameters.arm_m, height_m, stands_m);
         let (kind, stands) = (path.kind(), path.stands());
         let trajectory = path.flown(&self.power.under(&change), boldness);
         let [speed_m_s, acceleration_m_s2] = peaks(&trajectory);
@@ -93,12 +93,12 @@ impl<'a> Base<'a> {
 }
 
 /// Returns the motion at the start of `trajectory`, with the bank that its acceleration needs.
-fn start(trajectory: &Trajectory, gravity_m_s2: f64, seen: Seen) -> Motion {
+fn start(trajectory: &Trajectory, gravity_m_s2: f64, seen: FeedbackSource) -> Motion {
     let reference = trajectory.at(0.0);
     let force = reference.acceleration_m_s2 + Vector3::z() * gravity_m_s2;
     // A vehicle that must find its attitude first starts with less tilt.
     let level_m_s2 = force.xy().norm();
-    let most_m_s2 = if seen == Seen::Truth { f64::INFINITY } else { force.z * tan(LEVEL_RAD) };
+    let most_m_s2 = if seen == FeedbackSource::Truth { f64::INFINITY } else { force.z * tan(LEVEL_RAD) };
     let share = if level_m_s2 > most_m_s2 { most_m_s2 / level_m_s2 } else { 1.0 };
     let (x, y) = (share * force.x, share * force.y);
     let (s, c) = sincos(reference.yaw_rad);

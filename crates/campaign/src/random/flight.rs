@@ -1,11 +1,11 @@
 //! A drawn flight.
 
-use super::change::Change;
+use super::mismatch::ModelMismatch;
 use afbc_scenario::Scenario;
 
 /// Source of the state that the controllers see.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Seen {
+pub enum FeedbackSource {
     /// True state with the noise of the built-in scenario `hardware`.
     Truth,
     /// The vehicle's own estimate from the instruments of the built-in scenario `mocap`.
@@ -14,13 +14,13 @@ pub enum Seen {
     Outdoor,
 }
 
-impl Seen {
+impl FeedbackSource {
     /// Returns the name of the built-in scenario with these sensors.
     pub const fn scenario(self) -> &'static str {
         match self {
-            Seen::Truth => "hardware",
-            Seen::Mocap => "mocap",
-            Seen::Outdoor => "outdoor",
+            FeedbackSource::Truth => "hardware",
+            FeedbackSource::Mocap => "mocap",
+            FeedbackSource::Outdoor => "outdoor",
         }
     }
 }
@@ -43,7 +43,7 @@ pub struct DrawnFlight {
     /// Largest acceleration of the reference \[m/s2\].
     pub acceleration_m_s2: f64,
     /// Difference from the vehicle's file.
-    pub change: Change,
+    pub change: ModelMismatch,
     /// Scenario to fly.
     pub scenario: Scenario,
 }

@@ -6,24 +6,24 @@
 
 mod base;
 mod bisection;
-mod change;
 mod flight;
+mod mismatch;
 mod path;
 mod power;
 mod ranking;
 
-pub use change::Change;
-pub use flight::{DrawnFlight, Seen};
-pub use ranking::{Difference, RESAMPLES, Ranking, Score, is_level, rankings};
+pub use flight::{DrawnFlight, FeedbackSource};
+pub use mismatch::ModelMismatch;
+pub use ranking::{RESAMPLES, Ranking, RankingDifference, Score, is_level, rankings};
 
-use crate::compare::{self, Outcome};
+use crate::compare::{self, FlightOutcome};
 use afbc_files::read::FileError;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
 use afbc_sim::run::FlightResult;
 use afbc_types::OutOfRange;
 use afbc_vehicles::Vehicle;
-use base::Base;
+use base::BaseVehicle;
 use core::ops::Range;
 use rayon::prelude::*;
 
@@ -35,33 +35,33 @@ pub const FLIGHTS: u64 = 12;
 pub const TILT_MAX_RAD: f64 = 1.2;
 /// Selection of the flights to draw.
 #[derive(Clone, Debug)]
-pub struct Random {
+pub struct RandomFlights {
     /// Seeds from which flights are drawn.
     pub seeds: Range<u64>,
     /// Number of flights per vehicle and seed.
     pub flights: u64,
     /// Source of the state that the controllers see.
-    pub seen: Seen,
+    pub seen: FeedbackSource,
     /// Vehicles that fly.
     pub vehicles: Vec<Vehicle>,
 }
 
 /// A flight that was flown.
 #[derive(Clone, Debug)]
-pub struct FlownDraw {
+pub struct FlownRandomFlight {
     /// The flight.
     pub flight: DrawnFlight,
     /// Result of each of the scenario's contenders.
-    pub outcomes: Vec<Outcome>,
+    pub outcomes: Vec<FlightOutcome>,
 }
 
-impl Random {
+impl RandomFlights {
     /// Draws all flights, ordered by seed, vehicle and number.
     ///
     /// # Errors
     /// One line about the first value that a vehicle cannot fly with.
     pub fn draw(&self) -> Result<Vec<DrawnFlight>, FileError> {
-        let bases = self.vehicles.iter().map(|vehicle| Base::new(vehicle, self.seen));
+        let bases = self.vehicles.iter().map(|vehicle| BaseVehicle::new(vehicle, self.seen));
         let bases = bases.collect::<Result<Vec<_>, _>>()?;
         let (bases, flights) = (bases.as_slice(), self.flights);
         let of_seed = |seed| bases.iter().flat_map(move |base| (1..=flights).map(move |number| (base, seed, number)));
@@ -73,7 +73,7 @@ impl Random {
     /// The gains and settings of `own` are for the paper's vehicle and are scaled [by rule](Contender::by_rule).
     ///
     /// # Errors
-    /// Errors of [`Random::draw`], or one line about a gain or setting out of range.
+    /// Errors of [`RandomFlights::draw`], or one line about a gain or setting out of range.
     pub fn under(&self, contenders: &[Contender], own: &[Contender]) -> Result<Vec<DrawnFlight>, FileError> {
         let mut flights = self.draw()?;
         flights.par_iter_mut().try_for_each(|flight| {
@@ -91,24 +91,24 @@ impl Random {
 ///
 /// # Errors
 /// The first parameter, gain or setting out of range.
-pub fn fly(flights: Vec<DrawnFlight>, progress: &(dyn Fn() + Sync)) -> Result<Vec<FlownDraw>, OutOfRange> {
+pub fn fly(flights: Vec<DrawnFlight>, progress: &(dyn Fn() + Sync)) -> Result<Vec<FlownRandomFlight>, OutOfRange> {
     let outcome = |scenario: &Scenario, contender: &Contender| {
         let run = FlightResult::fly(scenario, contender, u64::MAX)?;
         progress();
-        Ok(Outcome::of(scenario, &run))
+        Ok(FlightOutcome::of(scenario, &run))
     };
     let flown = |flight: DrawnFlight| {
         let contenders = flight.scenario.contenders.par_iter();
         let outcomes = contenders.map(|contender| outcome(&flight.scenario, contender)).collect::<Result<_, _>>()?;
-        Ok(FlownDraw { flight, outcomes })
+        Ok(FlownRandomFlight { flight, outcomes })
     };
     flights.into_par_iter().map(flown).collect()
 }
 
-impl FlownDraw {
+impl FlownRandomFlight {
     /// Returns the distances by which the contenders are ranked.
     pub fn score(&self) -> Score {
-        let rms_m = |outcome: &Outcome| outcome.lost.is_none().then(|| outcome.metrics.rmse.xyz().norm());
+        let rms_m = |outcome: &FlightOutcome| outcome.lost.is_none().then(|| outcome.metrics.rmse.xyz().norm());
         Score { seed: self.flight.seed, rms_m: self.outcomes.iter().map(rms_m).collect() }
     }
 }

@@ -1,7 +1,7 @@
 //! Paths of a size and speed that suit the vehicle.
 
 use super::bisection::largest;
-use super::change::whole;
+use super::mismatch::whole;
 use super::power::Power;
 use afbc_plant::noise::Noise;
 use afbc_scenario::trajectory::{Sine, Trajectory, Waypoint};
@@ -22,8 +22,8 @@ const RATE_MAX: f64 = 50.0;
 
 /// A path whose speed is not yet chosen.
 #[derive(Clone, Debug)]
-pub(super) struct Path {
-    shape: Shape,
+pub(super) struct UntimedPath {
+    shape: PathShape,
     yaw_rad: f64,
     /// Height of the path's centre \[m\].
     height_m: f64,
@@ -32,7 +32,7 @@ pub(super) struct Path {
 }
 
 #[derive(Clone, Debug)]
-enum Shape {
+enum PathShape {
     /// x = a sin(w t), y = a/2 sin(2 w t).
     Lemniscate(f64),
     Circle(f64),
@@ -42,7 +42,7 @@ enum Shape {
     Hover,
 }
 
-impl Path {
+impl UntimedPath {
     /// Names of the kinds.
     pub(super) const KINDS: [&str; 4] = ["lemniscate", "circle", "waypoints", "hover"];
 
@@ -54,8 +54,8 @@ impl Path {
         let half_m = between(0.6, 4.0) * (arm_m / 0.2).clamp(0.4, 1.6);
         let yaw_rad = between(-1.0, 1.0);
         let shape = match kind {
-            0 => Shape::Lemniscate(half_m),
-            1 => Shape::Circle(half_m),
+            0 => PathShape::Lemniscate(half_m),
+            1 => PathShape::Circle(half_m),
             2 => {
                 let mut last_m = Vector3::zeros();
                 let mut corner = |()| {
@@ -65,22 +65,22 @@ impl Path {
                     last_m = place_m;
                     (place_m, between(-1.0, 1.0), sqrt(far.max(0.1)) * between(1.0, 2.0))
                 };
-                Shape::Waypoints((0..WAYPOINTS).map(|_| corner(())).collect())
+                PathShape::Waypoints((0..WAYPOINTS).map(|_| corner(())).collect())
             }
-            _ => Shape::Hover,
+            _ => PathShape::Hover,
         };
-        let stands_m = stands_m.filter(|_| matches!(shape, Shape::Waypoints(_) | Shape::Hover));
-        Path { shape, yaw_rad, height_m, stands_m }
+        let stands_m = stands_m.filter(|_| matches!(shape, PathShape::Waypoints(_) | PathShape::Hover));
+        UntimedPath { shape, yaw_rad, height_m, stands_m }
     }
 
     /// Returns the name of the path's kind.
     pub(super) const fn kind(&self) -> &'static str {
         let [lemniscate, circle, waypoints, hover] = Self::KINDS;
         match self.shape {
-            Shape::Lemniscate(_) => lemniscate,
-            Shape::Circle(_) => circle,
-            Shape::Waypoints(_) => waypoints,
-            Shape::Hover => hover,
+            PathShape::Lemniscate(_) => lemniscate,
+            PathShape::Circle(_) => circle,
+            PathShape::Waypoints(_) => waypoints,
+            PathShape::Hover => hover,
         }
     }
 
@@ -106,13 +106,13 @@ impl Path {
         let (yaw_rad, period_s) = (self.yaw_rad, TAU / rate);
         match &self.shape {
             _ if rate < RATE_MIN => self.rest(centre_m),
-            Shape::Lemniscate(half_m) => {
+            PathShape::Lemniscate(half_m) => {
                 let sine = |amplitude_m, period_s| Sine { amplitude_m, period_s, phase_rad: 0.0 };
                 let sines = [sine(*half_m, period_s), sine(0.5 * half_m, 0.5 * period_s), sine(0.0, period_s)];
                 Trajectory::Lissajous { centre_m, sines, yaw_rad }
             }
-            Shape::Circle(radius_m) => Trajectory::Circle { centre_m, radius_m: *radius_m, period_s, yaw_rad },
-            Shape::Waypoints(corners) => {
+            PathShape::Circle(radius_m) => Trajectory::Circle { centre_m, radius_m: *radius_m, period_s, yaw_rad },
+            PathShape::Waypoints(corners) => {
                 let mut waypoints = self.before(centre_m);
                 let mut time_s = waypoints.last().map_or(0.0, |last| last.time_s);
                 for (place_m, yaw_rad, periods) in corners {
@@ -124,7 +124,7 @@ impl Path {
                 }
                 Trajectory::Waypoints(waypoints)
             }
-            Shape::Hover => self.rest(centre_m),
+            PathShape::Hover => self.rest(centre_m),
         }
     }
 

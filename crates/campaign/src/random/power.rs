@@ -1,7 +1,7 @@
 //! The capability of a vehicle and the demands of a reference on it. `docs/suites.md` has the formulas.
 
 use super::bisection::largest;
-use super::change::Change;
+use super::mismatch::ModelMismatch;
 use afbc_plant::BatteryModel;
 use afbc_scenario::trajectory::SAMPLES;
 use afbc_scenario::trajectory::polynomial::peaks;
@@ -78,26 +78,26 @@ impl Power {
 
     /// Returns the capability under this change.
     #[must_use]
-    pub(super) fn under(mut self, change: &Change) -> Self {
+    pub(super) fn under(mut self, change: &ModelMismatch) -> Self {
         match change {
-            Change::Wind(wind_m_s) => self.wind_m_s = wind_m_s.norm(),
+            ModelMismatch::Wind(wind_m_s) => self.wind_m_s = wind_m_s.norm(),
             // Two standard deviations of the turbulence.
-            Change::Turbulence(turbulence) => self.wind_m_s = 2.0 * turbulence.at(HEIGHT_M).horizontal_m_s,
+            ModelMismatch::Turbulence(turbulence) => self.wind_m_s = 2.0 * turbulence.at(HEIGHT_M).horizontal_m_s,
             // The rotor on the payload's side carries more than the others.
-            Change::Payload { share, ahead_m, left_m, .. } => {
+            ModelMismatch::Payload { share, ahead_m, left_m, .. } => {
                 self.thrust_m_s2 /= 1.0 + share + 2.0 * share * hypot(*ahead_m, *left_m) / self.arm_m;
             }
-            Change::Mass(factor) => self.thrust_m_s2 /= factor,
+            ModelMismatch::Mass(factor) => self.thrust_m_s2 /= factor,
             // The other rotors cannot give more than the weak one without turning the vehicle.
-            Change::Rotor { efficiency, .. } => self.thrust_m_s2 *= efficiency,
-            Change::Drag(factor) => self.drag = self.drag.map(|drag| drag * factor),
-            Change::Nothing | Change::Older(_) => {}
+            ModelMismatch::Rotor { efficiency, .. } => self.thrust_m_s2 *= efficiency,
+            ModelMismatch::Drag(factor) => self.drag = self.drag.map(|drag| drag * factor),
+            ModelMismatch::Nothing | ModelMismatch::Older(_) => {}
         }
         self
     }
 
     /// Returns `change`, reduced as far as needed to leave a reserve of thrust.
-    pub(super) fn fitted(&self, change: &Change) -> Change {
+    pub(super) fn fitted(&self, change: &ModelMismatch) -> ModelMismatch {
         change.scaled(largest(1.0, |share| self.under(&change.scaled(share)).hovers()))
     }
 

@@ -36,12 +36,12 @@ pub struct Ranking {
     /// Geometric mean of the distances in the flights without a loss \[m\]; none if there are none.
     pub geometric_m: Option<f64>,
     /// Difference from the contender that all are compared with; none if no flight was survived by both.
-    pub difference: Option<Difference>,
+    pub difference: Option<RankingDifference>,
 }
 
 /// Mean difference of the logarithms of two contenders' distances, over the flights that both survived.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Difference {
+pub struct RankingDifference {
     /// Number of flights that both survived.
     pub flights: usize,
     /// Mean difference of the logarithms.
@@ -71,19 +71,19 @@ impl Score {
     }
 }
 
-/// Returns the ranking of each contender of `results`, compared with the contender at index `against`.
-pub fn rankings(results: &[Score], against: usize) -> Vec<Ranking> {
+/// Returns the ranking of each contender of `results`, compared with the contender at index `baseline`.
+pub fn rankings(results: &[Score], baseline: usize) -> Vec<Ranking> {
     let contenders = results.first().map_or(0, |result| result.rms_m.len());
-    let mut rankings: Vec<Ranking> = (0..contenders).map(|contender| ranking(results, contender, against)).collect();
-    let differences = || rankings.iter().enumerate().filter(|(place, _)| *place != against);
+    let mut rankings: Vec<Ranking> = (0..contenders).map(|contender| ranking(results, contender, baseline)).collect();
+    let differences = || rankings.iter().enumerate().filter(|(place, _)| *place != baseline);
     let p: Vec<f64> = differences().filter_map(|(_, ranking)| Some(ranking.difference?.test.p)).collect();
-    let tested = rankings.iter_mut().enumerate().filter(|(place, _)| *place != against);
+    let tested = rankings.iter_mut().enumerate().filter(|(place, _)| *place != baseline);
     let tested = tested.filter_map(|(_, ranking)| ranking.difference.as_mut());
     tested.zip(holm(&p)).for_each(|(difference, adjusted)| difference.p_holm = adjusted);
     rankings
 }
 
-fn ranking(results: &[Score], contender: usize, against: usize) -> Ranking {
+fn ranking(results: &[Score], contender: usize, baseline: usize) -> Ranking {
     let level =
         |result: &&Score| result.of(contender).zip(result.best_m()).is_some_and(|(own, best)| is_level(own, best));
     let lost = || results.iter().filter(|result| result.of(contender).is_none());
@@ -98,15 +98,15 @@ fn ranking(results: &[Score], contender: usize, against: usize) -> Ranking {
         lost_alone: lost().filter(|result| result.best_m().is_some()).count(),
         median_m: percentile(&all, 50.0).filter(|median_m| median_m.is_finite()),
         geometric_m: (!kept.is_empty()).then(|| exp(logs / kept.len() as f64)),
-        difference: difference(results, contender, against),
+        difference: difference(results, contender, baseline),
     }
 }
 
-fn difference(results: &[Score], contender: usize, against: usize) -> Option<Difference> {
+fn difference(results: &[Score], contender: usize, baseline: usize) -> Option<RankingDifference> {
     // Differences of each seed.
     let mut seeds: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
     for result in results {
-        if let (Some(own_m), Some(other_m)) = (result.of(contender), result.of(against)) {
+        if let (Some(own_m), Some(other_m)) = (result.of(contender), result.of(baseline)) {
             seeds.entry(result.seed).or_default().push(logarithm(own_m) - logarithm(other_m));
         }
     }
@@ -120,7 +120,7 @@ fn difference(results: &[Score], contender: usize, against: usize) -> Option<Dif
     let means: Vec<f64> = clusters.iter().map(|cluster| cluster.iter().sum::<f64>() / cluster.len() as f64).collect();
     let test = SignedRank::of(&means);
     let interval = clustered(&clusters, RESAMPLES);
-    (flights > 0).then_some(Difference { flights, mean, interval, test, p_holm: test.p })
+    (flights > 0).then_some(RankingDifference { flights, mean, interval, test, p_holm: test.p })
 }
 
 fn logarithm(distance_m: f64) -> f64 {
@@ -160,7 +160,7 @@ mod tests {
         close(a.geometric_m.unwrap(), (0.01_f64 * 0.0003 * 0.04).cbrt());
         close(b.geometric_m.unwrap(), (0.04_f64 * 0.09 * 0.0001).cbrt());
         let test = SignedRank { p: 1.0, effect: 0.0 };
-        let own = Difference { flights: 3, mean: 0.0, interval: Some([0.0; 2]), test, p_holm: 1.0 };
+        let own = RankingDifference { flights: 3, mean: 0.0, interval: Some([0.0; 2]), test, p_holm: 1.0 };
         assert_eq!(a.difference, Some(own));
         // Both `a` and `b` survived the first and third flights.
         let b = b.difference.unwrap();

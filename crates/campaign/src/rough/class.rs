@@ -1,6 +1,6 @@
 //! Classes of sensor behaviour that the suite `rough-estimate` draws.
 
-use super::drawing::Drawing;
+use super::builder::RoughFlightBuilder;
 use afbc_plant::instruments::{FailureKind, TrackerModel};
 use core::f64::consts::PI;
 use nalgebra::Vector3;
@@ -25,7 +25,7 @@ impl Venue {
 }
 
 /// A class of sensor behaviour.
-pub struct Class {
+pub struct SensorClass {
     /// Name of the class.
     pub name: &'static str,
     /// Meaning in words.
@@ -35,7 +35,7 @@ pub struct Class {
     pub known: bool,
     /// Place that has the affected instruments; none for both places.
     pub place: Option<Venue>,
-    put: fn(&mut Drawing<'_>),
+    put: fn(&mut RoughFlightBuilder<'_>),
 }
 
 /// Name of the class that combines two others.
@@ -48,16 +48,16 @@ const fn class(
     place: Option<Venue>,
     known: bool,
     meaning: &'static str,
-    put: fn(&mut Drawing<'_>),
-) -> Class {
-    Class { name, meaning, known, place, put }
+    put: fn(&mut RoughFlightBuilder<'_>),
+) -> SensorClass {
+    SensorClass { name, meaning, known, place, put }
 }
 
 const INDOORS: Option<Venue> = Some(Venue::Indoors);
 const OUTDOORS: Option<Venue> = Some(Venue::Outdoors);
 
 /// All classes except [`MIXTURE`].
-pub static CLASSES: [Class; 24] = [
+pub static CLASSES: [SensorClass; 24] = [
     class("nothing", None, true, "as the vehicle is told", |_| {}),
     class("vibration", None, false, "0.02 to 0.2 rad/s and 1 to 10 m/s2 from a hovering rotor, told 0.02 and 1", |d| {
         let (rate, force) = (d.logarithmic(0.02, 0.2), d.logarithmic(1.0, 10.0));
@@ -169,15 +169,19 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 }
 
 /// Draws a bias of the gyroscope and one of the accelerometer, within these bounds and in independent directions.
-fn biased(d: &mut Drawing<'_>, [rate_min, rate_max]: [f64; 2], [force_min, force_max]: [f64; 2]) -> FailureKind {
+fn biased(
+    d: &mut RoughFlightBuilder<'_>,
+    [rate_min, rate_max]: [f64; 2],
+    [force_min, force_max]: [f64; 2],
+) -> FailureKind {
     let rates_bias_rad_s = d.direction() * d.logarithmic(rate_min, rate_max);
     let force_bias_m_s2 = d.direction() * d.logarithmic(force_min, force_max);
     FailureKind::ImuBiased { rates_bias_rad_s, force_bias_m_s2 }
 }
 
-impl Class {
+impl SensorClass {
     /// Draws an instance of the class into a flight.
-    pub(super) fn put(&self, drawing: &mut Drawing<'_>) {
+    pub(super) fn put(&self, drawing: &mut RoughFlightBuilder<'_>) {
         (self.put)(drawing);
     }
 

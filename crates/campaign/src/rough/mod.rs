@@ -4,16 +4,16 @@
 //! A flight depends only on seed, vehicle, class and number. It is the same on every machine, whichever other flights
 //! are drawn.
 
+mod builder;
 mod class;
-mod drawing;
 mod flight;
 mod judgement;
 mod row;
 
-pub use class::{CLASSES, Class, MIXTURE, MIXTURE_MEANING, Venue, names};
+pub use class::{CLASSES, MIXTURE, MIXTURE_MEANING, SensorClass, Venue, names};
 pub use flight::RoughFlight;
 pub use judgement::Judgement;
-pub use row::{ClassRow, FlownRough, rows};
+pub use row::{ClassRow, FlownRoughFlight, rows};
 
 use crate::compare;
 use crate::draw::mix;
@@ -26,8 +26,8 @@ use afbc_scenario::contender::Contender;
 use afbc_scenario::trajectory::Trajectory;
 use afbc_types::OutOfRange;
 use afbc_vehicles::Vehicle;
+use builder::RoughFlightBuilder;
 use core::ops::Range;
-use drawing::Drawing;
 use rayon::prelude::*;
 
 /// Name of the suite.
@@ -41,7 +41,7 @@ pub const LONG_ONE_IN: u64 = 10;
 
 /// Selection of the flights to draw.
 #[derive(Clone, Debug)]
-pub struct Rough {
+pub struct RoughFlights {
     /// Seeds from which flights are drawn.
     pub seeds: Range<u64>,
     /// Number of flights per vehicle, class and seed.
@@ -53,19 +53,19 @@ pub struct Rough {
 }
 
 /// A vehicle at both places, with sensors that behave as stated.
-struct Base<'a> {
+struct VenueVehicles<'a> {
     vehicle: &'a Vehicle,
     indoors: Scenario,
     outdoors: Scenario,
 }
 
-impl Rough {
+impl RoughFlights {
     /// Draws all flights, flown by `contender` with its gains for the vehicle.
     ///
     /// # Errors
     /// One line about the first value that a vehicle cannot fly with, or a gain or setting out of range.
     pub fn draw(&self, contender: &Contender) -> Result<Vec<RoughFlight>, FileError> {
-        let bases = self.vehicles.iter().map(|vehicle| Base::new(vehicle, contender));
+        let bases = self.vehicles.iter().map(|vehicle| VenueVehicles::new(vehicle, contender));
         let bases = bases.collect::<Result<Vec<_>, _>>()?;
         let (bases, flights) = (bases.as_slice(), self.flights);
         let of_base = |seed| bases.iter().flat_map(move |base| names().map(move |class| (base, class, seed)));
@@ -75,7 +75,13 @@ impl Rough {
         all.into_par_iter().map(|(base, class, seed, number)| self.flight(base, class, seed, number)).collect()
     }
 
-    fn flight(&self, base: &Base<'_>, class: &'static str, seed: u64, number: u64) -> Result<RoughFlight, FileError> {
+    fn flight(
+        &self,
+        base: &VenueVehicles<'_>,
+        class: &'static str,
+        seed: u64,
+        number: u64,
+    ) -> Result<RoughFlight, FileError> {
         let vehicle = &base.vehicle.name;
         // The names enter the draw, not the indices in the lists, so that other vehicles and classes change nothing.
         let of_names = vehicle.bytes().chain(class.bytes()).fold(mix(seed), |hash, byte| mix(hash ^ u64::from(byte)));
@@ -102,7 +108,7 @@ impl Rough {
         if hovers {
             scenario.trajectory = Trajectory::Hover { position_m: scenario.initial.position_m, yaw_rad: 0.0 };
         }
-        let mut drawing = Drawing { noise: &mut noise, scenario: &mut scenario, gusts: Vec::new() };
+        let mut drawing = RoughFlightBuilder { noise: &mut noise, scenario: &mut scenario, gusts: Vec::new() };
         parts.iter().for_each(|part| part.put(&mut drawing));
         let parts: Vec<&str> = parts.iter().map(|part| part.name).collect();
         let unfit = |error: OutOfRange| {
@@ -116,13 +122,13 @@ impl Rough {
 }
 
 /// Draws two different classes whose instruments exist at `place`.
-fn two(noise: &mut Noise, place: Venue) -> Vec<&'static Class> {
-    let mut there: Vec<&Class> = CLASSES.iter().skip(1).filter(|class| class.is_at(place)).collect();
+fn two(noise: &mut Noise, place: Venue) -> Vec<&'static SensorClass> {
+    let mut there: Vec<&SensorClass> = CLASSES.iter().skip(1).filter(|class| class.is_at(place)).collect();
     let mut one = || there.remove((noise.uniform() * there.len() as f64) as usize);
     vec![one(), one()]
 }
 
-impl<'a> Base<'a> {
+impl<'a> VenueVehicles<'a> {
     fn new(vehicle: &'a Vehicle, contender: &Contender) -> Result<Self, FileError> {
         let at = |text: &str| {
             let mut scenario = afbc_scenario::parse(NAME, text, NAME)?.on(vehicle, Profile::Flight)?;
@@ -131,7 +137,11 @@ impl<'a> Base<'a> {
             scenario.realism.rotors.battery = None;
             Ok::<Scenario, FileError>(scenario)
         };
-        Ok(Base { vehicle, indoors: at(include_str!("indoors.toml"))?, outdoors: at(include_str!("outdoors.toml"))? })
+        Ok(VenueVehicles {
+            vehicle,
+            indoors: at(include_str!("indoors.toml"))?,
+            outdoors: at(include_str!("outdoors.toml"))?,
+        })
     }
 }
 
@@ -140,11 +150,11 @@ impl<'a> Base<'a> {
 ///
 /// # Errors
 /// The first parameter, gain or setting out of range.
-pub fn fly(flights: Vec<RoughFlight>, progress: &(dyn Fn() + Sync)) -> Result<Vec<FlownRough>, OutOfRange> {
+pub fn fly(flights: Vec<RoughFlight>, progress: &(dyn Fn() + Sync)) -> Result<Vec<FlownRoughFlight>, OutOfRange> {
     let flown = |flight: RoughFlight| {
         let judgement = Judgement::of(&flight.scenario)?;
         progress();
-        Ok(FlownRough { flight, judgement })
+        Ok(FlownRoughFlight { flight, judgement })
     };
     flights.into_par_iter().map(flown).collect()
 }

@@ -6,7 +6,7 @@ use super::judgement::Judgement;
 
 /// A flight that was flown.
 #[derive(Clone, Debug)]
-pub struct FlownRough {
+pub struct FlownRoughFlight {
     /// The flight.
     pub flight: RoughFlight,
     /// Quality of the flight's estimate, and its end.
@@ -39,7 +39,7 @@ pub struct ClassRow {
 }
 
 /// Returns a row for each class, and one for all flights.
-pub fn rows(flown: &[FlownRough]) -> Vec<ClassRow> {
+pub fn rows(flown: &[FlownRoughFlight]) -> Vec<ClassRow> {
     let classes = names().map(Some).chain([None]);
     let row = |class: Option<&'static str>| {
         let of_class = flown.iter().filter(|flown| class.is_none_or(|class| flown.flight.class == class));

@@ -17,12 +17,12 @@ struct Mistake {
     key: String,
     problem: String,
     /// Place in the file being read; none if the mistake concerns the file as a whole.
-    place: Option<Box<Place>>,
+    place: Option<Box<FileLocation>>,
 }
 
 /// Position of a mistake in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Place {
+pub(crate) struct FileLocation {
     pub(crate) file: String,
     /// Dotted key.
     pub(crate) key: String,
@@ -31,12 +31,12 @@ pub(crate) struct Place {
     pub(crate) line: usize,
     /// Byte offset at which the key's table begins.
     pub(crate) table: usize,
-    pub(crate) fault: Fault,
+    pub(crate) fault: MistakeKind,
 }
 
 /// Kind of mistake.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Fault {
+pub(crate) enum MistakeKind {
     /// The value is wrong.
     Value,
     /// The value is none of the options. Holds the most similar option, or all of them.
@@ -57,10 +57,11 @@ impl FileError {
     }
 
     /// Creates an error at byte `at` of `text`; `key` is empty if it concerns no key.
-    pub fn at(source: Source<'_>, at: usize, key: impl Into<String>, problem: impl Into<String>) -> Self {
+    pub fn at(source: SourceFile<'_>, at: usize, key: impl Into<String>, problem: impl Into<String>) -> Self {
         let line = source.line(at);
         let (file, key): (String, String) = (source.file.into(), key.into());
-        let place = Place { file: file.clone(), key: key.clone(), at, line, table: 0, fault: Fault::Value };
+        let place =
+            FileLocation { file: file.clone(), key: key.clone(), at, line, table: 0, fault: MistakeKind::Value };
         let place = Some(Box::new(place)).filter(|place| !place.key.is_empty());
         FileError::of(Mistake { file, line: Some(line), key, problem: problem.into(), place })
     }
@@ -95,18 +96,18 @@ impl FileError {
     }
 
     /// Returns the position of the first mistake.
-    pub(crate) fn place(&self) -> Option<&Place> {
+    pub(crate) fn place(&self) -> Option<&FileLocation> {
         self.first.place.as_deref()
     }
 
     /// Sets the kind of the first mistake.
-    pub(crate) fn because(mut self, fault: Fault) -> Self {
+    pub(crate) fn because(mut self, fault: MistakeKind) -> Self {
         self.first.place.iter_mut().for_each(|place| place.fault = fault.clone());
         self
     }
 
     /// Changes the positions of the mistakes; the message stays the same.
-    pub(crate) fn placed(mut self, change: impl Fn(&mut Option<Box<Place>>)) -> Self {
+    pub(crate) fn placed(mut self, change: impl Fn(&mut Option<Box<FileLocation>>)) -> Self {
         change(&mut self.first.place);
         self.others.iter_mut().for_each(|other| change(&mut other.place));
         self
@@ -115,14 +116,14 @@ impl FileError {
 
 /// A file's name and text.
 #[derive(Clone, Copy, Debug)]
-pub struct Source<'a> {
+pub struct SourceFile<'a> {
     /// Name as the user gave it.
     pub file: &'a str,
     /// The whole text.
     pub text: &'a str,
 }
 
-impl Source<'_> {
+impl SourceFile<'_> {
     /// Returns the line of the byte `at`.
     pub(crate) fn line(&self, at: usize) -> usize {
         1 + self.text.bytes().take(at).filter(|&byte| byte == b'\n').count()

@@ -1,7 +1,7 @@
 //! Reading of TOML files: size, syntax, name and description.
 
-use super::error::{FileError, Source};
-use super::heirs;
+use super::error::{FileError, SourceFile};
+use super::inheritance;
 use super::mistakes::read_all;
 use super::table::Table;
 use std::fs::File;
@@ -58,7 +58,7 @@ pub fn document<T>(
     sample: Example,
     read: impl Fn(Table<'_>) -> Result<T, FileError>,
 ) -> Result<T, FileError> {
-    let source = Source { file, text };
+    let source = SourceFile { file, text };
     read_all(source, parsed(source, sample)?, sample.text, read)
 }
 
@@ -67,16 +67,16 @@ pub fn document<T>(
 ///
 /// # Errors
 /// Like [`document`]. A `like` that names no earlier table is left for `read` to refuse.
-pub fn document_with_heirs<T>(
+pub fn document_with_inheritance<T>(
     file: &str,
     text: &str,
     sample: Example,
     (list, own): (&str, &[&str]),
     read: impl Fn(Table<'_>) -> Result<T, FileError>,
 ) -> Result<T, FileError> {
-    let source = Source { file, text };
+    let source = SourceFile { file, text };
     let mut document = parsed(source, sample)?;
-    heirs::inherit(&mut document, list, own);
+    inheritance::inherit(&mut document, list, own);
     read_all(source, document, sample.text, read)
 }
 
@@ -84,7 +84,7 @@ pub fn document_with_heirs<T>(
 ///
 /// # Errors
 /// Every TOML syntax error.
-fn parsed<'t>(source: Source<'t>, sample: Example) -> Result<DeTable<'t>, FileError> {
+fn parsed<'t>(source: SourceFile<'t>, sample: Example) -> Result<DeTable<'t>, FileError> {
     let (document, errors) = DeTable::parse_recoverable(source.text);
     // In a table that occurs twice, every key is a duplicate as well: only the table is reported.
     let (mut twice, mut told) = (Vec::new(), Vec::new());
@@ -130,7 +130,7 @@ fn head(text: &str, at: usize) -> (&str, usize) {
 }
 
 /// Returns the error for a TOML syntax error.
-fn syntax(source: Source<'_>, error: &toml::de::Error, sample: &str) -> FileError {
+fn syntax(source: SourceFile<'_>, error: &toml::de::Error, sample: &str) -> FileError {
     let span = error.span().unwrap_or_default();
     let near = source.text.get(span.clone()).and_then(|text| text.lines().next()).unwrap_or_default();
     let near: String = near.chars().take(40).collect();

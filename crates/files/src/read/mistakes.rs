@@ -1,7 +1,7 @@
 //! Reading on after a mistake, so that one error reports every mistake of a file.
 
-use super::error::{Fault, FileError, Place, Source};
-use super::heirs::LIKE;
+use super::error::{FileError, FileLocation, MistakeKind, SourceFile};
+use super::inheritance::LIKE;
 use super::table::{Overlooked, Table};
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
@@ -25,7 +25,7 @@ const TRIALS: usize = 12;
 /// # Errors
 /// All mistakes in the order of the file, without those that only follow from mending another.
 pub(crate) fn read_all<'d, T>(
-    source: Source<'d>,
+    source: SourceFile<'d>,
     document: DeTable<'d>,
     template: &'static str,
     read: impl Fn(Table<'_>) -> Result<T, FileError>,
@@ -85,7 +85,7 @@ fn concerns(key: &str, other: &str) -> bool {
 }
 
 impl<'d> Draft<'d> {
-    fn root<'a>(&'a self, source: Source<'a>) -> Table<'a>
+    fn root<'a>(&'a self, source: SourceFile<'a>) -> Table<'a>
     where
         'd: 'a,
     {
@@ -93,14 +93,14 @@ impl<'d> Draft<'d> {
     }
 
     /// True if a mistake may be a mere consequence of an earlier mend.
-    fn explains(&self, place: &Place) -> bool {
+    fn explains(&self, place: &FileLocation) -> bool {
         let (items, mended) = (items(&self.document, place), &self.mended);
         let among = match &place.fault {
-            Fault::Clash([]) => place.table_key(),
+            MistakeKind::Clash([]) => place.table_key(),
             _ => &place.key,
         };
         let clashes = |key: &String| match &place.fault {
-            Fault::Clash(with) => with.iter().any(|with| concerns(key, with)),
+            MistakeKind::Clash(with) => with.iter().any(|with| concerns(key, with)),
             _ => false,
         };
         let mut keys = mended.keys.iter();
@@ -112,13 +112,13 @@ impl<'d> Draft<'d> {
     /// leaves the fewest mistakes in this table. Returns the new draft; none for other mistakes.
     fn decided<T>(
         &self,
-        place: &Place,
-        source: Source<'_>,
+        place: &FileLocation,
+        source: SourceFile<'_>,
         template: &DeTable<'static>,
         read: impl Fn(Table<'_>) -> Result<T, FileError>,
         left: &mut usize,
     ) -> Option<Self> {
-        let Fault::Choice(options) = &place.fault else { return None };
+        let MistakeKind::Choice(options) = &place.fault else { return None };
         if self.mended.keys.iter().any(|(key, within)| *key == place.key && *within == items(&self.document, place)) {
             return None;
         }
@@ -131,7 +131,7 @@ impl<'d> Draft<'d> {
                 is_read = true;
                 let Err(error) = read(trial.root(source)) else { break };
                 let found = error.place().filter(|found| found.file == source.file);
-                let within = |found: &&Place| {
+                let within = |found: &&FileLocation| {
                     is_within(&found.key, place.table_key())
                         && items(&trial.document, found).starts_with(&items(&trial.document, place))
                 };
@@ -150,7 +150,7 @@ impl<'d> Draft<'d> {
     }
 
     /// Returns a draft with `option` under the key; none if the key does not decide the kind of its table.
-    fn choosing(&self, place: &Place, option: &'static str) -> Option<Self> {
+    fn choosing(&self, place: &FileLocation, option: &'static str) -> Option<Self> {
         let mut draft = self.clone();
         let keys: Vec<&str> = place.key.split('.').collect();
         let (last, parents) = keys.split_last().filter(|(last, _)| DECIDING.contains(last))?;
@@ -162,18 +162,18 @@ impl<'d> Draft<'d> {
     }
 
     /// Mends the mistake; returns false if it cannot be mended.
-    fn mend(&mut self, place: &Place, template: &DeTable<'static>) -> bool {
+    fn mend(&mut self, place: &FileLocation, template: &DeTable<'static>) -> bool {
         let items = items(&self.document, place);
         let Draft { document, mended } = self;
         mended.keys.push((place.key.clone(), items.clone()));
         let overlooked = (place.key.clone(), place.table);
-        if matches!(place.fault, Fault::Clash(_)) && !mended.overlooked.clashes.contains(&overlooked) {
+        if matches!(place.fault, MistakeKind::Clash(_)) && !mended.overlooked.clashes.contains(&overlooked) {
             mended.overlooked.clashes.push(overlooked);
             return true;
         }
         let keys: Vec<&str> = place.key.split('.').collect();
         let Some((last, parents)) = keys.split_last() else { return false };
-        if let Fault::Unknown(Some(instead)) = place.fault
+        if let MistakeKind::Unknown(Some(instead)) = place.fault
             && let Some(table) = table_at(document, parents, place.at)
             && let Some((key, value)) = table.remove_entry(*last)
         {
@@ -219,19 +219,19 @@ impl Mended {
     }
 }
 
-impl Fault {
+impl MistakeKind {
     /// Returns how strongly a mistake suggests that the table is meant to be another kind. A wrong key outweighs any
     /// number of wrong values; a wrong key of the table itself outweighs those in subtables.
     const fn weight(&self, is_own: bool) -> usize {
         match self {
-            Fault::Missing | Fault::Unknown(_) if is_own => TRIALS * TRIALS,
-            Fault::Missing | Fault::Unknown(_) => TRIALS,
-            Fault::Value | Fault::Choice(_) | Fault::Clash(_) => 1,
+            MistakeKind::Missing | MistakeKind::Unknown(_) if is_own => TRIALS * TRIALS,
+            MistakeKind::Missing | MistakeKind::Unknown(_) => TRIALS,
+            MistakeKind::Value | MistakeKind::Choice(_) | MistakeKind::Clash(_) => 1,
         }
     }
 }
 
-impl Place {
+impl FileLocation {
     /// Returns the dotted name of the key's table.
     fn table_key(&self) -> &str {
         self.key.rsplit_once('.').map_or("", |(table, _)| table)
@@ -269,7 +269,7 @@ fn table_at<'t, 'd>(mut table: &'t mut DeTable<'d>, keys: &[&str], at: usize) ->
 }
 
 /// Returns the byte offsets at which the list items around the place begin.
-fn items(document: &DeTable<'_>, place: &Place) -> Vec<usize> {
+fn items(document: &DeTable<'_>, place: &FileLocation) -> Vec<usize> {
     let (mut table, mut items) = (document, Vec::new());
     let keys: Vec<&str> = place.key.split('.').collect();
     for key in keys.iter().take(keys.len().saturating_sub(1)) {

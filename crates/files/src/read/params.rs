@@ -3,7 +3,7 @@
 //! Each line holds fields. QGroundControl's have five: system, component, name, value, type. MAVProxy's have two: name
 //! and value. `#` begins a comment. Both formats are recognised by the number of fields, not by the file name.
 
-use crate::read::{FileError, Source};
+use crate::read::{FileError, SourceFile};
 use core::fmt::Write;
 
 /// One parameter of a file.
@@ -19,7 +19,7 @@ pub struct ParameterEntry {
 
 /// Format of a parameter file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+pub enum ParameterFormat {
     /// QGroundControl's format.
     Qgc,
     /// MAVProxy's format.
@@ -37,7 +37,7 @@ pub fn read(file: &str, text: &str) -> Result<Vec<ParameterEntry>, FileError> {
         at += line.len();
         let line = line.split('#').next().unwrap_or_default();
         let fields: Vec<&str> = line.split([' ', '\t', ',', '\r', '\n']).filter(|field| !field.is_empty()).collect();
-        let fault = |key: &str, problem: String| Err(FileError::at(Source { file, text }, start, key, problem));
+        let fault = |key: &str, problem: String| Err(FileError::at(SourceFile { file, text }, start, key, problem));
         let (name, value) = match *fields {
             [] => continue,
             [name, value] | [_, _, name, value, _] => (name, value),
@@ -60,21 +60,21 @@ pub fn read(file: &str, text: &str) -> Result<Vec<ParameterEntry>, FileError> {
 /// Returns the text of a parameter file. Entries are name, value, MAV_PARAM_TYPE; reading the text returns exactly the
 /// same values.
 pub fn written<N: core::fmt::Display>(
-    format: Format,
+    format: ParameterFormat,
     vehicle: &str,
     entries: impl IntoIterator<Item = (N, f32, u8)>,
 ) -> String {
     let mut text = match format {
-        Format::Qgc => format!(
+        ParameterFormat::Qgc => format!(
             "# Onboard parameters for Vehicle 1\n#\n# {vehicle}\n#\n# Vehicle-Id Component-Id Name Value Type\n"
         ),
-        Format::Mavproxy => format!("# {vehicle}\n"),
+        ParameterFormat::Mavproxy => format!("# {vehicle}\n"),
     };
     for (name, value, kind) in entries {
         // Writing to a string cannot fail.
         let _ = match format {
-            Format::Qgc => writeln!(text, "1\t1\t{name}\t{value}\t{kind}"),
-            Format::Mavproxy => writeln!(text, "{name:<16} {value}"),
+            ParameterFormat::Qgc => writeln!(text, "1\t1\t{name}\t{value}\t{kind}"),
+            ParameterFormat::Mavproxy => writeln!(text, "{name:<16} {value}"),
         };
     }
     text

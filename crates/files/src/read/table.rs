@@ -1,6 +1,6 @@
 //! Typed access to TOML: checks every value as it is read and refuses unknown keys.
 
-use super::error::{Fault, FileError, Place, Source};
+use super::error::{FileError, FileLocation, MistakeKind, SourceFile};
 use super::words::{self, nearest, one_of};
 use afbc_types::{Declaration, Declared, DeclaredValueMut, Range};
 use nalgebra::Vector3;
@@ -21,7 +21,7 @@ pub(crate) struct Overlooked {
 
 /// One table of a document, with a record of the keys read so far.
 pub struct Table<'a> {
-    source: Source<'a>,
+    source: SourceFile<'a>,
     /// Dotted name; empty for the document.
     path: String,
     /// Byte offset of the table, to which errors about missing keys point.
@@ -35,7 +35,7 @@ pub struct Table<'a> {
 
 impl<'a> Table<'a> {
     /// Returns the document as a table.
-    pub(crate) fn root(source: Source<'a>, entries: &'a DeTable<'a>, overlooked: &'a Overlooked) -> Self {
+    pub(crate) fn root(source: SourceFile<'a>, entries: &'a DeTable<'a>, overlooked: &'a Overlooked) -> Self {
         Table { source, path: String::new(), start: 0, entries, read: Vec::new(), units: Vec::new(), overlooked }
     }
 
@@ -239,11 +239,11 @@ impl<'a> Table<'a> {
         let choice = self.choice(key, options, name)?.or(any);
         choice.ok_or_else(|| {
             let missing = self.missing(key, &format!("it must be {}", one_of(options, name)));
-            let is_misspelt = missing.place().is_some_and(|place| matches!(place.fault, Fault::Unknown(_)));
+            let is_misspelt = missing.place().is_some_and(|place| matches!(place.fault, MistakeKind::Unknown(_)));
             if is_misspelt {
                 missing
             } else {
-                missing.because(Fault::Choice(options.iter().copied().map(name).collect()))
+                missing.because(MistakeKind::Choice(options.iter().copied().map(name).collect()))
             }
         })
     }
@@ -345,7 +345,7 @@ impl<'a> Table<'a> {
     pub fn through(&self, key: &str, error: FileError) -> FileError {
         let at = self.entries.get(key).map_or(self.start, |value| value.span().start);
         let (file, line, key) = (self.source.file.to_owned(), self.source.line(at), self.dotted(key));
-        let place = Box::new(Place { file, key, at, line, table: self.start, fault: Fault::Value });
+        let place = Box::new(FileLocation { file, key, at, line, table: self.start, fault: MistakeKind::Value });
         error.placed(|own| {
             if own.as_ref().is_none_or(|own| own.file != place.file) {
                 *own = Some(place.clone());
@@ -364,7 +364,7 @@ impl<'a> Table<'a> {
         if self.overlooked.clashes.contains(&clash) {
             return Ok(());
         }
-        Err(self.fault_at(key, problem).because(Fault::Clash(with)))
+        Err(self.fault_at(key, problem).because(MistakeKind::Clash(with)))
     }
 
     /// Returns an error about the value under `key`.
@@ -375,7 +375,8 @@ impl<'a> Table<'a> {
 
     /// Returns an error about `key` at the byte `at`.
     fn error(&self, at: usize, key: &str, problem: impl Into<String>) -> FileError {
-        let in_table = |place: &mut Option<Box<Place>>| place.iter_mut().for_each(|place| place.table = self.start);
+        let in_table =
+            |place: &mut Option<Box<FileLocation>>| place.iter_mut().for_each(|place| place.table = self.start);
         FileError::at(self.source, at, self.dotted(key), problem).placed(in_table)
     }
 
@@ -391,7 +392,7 @@ impl<'a> Table<'a> {
         let slip = nearest(key, self.unread().map(|(unread, _)| unread));
         match self.unread().find(|(unread, _)| Some(*unread) == slip) {
             Some((slip, start)) => self.unknown(slip, start, &self.did_you_mean(key), Some(key)),
-            None => self.error(self.start, key, format!("missing; {cure}")).because(Fault::Missing),
+            None => self.error(self.start, key, format!("missing; {cure}")).because(MistakeKind::Missing),
         }
     }
 
@@ -413,7 +414,7 @@ impl<'a> Table<'a> {
     }
 
     fn unknown(&self, key: &str, start: usize, cure: &str, instead: Option<&'static str>) -> FileError {
-        self.error(start, key, format!("unknown key; {cure}")).because(Fault::Unknown(instead))
+        self.error(start, key, format!("unknown key; {cure}")).because(MistakeKind::Unknown(instead))
     }
 
     fn value(&mut self, key: &'static str) -> Option<&'a Spanned<DeValue<'a>>> {
@@ -455,14 +456,14 @@ impl<'a> Table<'a> {
         name: fn(T) -> &'static str,
     ) -> Result<T, FileError> {
         let names = || options.iter().copied().map(name);
-        let text = self.text_in(value, key).map_err(|error| error.because(Fault::Choice(names().collect())))?;
+        let text = self.text_in(value, key).map_err(|error| error.because(MistakeKind::Choice(names().collect())))?;
         options.iter().copied().find(|&option| name(option) == text).ok_or_else(|| {
             let slip = nearest(text, names()).and_then(|slip| names().find(|name| *name == slip));
             let likely = slip.map_or_else(|| names().collect(), |slip| vec![slip]);
             let slip = slip.map_or(String::new(), |known| format!("did you mean \"{known}\"? "));
             let (must, options) = (if slip.is_empty() { "it" } else { "It" }, one_of(options, name));
             let problem = format!("\"{text}\" is unknown; {slip}{must} must be {options}");
-            self.refuse(value, key, problem).because(Fault::Choice(likely))
+            self.refuse(value, key, problem).because(MistakeKind::Choice(likely))
         })
     }
 

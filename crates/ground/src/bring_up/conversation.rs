@@ -1,37 +1,37 @@
 //! A conversation with a vehicle in steps of one millisecond.
 
 use super::error::{Error, ExchangeError};
-use super::heard::Heard;
+use super::latest::LatestMessages;
 use crate::client::Client;
 use crate::commands::CommandState;
-use crate::repeated::Patience;
+use crate::retry::RetryPolicy;
 use afbc_mavlink::{CommandResult, Decoder, InertialSample, ReceivedFrame, VehicleCommand};
 
 /// Carries bytes to the board and back.
 ///
 /// Sends the given bytes, runs one millisecond, and passes the received bytes to the callback, in pieces of any size.
-pub type Exchange<'a> = dyn FnMut(&[u8], &mut dyn FnMut(&[u8])) -> Result<(), ExchangeError> + 'a;
+pub type ByteExchange<'a> = dyn FnMut(&[u8], &mut dyn FnMut(&[u8])) -> Result<(), ExchangeError> + 'a;
 
 /// Heartbeat period \[ms\].
 const BEAT_MS: u64 = 1_000;
 
 /// A ground station's conversation with one vehicle.
 pub(crate) struct Conversation<'a> {
-    exchange: &'a mut Exchange<'a>,
+    exchange: &'a mut ByteExchange<'a>,
     pub(crate) client: Client,
     /// Second decoder of the same bytes, for the inertial samples.
     samples: Decoder<InertialSample>,
     now_ms: u64,
     bytes: u64,
-    pub(crate) heard: Heard,
+    pub(crate) latest: LatestMessages,
 }
 
 impl<'a> Conversation<'a> {
-    pub(crate) fn new(exchange: &'a mut Exchange<'a>) -> Self {
+    pub(crate) fn new(exchange: &'a mut ByteExchange<'a>) -> Self {
         let mut client = Client::new(Client::STATION);
-        client.beat_every(Some(BEAT_MS));
+        client.set_heartbeat_period(Some(BEAT_MS));
         let samples = Decoder::new(Client::STATION);
-        Conversation { exchange, client, samples, now_ms: 0, bytes: 0, heard: Heard::default() }
+        Conversation { exchange, client, samples, now_ms: 0, bytes: 0, latest: LatestMessages::default() }
     }
 
     /// Returns the time since the conversation began \[ms\].
@@ -46,8 +46,8 @@ impl<'a> Conversation<'a> {
 
     /// Sends the queued frames, runs one millisecond, and handles the received bytes.
     fn exchange(&mut self) -> Result<(), Error> {
-        let Conversation { exchange, client, samples, now_ms, bytes, heard } = self;
-        client.turn(*now_ms);
+        let Conversation { exchange, client, samples, now_ms, bytes, latest } = self;
+        client.update(*now_ms);
         let (uplink, mut signed) = (client.take(), false);
         exchange(&uplink, &mut |piece| {
             *bytes += piece.len() as u64;
@@ -55,10 +55,10 @@ impl<'a> Conversation<'a> {
                 signed |= frame.stamp().is_some();
                 true
             };
-            client.hear_accepted(piece, accept, |_, message| heard.take(message));
+            client.hear_accepted(piece, accept, |_, message| latest.take(message));
             samples.feed(piece, |from, sample| {
                 if client.vehicle().address == Some(from) {
-                    heard.samples.push(sample);
+                    latest.samples.push(sample);
                 }
             });
         })
@@ -85,7 +85,7 @@ impl<'a> Conversation<'a> {
 
     /// Sends a command; returns the answer and the time since the last try \[ms\], or `None` without an answer.
     pub(crate) fn command(&mut self, command: VehicleCommand) -> Result<Option<(CommandResult, u64)>, Error> {
-        self.client.command(command, Patience::REPEATED);
+        self.client.command(command, RetryPolicy::REPEATED);
         loop {
             match self.client.state(command) {
                 Some(CommandState::Waiting) => self.exchange()?,

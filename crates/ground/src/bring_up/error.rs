@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Reason why an [`Exchange`](super::Exchange) failed.
+/// Reason why an [`ByteExchange`](super::ByteExchange) failed.
 pub type ExchangeError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Reason why a bring-up ends without a log; displayed as one line.

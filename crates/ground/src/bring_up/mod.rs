@@ -5,19 +5,19 @@
 //!
 //! 1. [`bring_up`]: runs the list. Its steps are in `steps` and `turns`.
 //! 2. [`BringUpLog`]: the results, and their text.
-//! 3. `conversation`: drives a [`Client`](crate::Client) over an [`Exchange`] in steps of one millisecond. It reads no
-//!    clock, so the same vehicle in lockstep gives the same log.
+//! 3. `conversation`: drives a [`Client`](crate::Client) over an [`ByteExchange`] in steps of one millisecond. It reads
+//!    no clock, so the same vehicle in lockstep gives the same log.
 
 mod conversation;
 mod error;
-mod heard;
+mod latest;
 mod log;
 mod run;
 mod statistics;
 mod steps;
 mod turns;
 
-pub use conversation::Exchange;
+pub use conversation::ByteExchange;
 pub use error::{Error, ExchangeError};
 pub use log::{BringUpLog, BringUpStep, Verdict};
 pub use run::{BringUpOptions, bring_up};

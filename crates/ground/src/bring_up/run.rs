@@ -1,6 +1,6 @@
 //! Runs all steps of a bring-up.
 
-use super::conversation::{Conversation, Exchange};
+use super::conversation::{ByteExchange, Conversation};
 use super::error::Error;
 use super::log::BringUpLog;
 use super::steps;
@@ -25,7 +25,7 @@ pub struct BringUpOptions {
 /// # Errors
 /// Fails if the board is silent, sends something else, is armed or signs its frames, or if the connection fails.
 pub fn bring_up(
-    exchange: &mut Exchange<'_>,
+    exchange: &mut ByteExchange<'_>,
     options: BringUpOptions,
     tell: &mut dyn FnMut(&str),
 ) -> Result<BringUpLog, Error> {
@@ -37,7 +37,7 @@ pub fn bring_up(
     if talk.client.vehicle().armed {
         return Err(Error::Armed);
     }
-    if !talk.wait(SILENT_MS, |talk| talk.heard.health.is_some())? {
+    if !talk.wait(SILENT_MS, |talk| talk.latest.health.is_some())? {
         return Err(Error::Stranger);
     }
     tell(&format!("system {}, component {}", vehicle.system, vehicle.component));

@@ -42,8 +42,8 @@ const SELF_TEST_MS: u64 = 3_000;
 pub(crate) fn version(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
     let mut step = BringUpStep::new("version");
     talk.command(VehicleCommand::RequestMessage { message: 148, index: 0 })?;
-    talk.wait(1_000, |talk| talk.heard.version.is_some())?;
-    match talk.heard.version {
+    talk.wait(1_000, |talk| talk.latest.version.is_some())?;
+    match talk.latest.version {
         Some(version) => {
             let [major, minor, patch, _] = version.software;
             step.found("firmware", format!("{major}.{minor}.{patch}"));
@@ -71,11 +71,11 @@ pub(crate) fn parameters(talk: &mut Conversation<'_>) -> Result<BringUpStep, Err
 /// Reads which sensors are present and healthy.
 pub(crate) fn sensors(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
     let mut step = BringUpStep::new("sensors");
-    talk.wait(3_000, |talk| talk.heard.system.is_some())?;
+    talk.wait(3_000, |talk| talk.latest.system.is_some())?;
     // Wait for a second message: some sensors may have been unhealthy at the start.
-    talk.heard.system = None;
-    talk.wait(3_000, |talk| talk.heard.system.is_some())?;
-    let Some(system) = talk.heard.system else {
+    talk.latest.system = None;
+    talk.wait(3_000, |talk| talk.latest.system.is_some())?;
+    let Some(system) = talk.latest.system else {
         step.check(false, "no SYS_STATUS");
         return Ok(step);
     };
@@ -133,13 +133,13 @@ pub(crate) fn self_tests(talk: &mut Conversation<'_>) -> Result<BringUpStep, Err
 pub(crate) fn at_rest(talk: &mut Conversation<'_>, rest_s: u32, add: &mut dyn FnMut(BringUpStep)) -> Result<(), Error> {
     let senses = senses(talk);
     show_samples(talk, true)?;
-    let before = talk.heard.health.unwrap_or_default();
-    let (restarts, attitudes) = (talk.heard.restarts, talk.heard.attitudes);
-    talk.heard.samples.clear();
-    talk.heard.altitudes_m.clear();
+    let before = talk.latest.health.unwrap_or_default();
+    let (restarts, attitudes) = (talk.latest.restarts, talk.latest.attitudes);
+    talk.latest.samples.clear();
+    talk.latest.altitudes_m.clear();
     talk.listen(1_000 * u64::from(rest_s))?;
-    let after = talk.heard.health.unwrap_or_default();
-    let samples = std::mem::take(&mut talk.heard.samples);
+    let after = talk.latest.health.unwrap_or_default();
+    let samples = std::mem::take(&mut talk.latest.samples);
 
     let mut ticks = BringUpStep::new("ticks");
     let elapsed_s = after.time_us.saturating_sub(before.time_us) as f64 * 1e-6;
@@ -149,9 +149,9 @@ pub(crate) fn at_rest(talk: &mut Conversation<'_>, rest_s: u32, add: &mut dyn Fn
     ticks.found("longest since power-up", format!("{:.1} us", after.tick_max_us));
     ticks.found("late or early meanwhile", after.late_ticks.wrapping_sub(before.late_ticks));
     ticks.found("late or early since power-up", after.late_ticks);
-    ticks.found("attitudes", format!("{:.1} Hz", rate(talk.heard.attitudes - attitudes, elapsed_s)));
+    ticks.found("attitudes", format!("{:.1} Hz", rate(talk.latest.attitudes - attitudes, elapsed_s)));
     ticks.found("stack", "not told by telemetry; computed: docs/budgets.md");
-    ticks.check(talk.heard.restarts == restarts, "the board has restarted");
+    ticks.check(talk.latest.restarts == restarts, "the board has restarted");
     ticks.check((997.0..=1003.0).contains(&after.rate_hz), "the rate is not 1000 Hz");
     ticks.check(after.late_ticks == before.late_ticks, "ticks late or early");
     ticks.check(after.tick_max_us < 1_000.0, "a tick longer than its period");
@@ -165,7 +165,7 @@ pub(crate) fn at_rest(talk: &mut Conversation<'_>, rest_s: u32, add: &mut dyn Fn
         return Ok(());
     }
     inertial_noise(&mut noise, &samples, elapsed_s);
-    let altitudes = talk.heard.altitudes_m.iter().map(|&altitude_m| Vector3::new(altitude_m, 0.0, 0.0));
+    let altitudes = talk.latest.altitudes_m.iter().map(|&altitude_m| Vector3::new(altitude_m, 0.0, 0.0));
     let altitude_m = VectorStatistics::of(altitudes).deviation().x;
     noise.found("altitude, deviation", format!("{altitude_m:.2} m"));
     add(noise);
@@ -176,7 +176,7 @@ pub(crate) fn at_rest(talk: &mut Conversation<'_>, rest_s: u32, add: &mut dyn Fn
 
 /// Returns true if the vehicle has an inertial sensor.
 pub(crate) fn senses(talk: &Conversation<'_>) -> bool {
-    talk.heard.system.is_some_and(|system| system.present & GYROSCOPE != 0)
+    talk.latest.system.is_some_and(|system| system.present & GYROSCOPE != 0)
 }
 
 /// Starts or stops the inertial samples.
@@ -268,9 +268,9 @@ pub(crate) fn warmth(
         return Ok(step.skipped("nobody to warm it, or nothing to be warmed"));
     }
     let mean = |talk: &mut Conversation<'_>| -> Result<_, Error> {
-        talk.heard.samples.clear();
+        talk.latest.samples.clear();
         talk.listen(3_000)?;
-        let samples = std::mem::take(&mut talk.heard.samples);
+        let samples = std::mem::take(&mut talk.latest.samples);
         Ok(VectorStatistics::of(samples.iter().map(|sample| sample.rates_rad_s)).mean())
     };
     let mut step = step;
@@ -294,14 +294,14 @@ pub(crate) fn position(
     tell: &mut dyn FnMut(&str),
 ) -> Result<BringUpStep, Error> {
     let mut step = BringUpStep::new("GNSS fix");
-    if talk.heard.fix.is_none() {
+    if talk.latest.fix.is_none() {
         return Ok(step.skipped("no receiver"));
     }
     let patience_s = if is_attended { 300 } else { 10 };
     tell(&format!("waiting for a fix under open sky, {patience_s} s at most"));
     let began_ms = talk.now_ms();
-    let is_fixed = talk.wait(1_000 * patience_s, |talk| talk.heard.fix.is_some_and(|fix| fix.kind >= 3))?;
-    if let Some(fix) = talk.heard.fix {
+    let is_fixed = talk.wait(1_000 * patience_s, |talk| talk.latest.fix.is_some_and(|fix| fix.kind >= 3))?;
+    if let Some(fix) = talk.latest.fix {
         let [horizontal_mm, vertical_mm] = fix.sigma_mm;
         step.found("kind of fix", fix.kind);
         step.found("satellites", fix.satellites);
@@ -318,7 +318,7 @@ pub(crate) fn position(
 /// Reads the measured battery voltage and current.
 pub(crate) fn battery(talk: &Conversation<'_>) -> BringUpStep {
     let mut step = BringUpStep::new("battery");
-    let Some(battery) = talk.heard.battery else { return step.skipped("no reading of a battery") };
+    let Some(battery) = talk.latest.battery else { return step.skipped("no reading of a battery") };
     step.found("voltage, to be compared with a meter", format!("{:.2} V", f64::from(battery.voltage_mv) * 1e-3));
     if battery.current_ca >= 0 {
         step.found("current", format!("{:.2} A", f64::from(battery.current_ca) * 1e-2));
@@ -329,7 +329,7 @@ pub(crate) fn battery(talk: &Conversation<'_>) -> BringUpStep {
 /// Checks that all motor outputs are zero while disarmed.
 pub(crate) fn motors(talk: &Conversation<'_>) -> BringUpStep {
     let mut step = BringUpStep::new("motors, disarmed");
-    match talk.heard.outputs {
+    match talk.latest.outputs {
         Some(outputs) => {
             let throttles: Vec<_> = outputs.throttles.iter().take(outputs.active as usize).collect();
             step.found("outputs", outputs.active);
@@ -367,10 +367,10 @@ pub(crate) fn link(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
         talk.listen(20)?;
     }
     let elapsed_s = talk.now_ms() as f64 * 1e-3;
-    let heard = *talk.client.counters();
+    let latest = *talk.client.counters();
     step.found("bytes", format!("{}, {:.0} per second", talk.bytes(), talk.bytes() as f64 / elapsed_s));
-    step.found("messages here", format!("{}, {} lost, {} corrupt", heard.received, heard.lost, heard.bad_checksum));
-    if let Some(there) = talk.heard.health.map(|health| health.link) {
+    step.found("messages here", format!("{}, {} lost, {} corrupt", latest.received, latest.lost, latest.bad_checksum));
+    if let Some(there) = talk.latest.health.map(|health| health.link) {
         let counts = format!("{}, {} lost, {} corrupt", there.received, there.lost, there.bad_checksum);
         step.found("messages there, on one of its links", counts);
         step.check(there.bad_checksum == 0, "corrupt messages there");
@@ -381,7 +381,7 @@ pub(crate) fn link(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
         step.found("round trip", format!("mean {}, worst {worst_ms} ms", sum_ms / u64::from(answered)));
     }
     step.check(answered == PINGS, format_args!("{} questions unanswered", PINGS - answered));
-    step.check(heard.bad_checksum == 0, "corrupt messages here");
+    step.check(latest.bad_checksum == 0, "corrupt messages here");
     step.check(f64::from(heartbeats) > 0.8 * elapsed_s - 1.0, "heartbeats are missing");
     Ok(step)
 }

@@ -2,7 +2,7 @@
 
 use super::conversation::Conversation;
 use super::error::Error;
-use super::heard::Heard;
+use super::latest::LatestMessages;
 use super::log::BringUpStep;
 use super::steps::senses;
 use nalgebra::Vector3;
@@ -16,7 +16,7 @@ const GAP_MAX_S: f64 = 0.1;
 
 /// A turn by hand from level: its name, the instruction, the direction that points up afterwards (x forward, y left, z
 /// up), and the axis and sign of the rotation that gyroscope and attitude must show.
-struct Turn {
+struct TurnCheck {
     name: &'static str,
     order: &'static str,
     up: [f32; 3],
@@ -24,11 +24,23 @@ struct Turn {
     sign: f64,
 }
 
-const TURNS: [Turn; 4] = [
-    Turn { name: "right side down", order: "turn it onto its right side", up: [0.0, 1.0, 0.0], axis: 0, sign: 1.0 },
-    Turn { name: "left side down", order: "turn it onto its left side", up: [0.0, -1.0, 0.0], axis: 0, sign: -1.0 },
-    Turn { name: "nose down", order: "turn its nose straight down", up: [-1.0, 0.0, 0.0], axis: 1, sign: 1.0 },
-    Turn { name: "nose up", order: "turn its nose straight up", up: [1.0, 0.0, 0.0], axis: 1, sign: -1.0 },
+const TURNS: [TurnCheck; 4] = [
+    TurnCheck {
+        name: "right side down",
+        order: "turn it onto its right side",
+        up: [0.0, 1.0, 0.0],
+        axis: 0,
+        sign: 1.0,
+    },
+    TurnCheck {
+        name: "left side down",
+        order: "turn it onto its left side",
+        up: [0.0, -1.0, 0.0],
+        axis: 0,
+        sign: -1.0,
+    },
+    TurnCheck { name: "nose down", order: "turn its nose straight down", up: [-1.0, 0.0, 0.0], axis: 1, sign: 1.0 },
+    TurnCheck { name: "nose up", order: "turn its nose straight up", up: [1.0, 0.0, 0.0], axis: 1, sign: -1.0 },
 ];
 
 /// Runs all turns.
@@ -45,15 +57,15 @@ pub(crate) fn turns(
             continue;
         }
         tell("hold it level");
-        let mut level = Turned::default();
-        let is_level = talk.wait(PATIENCE_MS, |talk| level.follow(&mut talk.heard, &Vector3::z()))?;
+        let mut level = TurnProgress::default();
+        let is_level = talk.wait(PATIENCE_MS, |talk| level.follow(&mut talk.latest, &Vector3::z()))?;
         step.check(is_level, "it was not held level");
         tell(turn.order);
         // Start anew, so that the angle counts from level.
-        let mut turned = Turned::default();
-        let is_done = talk.wait(PATIENCE_MS, |talk| turned.follow(&mut talk.heard, &turn.up.into()))?;
+        let mut turned = TurnProgress::default();
+        let is_done = talk.wait(PATIENCE_MS, |talk| turned.follow(&mut talk.latest, &turn.up.into()))?;
         let angle_rad = turned.angle_rad.get(turn.axis).copied().unwrap_or_default() * turn.sign;
-        let attitude_rad = talk.heard.attitude_rad.and_then(|attitude_rad| attitude_rad.get(turn.axis).copied());
+        let attitude_rad = talk.latest.attitude_rad.and_then(|attitude_rad| attitude_rad.get(turn.axis).copied());
         let attitude_rad = f64::from(attitude_rad.unwrap_or_default()) * turn.sign;
         step.found("specific force, forward, left, up [m/s2]", three(turned.force_m_s2));
         step.found("turned by the gyroscope, expected 90", format!("{:.0} degrees", angle_rad.to_degrees()));
@@ -69,7 +81,7 @@ pub(crate) fn turns(
 
 /// Result of following the samples during a turn.
 #[derive(Default)]
-struct Turned {
+struct TurnProgress {
     force_m_s2: Vector3<f32>,
     angle_rad: Vector3<f64>,
     last_us: Option<u64>,
@@ -77,11 +89,11 @@ struct Turned {
     held: u32,
 }
 
-impl Turned {
+impl TurnProgress {
     /// Takes the new samples; returns true once `up` has pointed up for half a second.
-    fn follow(&mut self, heard: &mut Heard, up: &Vector3<f32>) -> bool {
+    fn follow(&mut self, latest: &mut LatestMessages, up: &Vector3<f32>) -> bool {
         const HELD: u32 = 25;
-        for sample in heard.samples.drain(..) {
+        for sample in latest.samples.drain(..) {
             let elapsed_s = sample.time_us.saturating_sub(self.last_us.unwrap_or(sample.time_us)) as f64 * 1e-6;
             self.last_us = Some(sample.time_us);
             self.angle_rad += sample.rates_rad_s.cast::<f64>() * elapsed_s.min(GAP_MAX_S);

@@ -129,7 +129,7 @@ impl Vehicle {
     }
 
     /// Returns the repeated request for an item, if it is due.
-    fn turn(&mut self, now_ms: u64) -> Option<Downlink> {
+    fn update(&mut self, now_ms: u64) -> Option<Downlink> {
         let (plan, _, held, asked_ms) = self.upload.as_mut().filter(|(.., asked_ms)| now_ms > *asked_ms + AGAIN_MS)?;
         *asked_ms = now_ms;
         let message = MissionMessage::Request(held.len() as u16, *plan);
@@ -179,7 +179,7 @@ impl Line {
 
     fn step(&mut self) {
         let (now_ms, mut sent, mut answers) = (self.now_ms, Vec::new(), Vec::new());
-        self.client.turn(now_ms);
+        self.client.update(now_ms);
         self.client.send(|_, frame| sent.push(frame.to_vec()));
         sent.into_iter().for_each(|frame| self.put(true, frame));
         let arrived: Vec<_> = self.frames.extract_if(.., |(due_ms, ..)| *due_ms <= now_ms).collect();
@@ -190,7 +190,7 @@ impl Line {
                 self.client.hear(&frame, |_, _| ());
             }
         }
-        answers.extend(self.vehicle.turn(now_ms));
+        answers.extend(self.vehicle.update(now_ms));
         if now_ms.is_multiple_of(1_000) {
             answers.push(Downlink::Heartbeat { armed: false, failsafe: false, mode: 0 });
         }

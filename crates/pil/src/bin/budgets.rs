@@ -2,11 +2,11 @@
 //! tick from fewer seeds and writes nothing. Fails if a budget is exceeded. Both images must have been built.
 
 use afbc_hil::Station;
-use pil::beside::Beside;
-use pil::budget::{ESTIMATING_INSTRUCTIONS_MAX, FRAME_BYTES, LEVELS, Linked, TICK_INSTRUCTIONS_MAX};
+use pil::background::BackgroundInstructions;
+use pil::budget::{ESTIMATING_INSTRUCTIONS_MAX, FRAME_BYTES, LEVELS, LinkedImage, TICK_INSTRUCTIONS_MAX};
 use pil::exercise::{TICKS, bytes_of_tick};
-use pil::worst::{StateSource, search};
-use pil::{Emulator, Error, Image};
+use pil::worst_tick::{StateSource, search};
+use pil::{Emulator, Error, FirmwareImage};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -59,7 +59,7 @@ fn main() -> ExitCode {
 
 /// Returns true if every budget is met.
 fn run() -> Result<bool, Error> {
-    let flight = Linked::read(&Image::Flight.find()?)?;
+    let flight = LinkedImage::read(&FirmwareImage::Flight.find()?)?;
     let tick = flight.reach(TICK)?;
     for (name, bytes) in &tick.deepest {
         println!("{bytes:6} bytes of stack: {name}");
@@ -119,7 +119,7 @@ fn run() -> Result<bool, Error> {
     let [min, mean, max, stack] = fly()?;
     let max = max.max(worst(StateSource::Link, searches)?);
     let estimating = worst(StateSource::Estimate, searches)?;
-    let beside = Beside::count(&Image::Flight.find()?)?;
+    let background = BackgroundInstructions::count(&FirmwareImage::Flight.find()?)?;
     let line = |what, unit, measured, most| Budget { what, unit, measured, most };
     let budgets = [
         line("control tick, worst", "instructions", max, Some(TICK_INSTRUCTIONS_MAX.into())),
@@ -129,10 +129,10 @@ fn run() -> Result<bool, Error> {
             estimating,
             Some(ESTIMATING_INSTRUCTIONS_MAX.into()),
         ),
-        line("DSHOT frames of four motors", "instructions", beside.dshot.into(), Some(1_500)),
-        line("SysTick's interrupt", "instructions", beside.systick.into(), Some(200)),
-        line("USART1's interrupt, for a byte", "instructions", beside.byte.into(), Some(250)),
-        line("link's task, woken once, most seen", "instructions", beside.wake.into(), None),
+        line("DSHOT frames of four motors", "instructions", background.dshot.into(), Some(1_500)),
+        line("SysTick's interrupt", "instructions", background.systick.into(), Some(200)),
+        line("USART1's interrupt, for a byte", "instructions", background.byte.into(), Some(250)),
+        line("link's task, woken once, most seen", "instructions", background.wake.into(), None),
         line("control tick, mean", "instructions", mean, None),
         line("control tick, least", "instructions", min, None),
         line("stack of the control tick, worst case", "bytes", tick.stack_bytes.into(), Some(4_608)),
@@ -157,7 +157,7 @@ fn run() -> Result<bool, Error> {
 fn worst(source: StateSource, searches: u64) -> Result<u64, Error> {
     let mut worst = 0;
     for seed in 1..=searches {
-        let found = search(Emulator::start(&Image::Pil.find()?)?, source, seed, CANDIDATES)?;
+        let found = search(Emulator::start(&FirmwareImage::Pil.find()?)?, source, seed, CANDIDATES)?;
         println!(
             "{source:?}, seed {seed}: worst of {} candidates: number {}, {} instructions",
             found.candidates, found.candidate, found.instructions
@@ -169,7 +169,7 @@ fn worst(source: StateSource, searches: u64) -> Result<u64, Error> {
 
 /// Returns the least, mean and most instructions of a tick with motors on, and the deepest stack \[bytes\].
 fn fly() -> Result<[u64; 4], Error> {
-    let mut emulator = Emulator::start(&Image::Pil.find()?)?;
+    let mut emulator = Emulator::start(&FirmwareImage::Pil.find()?)?;
     let mut station = Station::default();
     let (mut min, mut sum, mut count, mut max, mut stack) = (u64::MAX, 0, 0, 0, 0);
     for tick in 0..TICKS {

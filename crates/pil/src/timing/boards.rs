@@ -1,7 +1,7 @@
 //! Data of each board on which its times depend: its core, links and parts. `tests/timing.rs` compares the data with
 //! `firmware/boards/`.
 
-use super::bus::{Script, Wire, script};
+use super::bus::{BusKind, BusScript, script};
 use super::cycles::{CORTEX_M4F, CORTEX_M7, CoreCycles};
 use super::known::{self, KnownLateness};
 use afbc_drivers::bmi270::Bmi270;
@@ -72,7 +72,7 @@ pub struct BoardTimes {
     /// Instructions of the slow sensors' task and everything that it can reach, each counted once.
     pub aiding: u64,
     /// Functions that return the readings of the board's parts, including all candidates.
-    parts: &'static [fn() -> Script],
+    parts: &'static [fn() -> BusScript],
     /// Number of parts, from the first on, that the sampling task reads.
     pub sampled: usize,
     /// True if only one of the sampled parts is on the board.
@@ -84,7 +84,7 @@ pub struct BoardTimes {
 impl BoardTimes {
     /// Returns the readings of the board's parts.
     #[must_use]
-    pub fn scripts(&self) -> Vec<Script> {
+    pub fn scripts(&self) -> Vec<BusScript> {
         self.parts.iter().map(|part| part()).collect()
     }
 }
@@ -128,16 +128,16 @@ pub static BOARDS: [BoardTimes; 4] = [
         sampling: 7_096,
         aiding: 23_085,
         parts: parts![
-            Icm42688p<true>: Wire::Spi(SPI1_HZ),
-            Bmi270: Wire::Spi(SPI1_HZ),
-            Icm20602: Wire::Spi(SPI1_HZ),
-            Icm20689: Wire::Spi(SPI1_HZ),
-            Mpu6000: Wire::Spi(SPI1_HZ),
-            Mpu6500: Wire::Spi(SPI1_HZ),
-            Spl06: Wire::I2c,
-            Dps310: Wire::I2c,
-            Bmp280: Wire::I2c,
-            Qmc5883l: Wire::I2c,
+            Icm42688p<true>: BusKind::Spi(SPI1_HZ),
+            Bmi270: BusKind::Spi(SPI1_HZ),
+            Icm20602: BusKind::Spi(SPI1_HZ),
+            Icm20689: BusKind::Spi(SPI1_HZ),
+            Mpu6000: BusKind::Spi(SPI1_HZ),
+            Mpu6500: BusKind::Spi(SPI1_HZ),
+            Spl06: BusKind::I2c,
+            Dps310: BusKind::I2c,
+            Bmp280: BusKind::I2c,
+            Qmc5883l: BusKind::I2c,
         ],
         sampled: 6,
         is_one: true,
@@ -154,11 +154,11 @@ pub static BOARDS: [BoardTimes; 4] = [
         sampling: 12_624,
         aiding: 24_825,
         parts: parts![
-            Icm20608: Wire::Spi(SPI1_HZ),
-            Mpu9250: Wire::Spi(SPI1_HZ),
-            Lis3mdl: Wire::Spi(SPI1_HZ),
-            Ms5611: Wire::Spi(SPI2_HZ),
-            Qmc5883l: Wire::I2c,
+            Icm20608: BusKind::Spi(SPI1_HZ),
+            Mpu9250: BusKind::Spi(SPI1_HZ),
+            Lis3mdl: BusKind::Spi(SPI1_HZ),
+            Ms5611: BusKind::Spi(SPI2_HZ),
+            Qmc5883l: BusKind::I2c,
         ],
         sampled: 3,
         is_one: false,
@@ -175,10 +175,10 @@ pub static BOARDS: [BoardTimes; 4] = [
         sampling: 7_552,
         aiding: 23_515,
         parts: parts![
-            Icm42688p<true>: Wire::Spi(SPI_H743_HZ),
-            Icm42605<true>: Wire::Spi(SPI_H743_HZ),
-            Dps310: Wire::I2c,
-            Qmc5883l: Wire::I2c,
+            Icm42688p<true>: BusKind::Spi(SPI_H743_HZ),
+            Icm42605<true>: BusKind::Spi(SPI_H743_HZ),
+            Dps310: BusKind::I2c,
+            Qmc5883l: BusKind::I2c,
         ],
         sampled: 2,
         is_one: false,

@@ -12,7 +12,7 @@ const I2C_HZ: u32 = 400_000;
 
 /// Bus traffic of one reading of a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Script {
+pub struct BusScript {
     /// Name of the part.
     pub part: &'static str,
     /// Bytes on the bus, including addresses.
@@ -27,7 +27,7 @@ pub struct Script {
 
 /// Bus of a part.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Wire {
+pub(super) enum BusKind {
     /// SPI with this input clock \[Hz\].
     Spi(u32),
     /// I2C.
@@ -55,22 +55,22 @@ pub fn i2c_ns(bytes: u64, conditions: u64) -> u64 {
 }
 
 /// Adds up the longest cycle of a part that is ready, plus one read of a register.
-pub(super) fn script<P: SensorPart>(wire: Wire) -> Script {
+pub(super) fn script<P: SensorPart>(wire: BusKind) -> BusScript {
     let format = P::SPI;
     let clock_hz = match (wire, format) {
-        (Wire::Spi(kernel_hz), Some(format)) => spi_clock_hz(kernel_hz, format.clock_hz),
+        (BusKind::Spi(kernel_hz), Some(format)) => spi_clock_hz(kernel_hz, format.clock_hz),
         _ => I2C_HZ,
     };
     let dummies = format.map_or(0, |format| format.dummies as u64);
-    let mut script = Script { part: P::NAME, bytes: 0, transfers: 0, clock_hz, time_ns: 0 };
+    let mut script = BusScript { part: P::NAME, bytes: 0, transfers: 0, clock_hz, time_ns: 0 };
     let mut add = |data: u64, is_read: bool| {
         let (bytes, time_ns) = match wire {
-            Wire::Spi(_) => {
+            BusKind::Spi(_) => {
                 let bytes = 1 + data + if is_read { dummies } else { 0 };
                 (bytes, spi_ns(bytes, clock_hz))
             }
             // Address and register; a read sends the address again before the answer.
-            Wire::I2c => {
+            BusKind::I2c => {
                 let bytes = 2 + data + u64::from(is_read);
                 (bytes, i2c_ns(bytes, 2 + u64::from(is_read)))
             }

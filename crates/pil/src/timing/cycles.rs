@@ -11,7 +11,7 @@ pub enum CycleLimit {
 
 /// Shares of the kinds of instructions; 1 is all instructions.
 #[derive(Clone, Copy, Debug)]
-pub struct Mix {
+pub struct InstructionMix {
     /// Share of loads from memory.
     pub load: f64,
     /// Share of loads from constants in the code, which `load` includes.
@@ -32,7 +32,7 @@ pub struct Mix {
 
 /// Mix of the 45,156 instructions that the control tick of `speedybee-f405-v4` can reach; the other images differ by 1
 /// %. 71 % of the instructions have four bytes.
-pub(super) const MIX: Mix = Mix {
+pub(super) const MIX: InstructionMix = InstructionMix {
     load: 0.20,
     literal: 0.02,
     store: 0.118,
@@ -45,7 +45,7 @@ pub(super) const MIX: Mix = Mix {
 
 /// Cycles per instruction of each kind.
 #[derive(Clone, Copy, Debug)]
-struct Kinds {
+struct CyclesPerKind {
     load: f64,
     store: f64,
     multiple: f64,
@@ -62,8 +62,8 @@ pub struct CoreCycles {
     pub name: &'static str,
     /// Clock of the core \[Hz\].
     pub hz: u64,
-    best: Kinds,
-    bound: Kinds,
+    best: CyclesPerKind,
+    bound: CyclesPerKind,
     /// Size of a flash line \[bytes\], and the core's wait for it \[cycles\].
     line_bytes: f64,
     line_wait: f64,
@@ -84,8 +84,24 @@ pub struct CoreCycles {
 pub static CORTEX_M4F: CoreCycles = CoreCycles {
     name: "Cortex-M4F, flash with 5 wait states and prefetch",
     hz: 168_000_000,
-    best: Kinds { load: 1.0, store: 1.0, multiple: 5.0, multiply_add: 3.0, divide: 14.0, branch: 2.0, other: 1.0 },
-    bound: Kinds { load: 2.0, store: 2.0, multiple: 6.0, multiply_add: 3.0, divide: 14.0, branch: 4.0, other: 1.0 },
+    best: CyclesPerKind {
+        load: 1.0,
+        store: 1.0,
+        multiple: 5.0,
+        multiply_add: 3.0,
+        divide: 14.0,
+        branch: 2.0,
+        other: 1.0,
+    },
+    bound: CyclesPerKind {
+        load: 2.0,
+        store: 2.0,
+        multiple: 6.0,
+        multiply_add: 3.0,
+        divide: 14.0,
+        branch: 4.0,
+        other: 1.0,
+    },
     line_bytes: 16.0,
     line_wait: 5.0,
     prefetches: true,
@@ -100,8 +116,24 @@ pub static CORTEX_M4F: CoreCycles = CoreCycles {
 pub static CORTEX_M7: CoreCycles = CoreCycles {
     name: "Cortex-M7, instruction cache, no data cache",
     hz: 400_000_000,
-    best: Kinds { load: 1.0, store: 1.0, multiple: 3.0, multiply_add: 1.0, divide: 14.0, branch: 1.0, other: 0.5 },
-    bound: Kinds { load: 7.0, store: 4.0, multiple: 6.0, multiply_add: 4.0, divide: 16.0, branch: 8.0, other: 1.0 },
+    best: CyclesPerKind {
+        load: 1.0,
+        store: 1.0,
+        multiple: 3.0,
+        multiply_add: 1.0,
+        divide: 14.0,
+        branch: 1.0,
+        other: 0.5,
+    },
+    bound: CyclesPerKind {
+        load: 7.0,
+        store: 4.0,
+        multiple: 6.0,
+        multiply_add: 4.0,
+        divide: 16.0,
+        branch: 8.0,
+        other: 1.0,
+    },
     line_bytes: 32.0,
     line_wait: 16.0,
     prefetches: false,
@@ -113,7 +145,7 @@ impl CoreCycles {
     /// Returns the mean cycles per instruction in a loop that the cache holds.
     #[must_use]
     pub fn per_cached(&self, limit: CycleLimit) -> f64 {
-        let Kinds { load, store, multiple, multiply_add, divide, branch, other } = match limit {
+        let CyclesPerKind { load, store, multiple, multiply_add, divide, branch, other } = match limit {
             CycleLimit::Best => self.best,
             CycleLimit::Bound => self.bound,
         };

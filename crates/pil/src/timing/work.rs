@@ -34,7 +34,7 @@ const QUEUE: u64 = 24;
 
 /// Instruction counts from `docs/budgets.md`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Work {
+pub struct InstructionCounts {
     /// Largest number of instructions allowed in the control tick.
     pub tick: u64,
     /// Largest number of instructions allowed in the control tick with the estimate.
@@ -51,7 +51,7 @@ pub struct Work {
 
 /// A section of code with interrupts disabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Section {
+pub struct CriticalSection {
     /// Purpose of the section.
     pub what: &'static str,
     /// Priority of the task.
@@ -84,7 +84,7 @@ impl TimingRow {
 }
 
 /// Input of a row. `interrupts` is the number of interrupt entries, `bus_ns` the time of the bus transfer that follows.
-struct Entry {
+struct RowInput {
     name: &'static str,
     priority: u8,
     period_ns: u64,
@@ -102,7 +102,7 @@ const SAMPLED_NS: u64 = 75_000;
 /// some 40 operations.
 const FIRST_FIX: u64 = 13_000;
 
-impl Work {
+impl InstructionCounts {
     /// Reads the instruction counts from the page's table.
     ///
     /// # Errors
@@ -114,7 +114,7 @@ impl Work {
             let missing = || Error::Protocol(format!("docs/budgets.md has no figure in the row {what}"));
             words.and_then(|word| word.parse().ok()).ok_or_else(missing)
         };
-        Ok(Work {
+        Ok(InstructionCounts {
             tick: cell("control tick, worst", 3)?,
             estimating: cell("control tick with the estimate, worst", 3)?,
             dshot: cell("DSHOT frames of four motors", 2)?,
@@ -126,17 +126,22 @@ impl Work {
 
     /// Returns the longest sections with interrupts disabled on a board.
     #[must_use]
-    pub fn sections(&self, board: &BoardTimes) -> Vec<Section> {
+    pub fn sections(&self, board: &BoardTimes) -> Vec<CriticalSection> {
         let mut sections = vec![
             // Copies 584 bytes.
-            Section { what: "result of a tick, to the links", priority: priority::CONTROL, straight: 100, looped: 515 },
-            Section { what: "timer of a task", priority: priority::HOUSEKEEPING, straight: 216, looped: 0 },
+            CriticalSection {
+                what: "result of a tick, to the links",
+                priority: priority::CONTROL,
+                straight: 100,
+                looped: 515,
+            },
+            CriticalSection { what: "timer of a task", priority: priority::HOUSEKEEPING, straight: 216, looped: 0 },
             // Copies 64 bytes to an odd address.
-            Section { what: "messages, to USB's ring", priority: priority::COMMS, straight: 200, looped: 233 },
+            CriticalSection { what: "messages, to USB's ring", priority: priority::COMMS, straight: 200, looped: 233 },
         ];
         if board.senses {
             // Copies the message of a fix, 48 bytes, and the origin.
-            sections.push(Section {
+            sections.push(CriticalSection {
                 what: "a fix, to stations",
                 priority: priority::AIDING,
                 straight: 60,
@@ -169,7 +174,7 @@ impl Work {
                 }
             })
             .collect();
-        let row = |(index, entry): (usize, &Entry)| {
+        let row = |(index, entry): (usize, &RowInput)| {
             let response_ns = worst_response_ns(&tasks, index).map(|response| response + entry.bus_ns);
             tasks.get(index).map(|task| TimingRow {
                 name: entry.name,
@@ -181,9 +186,9 @@ impl Work {
         entries.iter().enumerate().filter_map(row).collect()
     }
 
-    fn entries(&self, board: &BoardTimes, link_baud: u64) -> Vec<Entry> {
+    fn entries(&self, board: &BoardTimes, link_baud: u64) -> Vec<RowInput> {
         let tick = if board.senses { self.estimating } else { self.tick };
-        let mut entries = vec![Entry {
+        let mut entries = vec![RowInput {
             name: "SysTick",
             priority: priority::TIME,
             period_ns: TICK_NS,
@@ -193,7 +198,7 @@ impl Work {
             // If SysTick is later, the next one is lost.
             deadline_ns: Some(TICK_NS),
         }];
-        let byte = |name, rate: RateOfUart, is_heard: bool| Entry {
+        let byte = |name, rate: RateOfUart, is_heard: bool| RowInput {
             name,
             priority: priority::UART,
             period_ns: rate.byte_ns(link_baud),
@@ -224,7 +229,7 @@ impl Work {
                 (times.sum(), transfers.sum())
             };
             // Two DMA ends per transfer, and one run of the task per transfer.
-            entries.push(Entry {
+            entries.push(RowInput {
                 name: "sampling, with its transfers",
                 priority: priority::SAMPLING,
                 period_ns: TICK_NS,
@@ -234,7 +239,7 @@ impl Work {
                 deadline_ns: Some(TICK_NS),
             });
             let transfers = slow.iter().map(|script| script.transfers).sum::<u64>();
-            entries.push(Entry {
+            entries.push(RowInput {
                 name: "slow sensors, with their transfers",
                 priority: priority::AIDING,
                 period_ns: AIDING_NS,
@@ -245,7 +250,7 @@ impl Work {
             });
         }
         entries.extend([
-            Entry {
+            RowInput {
                 name: "control tick, to the motors' DMA",
                 priority: priority::CONTROL,
                 period_ns: TICK_NS,
@@ -255,7 +260,7 @@ impl Work {
                 // The frame must have been sent when the next tick begins.
                 deadline_ns: Some(TICK_NS),
             },
-            Entry {
+            RowInput {
                 name: "end of the motors' DMA",
                 priority: priority::MOTOR_DMA,
                 period_ns: TICK_NS,
@@ -266,7 +271,7 @@ impl Work {
             },
         ]);
         if board.answers {
-            entries.push(Entry {
+            entries.push(RowInput {
                 name: "motor controllers' answers",
                 priority: priority::CONTROL,
                 period_ns: TICK_NS,
@@ -276,7 +281,7 @@ impl Work {
                 deadline_ns: Some(TICK_NS),
             });
         }
-        entries.extend([Entry {
+        entries.extend([RowInput {
             name: "links' task",
             priority: priority::COMMS,
             period_ns: TICK_NS,
@@ -291,7 +296,7 @@ impl Work {
     }
 }
 
-impl Section {
+impl CriticalSection {
     /// Returns the section's duration \[ns\].
     #[must_use]
     pub fn time_ns(&self, core: &CoreCycles, limit: CycleLimit) -> u64 {

@@ -1,12 +1,12 @@
 //! Helpers for the tests of both images.
 
-use pil::{Error, Image};
+use pil::{Error, FirmwareImage};
 use std::io::Write as _;
 use std::path::PathBuf;
 
 /// Starts the image. Returns none, with a message on the terminal, if the test must be skipped. In CI nothing may be
 /// skipped.
-pub fn start_or_skip<T>(image: Image, start: impl FnOnce(PathBuf) -> Result<T, Error>) -> Option<T> {
+pub fn start_or_skip<T>(image: FirmwareImage, start: impl FnOnce(PathBuf) -> Result<T, Error>) -> Option<T> {
     match image.find().and_then(start) {
         Ok(started) => Some(started),
         Err(error) if error.is_missing() && std::env::var_os("CI").is_none() => {

@@ -2,7 +2,7 @@
 
 mod synthesis;
 
-use synthesis::Model;
+use synthesis::WorldMagneticModel;
 
 /// First and last day that the models cover, counted from 1970: 2020 to 2029.
 const DAYS: (f64, f64) = (18_262.0, 21_914.0);
@@ -16,7 +16,7 @@ const LATITUDE_MAX_DEG: f64 = 89.99;
 
 /// The earth's field at a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Field {
+pub(crate) struct EarthField {
     /// Declination, positive to the east \[rad\].
     pub(crate) declination_rad: f32,
     /// Horizontal and downward part of the field \[gauss\].
@@ -27,11 +27,11 @@ pub(crate) struct Field {
 /// Returns the field at a place and time; none where the model has no field, such as near the poles. A time outside the
 /// models' years is moved to the nearest covered year: the declination changes by 0.2 degrees per year. Without a time,
 /// the field is that of the beginning of 2020.
-pub(crate) fn at(latitude_deg: f64, longitude_deg: f64, altitude_m: f64, utc_us: Option<f64>) -> Option<Field> {
+pub(crate) fn at(latitude_deg: f64, longitude_deg: f64, altitude_m: f64, utc_us: Option<f64>) -> Option<EarthField> {
     let days = utc_us.filter(|utc_us| utc_us.is_finite()).map_or(DAYS.0, |utc_us| utc_us / 86_400e6);
     let [north_nt, east_nt, down_nt] = at_day(latitude_deg, longitude_deg, altitude_m, days)?;
     let gauss = |nanotesla: f64| (nanotesla * 1e-5) as f32;
-    Some(Field {
+    Some(EarthField {
         declination_rad: east_nt.atan2(north_nt) as f32,
         horizontal_gauss: gauss(north_nt.hypot(east_nt)),
         down_gauss: gauss(down_nt),
@@ -54,7 +54,12 @@ fn at_day(latitude_deg: f64, longitude_deg: f64, altitude_m: f64, days: f64) -> 
         (include_str!("wmm2025.cof"), SECOND_DAY)
     };
     let years = (days - epoch) / DAYS_A_YEAR;
-    Some(Model::read(table)?.field(latitude_deg.to_radians(), longitude_deg.to_radians(), altitude_m, years))
+    Some(WorldMagneticModel::read(table)?.field(
+        latitude_deg.to_radians(),
+        longitude_deg.to_radians(),
+        altitude_m,
+        years,
+    ))
 }
 
 #[cfg(test)]

@@ -15,9 +15,9 @@ const AXIS_M: f64 = 6_378_137.0;
 const ECCENTRICITY_SQUARED: f64 = 6.694_379_990_14e-3;
 
 /// Coefficients of a model: g, h \[nT\] and their changes \[nT/year\] for each degree and order.
-pub(super) struct Model([[f64; 4]; PAIRS]);
+pub(super) struct WorldMagneticModel([[f64; 4]; PAIRS]);
 
-impl Model {
+impl WorldMagneticModel {
     /// Reads NOAA's table of coefficients; none if the table is incomplete.
     pub(super) fn read(table: &str) -> Option<Self> {
         let mut rows = [[0.0; 4]; PAIRS];
@@ -35,7 +35,7 @@ impl Model {
                 *number = words.next()?.parse().ok()?;
             }
         }
-        Some(Model(rows))
+        Some(WorldMagneticModel(rows))
     }
 
     /// Returns the field north, east and down \[nT\] at a place above the ellipsoid, `years` years after the epoch.

@@ -1,7 +1,7 @@
 //! Compares the flight of a log with a replay under changed settings.
 
 use super::change::SettingChange;
-use super::quantities::{QUANTITIES, ReplayQuantity, Values, values};
+use super::quantities::{QUANTITIES, QuantityValues, ReplayQuantity, values};
 use afbc_control::Trace;
 use afbc_onboard::Report;
 use core::f64::consts::{PI, TAU};
@@ -43,9 +43,9 @@ pub struct ChangeRow {
     /// Time from the first tick of the log on \[s\].
     pub time_s: f64,
     /// Values as flown.
-    pub flown: Values,
+    pub flown: QuantityValues,
     /// Values under the changed settings.
-    pub changed: Values,
+    pub changed: QuantityValues,
 }
 
 /// Compares the commands of changed settings with the commands as flown, from the same inputs. The vehicle flew under

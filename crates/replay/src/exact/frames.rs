@@ -3,7 +3,7 @@
 use afbc_log::exact::{FRAME_MAX, FrameError, Record, StartRecord, VERSION, decode};
 
 /// Result of looking for the start record of a file.
-pub(super) enum Found {
+pub(super) enum StartSearch {
     /// The first start record.
     Start(StartRecord),
     /// No start record: the reason and the cure.
@@ -40,18 +40,18 @@ fn read(frame: &[u8]) -> Result<Record, FrameError> {
 }
 
 /// Looks for the first start record in a file.
-pub(super) fn look(bytes: &[u8]) -> Found {
-    let refused = |problem: &str| Found::Refused(problem.into());
+pub(super) fn look(bytes: &[u8]) -> StartSearch {
+    let refused = |problem: &str| StartSearch::Refused(problem.into());
     if bytes.is_empty() {
         return refused("it is empty; was a log sent to the link that LOG_PORT names, and its baud rate set?");
     }
     let mut records = 0_u64;
     for frame in bytes.split(|byte| *byte == 0).filter(|frame| !frame.is_empty()) {
         match read(frame) {
-            Ok(Record::Start(start)) => return Found::Start(start),
+            Ok(Record::Start(start)) => return StartSearch::Start(start),
             Ok(_) => records += 1,
             Err(FrameError::Foreign(Some(version))) => {
-                return Found::Refused(format!(
+                return StartSearch::Refused(format!(
                     "it is of version {version} of the exact log, and this program reads version {VERSION}; replay it \
                      with the program of the version that flew it"
                 ));

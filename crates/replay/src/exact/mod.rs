@@ -17,7 +17,7 @@ pub use quantities::{QUANTITIES, ReplayQuantity};
 use crate::ulog;
 use afbc_files::read::FileError;
 use afbc_vehicles::{Vehicle, built_in};
-use frames::Found;
+use frames::StartSearch;
 use std::fs;
 use std::path::Path;
 
@@ -42,15 +42,15 @@ pub fn replay(
         return Err(failed("this is a PX4 ULog; replay it without --exact".into()));
     }
     let start = match frames::look(&bytes) {
-        Found::Start(start) => start,
-        Found::Refused(problem) => return Err(failed(problem)),
+        StartSearch::Start(start) => start,
+        StartSearch::Refused(problem) => return Err(failed(problem)),
     };
     let known = match vehicle {
         Some(_) => None,
         None => Some(named(&start.vehicle).map_err(failed)??),
     };
     let Some(vehicle) = vehicle.or(known.as_ref()) else { return Err(failed("it names no vehicle".into())) };
-    let players = player::Players::of(vehicle, &start, changes).map_err(|problem| problem.of(&shown))?;
+    let players = player::TickPlayers::of(vehicle, &start, changes).map_err(|problem| problem.of(&shown))?;
     run::run(&mut bytes, start, players, &mut progress).map_err(failed)
 }
 

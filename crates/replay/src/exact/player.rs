@@ -12,14 +12,14 @@ use afbc_types::OutOfRange;
 use afbc_vehicles::Vehicle;
 
 /// The flight as logged, and the same flight under changed settings.
-pub(super) struct Players {
+pub(super) struct TickPlayers {
     pub(super) flown: Box<Replayer<FlownLaw>>,
     pub(super) changed: Option<Box<Replayer<FlownLaw>>>,
     pub(super) changes: Vec<SettingChange>,
 }
 
 /// Reason for which there are no players.
-pub(super) enum Refusal {
+pub(super) enum PlayerError {
     /// A problem with the log.
     Log(String),
     /// A whole line, with its subject before a colon.
@@ -28,32 +28,32 @@ pub(super) enum Refusal {
     File(FileError),
 }
 
-impl Refusal {
+impl PlayerError {
     /// Returns the error; `log` is the log's name in the message.
     pub(super) fn of(self, log: &str) -> FileError {
         match self {
-            Refusal::Log(problem) => FileError::whole(log, problem),
-            Refusal::Whole(line) => match line.split_once(": ") {
+            PlayerError::Log(problem) => FileError::whole(log, problem),
+            PlayerError::Whole(line) => match line.split_once(": ") {
                 Some((what, problem)) => FileError::whole(what, problem),
                 None => FileError::whole(log, line),
             },
-            Refusal::File(error) => error,
+            PlayerError::File(error) => error,
         }
     }
 }
 
-impl Players {
+impl TickPlayers {
     /// Makes the players for a log with this start record.
-    pub(super) fn of(vehicle: &Vehicle, start: &StartRecord, changes: &[SettingChange]) -> Result<Self, Refusal> {
+    pub(super) fn of(vehicle: &Vehicle, start: &StartRecord, changes: &[SettingChange]) -> Result<Self, PlayerError> {
         let flown = ControllerKind::named(start.law.as_str());
         let Some(flown) = flown else {
             let law = start.law.escape_debug();
-            return Err(Refusal::Log(format!(
+            return Err(PlayerError::Log(format!(
                 "it was flown under the law '{law}', which this program does not have; read it by one that has"
             )));
         };
         if usize::from(start.rotors) != vehicle.rotors.len() {
-            return Err(Refusal::Log(format!(
+            return Err(PlayerError::Log(format!(
                 "it was flown with {} rotors, and the vehicle {} has {}; give the vehicle's file by --vehicle",
                 start.rotors,
                 vehicle.name,
@@ -70,21 +70,22 @@ impl Players {
             let mut player = player(vehicle, law.next_back().unwrap_or(flown))?;
             for change in changes {
                 if let SettingChange::Parameter(name, value) = change {
-                    set(&mut player, *name, *value).map_err(Refusal::Whole)?;
+                    set(&mut player, *name, *value).map_err(PlayerError::Whole)?;
                 }
             }
             Some(player)
         };
-        Ok(Players { flown: player(vehicle, flown)?, changed, changes: changes.to_vec() })
+        Ok(TickPlayers { flown: player(vehicle, flown)?, changed, changes: changes.to_vec() })
     }
 }
 
 /// Makes the player for a vehicle under a law.
-fn player(vehicle: &Vehicle, kind: ControllerKind) -> Result<Box<Replayer<FlownLaw>>, Refusal> {
-    let refused = |error: OutOfRange| Refusal::Log(format!("the vehicle {}: {}", vehicle.name, out_of_range(&error)));
+fn player(vehicle: &Vehicle, kind: ControllerKind) -> Result<Box<Replayer<FlownLaw>>, PlayerError> {
+    let refused =
+        |error: OutOfRange| PlayerError::Log(format!("the vehicle {}: {}", vehicle.name, out_of_range(&error)));
     let law = match kind {
         ControllerKind::Afbc => None,
-        kind => Some(Law::on(kind, vehicle, Profile::Flight).map_err(Refusal::File)?),
+        kind => Some(Law::on(kind, vehicle, Profile::Flight).map_err(PlayerError::File)?),
     };
     let image = vehicle.configuration().map_err(refused)?;
     Ok(Box::new(Replayer::under(FlownLaw(law), image).map_err(refused)?))

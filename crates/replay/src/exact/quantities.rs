@@ -35,7 +35,7 @@ const MOTIONS: usize = 19;
 const COUNT: usize = 2 * ROTORS_MAX + MOTIONS;
 
 /// Values of all quantities; a missing value is NaN.
-pub(super) type Values = [f32; COUNT];
+pub(super) type QuantityValues = [f32; COUNT];
 
 /// All quantities: motor commands, the law's demands, its setpoints and the estimate.
 pub const QUANTITIES: [ReplayQuantity; COUNT] = [
@@ -77,7 +77,7 @@ pub const QUANTITIES: [ReplayQuantity; COUNT] = [
 ];
 
 /// Returns the values of all quantities at a tick.
-pub(super) fn values(report: &Report, trace: &Trace) -> Values {
+pub(super) fn values(report: &Report, trace: &Trace) -> QuantityValues {
     const NONE: [f32; 3] = [f32::NAN; 3];
     let (inputs, [roll, pitch]) = (&trace.inputs, trace.desired_rad);
     let setpoint = report.guided.setpoint;

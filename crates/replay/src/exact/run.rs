@@ -3,7 +3,7 @@
 use super::compare::ChangeComparison;
 use super::frames;
 use super::outcome::{ExactReplay, FirstDifference, GivenSignal, LoggedParameter, ReplayFinding};
-use super::player::Players;
+use super::player::TickPlayers;
 use afbc_log::exact::{FrameError, Given, Record, ReplayDifference, ReplayStep, StartRecord, decode};
 use afbc_onboard::{Report, TickInputs};
 
@@ -11,8 +11,8 @@ use afbc_onboard::{Report, TickInputs};
 const PROGRESS_BYTES: usize = 1 << 20;
 
 /// State of a running replay.
-struct Run {
-    players: Players,
+struct ExactRun {
+    players: TickPlayers,
     out: ExactReplay,
     /// Number of the next expected tick, and whether the motors were driven in the last tick.
     next: u32,
@@ -31,7 +31,7 @@ struct Run {
 pub(super) fn run(
     bytes: &mut [u8],
     start: StartRecord,
-    players: Players,
+    players: TickPlayers,
     progress: &mut dyn FnMut(u64),
 ) -> Result<ExactReplay, String> {
     let length = bytes.len();
@@ -54,7 +54,7 @@ pub(super) fn run(
         first_difference: None,
         comparison,
     };
-    let mut run = Run { players, out, next: 0, is_armed: false, last_us: 0, began_us: 0, first_us: None };
+    let mut run = ExactRun { players, out, next: 0, is_armed: false, last_us: 0, began_us: 0, first_us: None };
     let mut told = 0;
     for frame in frames::each(bytes) {
         if frame.at >= told + PROGRESS_BYTES {
@@ -88,7 +88,7 @@ pub(super) fn run(
     Ok(run.out)
 }
 
-impl Run {
+impl ExactRun {
     fn take(&mut self, byte: usize, record: &Record) -> Result<(), String> {
         // Ticks are missing after the last one.
         let before_us = matches!(record, Record::Tick(tick, _) if tick.number != self.next).then_some(self.last_us);
@@ -177,7 +177,7 @@ impl Run {
 
     fn compare(&mut self, tick: &TickInputs, flown: &Report, other: &Report) {
         let time_s = self.now_us(tick.time_us) as f64 * 1e-6;
-        let Players { flown: player, changed: Some(changed), .. } = &self.players else { return };
+        let TickPlayers { flown: player, changed: Some(changed), .. } = &self.players else { return };
         let (trace, other_trace) = (player.trace(), changed.trace());
         if let Some(comparison) = &mut self.out.comparison {
             comparison.add(time_s, (flown, &trace), (other, &other_trace));

@@ -8,12 +8,12 @@ mod ros;
 mod times;
 mod topic;
 
-use crate::ulog::{Entry, LogReader, LoggedTopic, ParameterValue, Piece, each, is_ulog};
+use crate::ulog::{FilePiece, LogReader, UlogEntry, UlogSubscription, UlogValue, each, is_ulog};
 use afbc_files::read::FileError;
 use cdr_encoding::to_vec;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{McapError, WriteOptions, Writer};
-use ros::{ParameterChange, RosMessage, Scene, ShownText};
+use ros::{RosLog, RosMessage, RosParameterChange, SceneAttitudes};
 use serde::Serialize;
 use std::collections::{BTreeMap, HashMap};
 use std::fs;
@@ -52,9 +52,9 @@ fn write(bytes: &[u8], to: impl Write + Seek) -> Result<McapSummary, String> {
     let options = WriteOptions::new().compression(None).profile("ros2").library(library);
     let writer = options.create(to).map_err(unwritten)?;
     let mut conversion = Conversion {
-        output: Output { writer, channels: HashMap::new(), messages: 0, failure: None },
+        output: McapWriter { writer, channels: HashMap::new(), messages: 0, failure: None },
         topics: HashMap::new(),
-        scene: Scene::default(),
+        scene: SceneAttitudes::default(),
         now_us: 0,
         parameters: BTreeMap::new(),
         information: BTreeMap::new(),
@@ -70,20 +70,20 @@ fn write(bytes: &[u8], to: impl Write + Seek) -> Result<McapSummary, String> {
 }
 
 /// Calls `take` with the content of each record; with none for a damaged one.
-fn entries(bytes: &[u8], mut take: impl FnMut(Option<Entry<'_>>)) -> Result<(), String> {
+fn entries(bytes: &[u8], mut take: impl FnMut(Option<UlogEntry<'_>>)) -> Result<(), String> {
     let mut reader = LogReader::default();
     each(bytes, |piece, _| match piece {
-        Piece::Record(record) => take(reader.entry(record)),
-        Piece::Junk(_) => take(None),
+        FilePiece::Record(record) => take(reader.entry(record)),
+        FilePiece::Junk(_) => take(None),
     })
     .map(drop)
 }
 
 /// Returns the time of a record, if it has one \[us\].
-fn time_us(entry: &Entry<'_>) -> Option<u64> {
+fn time_us(entry: &UlogEntry<'_>) -> Option<u64> {
     match entry {
-        Entry::Message { topic, data, .. } => topic::time_us(&topic.format, data),
-        Entry::Text { time_us, .. } => Some(*time_us),
+        UlogEntry::Message { topic, data, .. } => topic::time_us(&topic.format, data),
+        UlogEntry::Text { time_us, .. } => Some(*time_us),
         _ => None,
     }
 }
@@ -101,10 +101,10 @@ fn unwritten(error: McapError) -> String {
 
 /// A conversion in progress: what was read so far, and the file being written.
 struct Conversion<W: Write + Seek> {
-    output: Output<W>,
+    output: McapWriter<W>,
     /// Topics of the log by their ids.
     topics: HashMap<u16, McapTopic>,
-    scene: Scene,
+    scene: SceneAttitudes,
     /// Time of the last message that had one \[us\].
     now_us: u64,
     /// Parameters at the log's beginning.
@@ -113,22 +113,22 @@ struct Conversion<W: Write + Seek> {
 }
 
 impl<W: Write + Seek> Conversion<W> {
-    fn take(&mut self, entry: Entry<'_>) {
+    fn take(&mut self, entry: UlogEntry<'_>) {
         self.now_us = time_us(&entry).unwrap_or(self.now_us);
         match entry {
-            Entry::Message { id, topic, data } => self.message(id, topic, data),
-            Entry::Parameter { name, value, is_initial } => self.parameter(name, value, is_initial),
-            Entry::Information { kind, name, value } => self.information(kind, name, value),
-            Entry::Text { time_us, level, text } => {
-                let shown = ShownText::of(time_us, level, &text);
-                self.output.put(ShownText::TOPIC, [ShownText::KIND, ShownText::SCHEMA], self.now_us, &shown);
+            UlogEntry::Message { id, topic, data } => self.message(id, topic, data),
+            UlogEntry::Parameter { name, value, is_initial } => self.parameter(name, value, is_initial),
+            UlogEntry::Information { kind, name, value } => self.information(kind, name, value),
+            UlogEntry::Text { time_us, level, text } => {
+                let shown = RosLog::of(time_us, level, &text);
+                self.output.put(RosLog::TOPIC, [RosLog::KIND, RosLog::SCHEMA], self.now_us, &shown);
             }
-            Entry::Dropout(lost_ms) => self.dropout(lost_ms),
-            Entry::Other => {}
+            UlogEntry::Dropout(lost_ms) => self.dropout(lost_ms),
+            UlogEntry::Other => {}
         }
     }
 
-    fn message(&mut self, id: u16, topic: &LoggedTopic, data: &[u8]) {
+    fn message(&mut self, id: u16, topic: &UlogSubscription, data: &[u8]) {
         let known = self.topics.entry(id).or_insert_with(|| McapTopic::of(topic));
         self.output.put(&known.name, [&known.kind, &known.schema], self.now_us, &known.sample(data));
         if let Some(RosMessage { topic, kind, schema, content }) = self.scene.update(&topic.format, data) {
@@ -136,13 +136,13 @@ impl<W: Write + Seek> Conversion<W> {
         }
     }
 
-    fn parameter(&mut self, name: &str, value: ParameterValue, is_initial: bool) {
+    fn parameter(&mut self, name: &str, value: UlogValue, is_initial: bool) {
         if is_initial {
             self.parameters.insert(name.to_owned(), value.to_string());
         } else {
-            let change = ParameterChange { name: name.to_owned(), value: value.number() };
-            let schema = [ParameterChange::KIND, ParameterChange::SCHEMA];
-            self.output.put(ParameterChange::TOPIC, schema, self.now_us, &change);
+            let change = RosParameterChange { name: name.to_owned(), value: value.number() };
+            let schema = [RosParameterChange::KIND, RosParameterChange::SCHEMA];
+            self.output.put(RosParameterChange::TOPIC, schema, self.now_us, &change);
         }
     }
 
@@ -177,7 +177,7 @@ impl<W: Write + Seek> Conversion<W> {
 }
 
 /// The MCAP file being written.
-struct Output<W: Write + Seek> {
+struct McapWriter<W: Write + Seek> {
     writer: Writer<W>,
     /// Channel and number of messages of each topic that has any.
     channels: HashMap<String, (u16, u32)>,
@@ -187,7 +187,7 @@ struct Output<W: Write + Seek> {
     failure: Option<McapError>,
 }
 
-impl<W: Write + Seek> Output<W> {
+impl<W: Write + Seek> McapWriter<W> {
     /// Writes a message of a topic; `schema` holds the schema's name and text.
     fn put(&mut self, topic: &str, schema: [&str; 2], time_us: u64, content: &impl Serialize) {
         if self.failure.is_none() {

@@ -5,7 +5,7 @@
 //! are forward-left-up.
 
 use super::topic::time_us;
-use crate::ulog::{FieldType, Format};
+use crate::ulog::{FieldType, UlogFormat};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::Serialize;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -24,8 +24,8 @@ pub(super) struct RosMessage {
 #[derive(Serialize)]
 #[serde(untagged)]
 pub(super) enum RosContent {
-    Frames(Vec<FrameTransform>),
-    Fix(PlaceFix),
+    Frames(Vec<TransformStamped>),
+    Fix(NavSatFix),
 }
 
 macro_rules! with_header {
@@ -53,31 +53,31 @@ const FIX: &str = with_header!(
     "================\nMSG: sensor_msgs/NavSatStatus\nint8 status\nuint16 service\n"
 );
 
-/// `builtin_interfaces/Time`, counted from power-up.
+/// `builtin_interfaces/RosTime`, counted from power-up.
 #[derive(Clone, Copy, Serialize)]
-struct Time {
+struct RosTime {
     sec: i32,
     nanosec: u32,
 }
 
-impl Time {
+impl RosTime {
     fn of(time_us: u64) -> Self {
         let sec = i32::try_from(time_us / 1_000_000).unwrap_or(i32::MAX);
-        Time { sec, nanosec: (time_us % 1_000_000) as u32 * 1000 }
+        RosTime { sec, nanosec: (time_us % 1_000_000) as u32 * 1000 }
     }
 }
 
-/// `std_msgs/Header`.
+/// `std_msgs/RosHeader`.
 #[derive(Serialize)]
-struct Header {
-    stamp: Time,
+struct RosHeader {
+    stamp: RosTime,
     frame_id: &'static str,
 }
 
 /// `geometry_msgs/TransformStamped`.
 #[derive(Serialize)]
-pub(super) struct FrameTransform {
-    header: Header,
+pub(super) struct TransformStamped {
+    header: RosHeader,
     child_frame_id: &'static str,
     /// Position \[m\].
     translation: [f64; 3],
@@ -87,8 +87,8 @@ pub(super) struct FrameTransform {
 
 /// `sensor_msgs/NavSatFix`.
 #[derive(Serialize)]
-pub(super) struct PlaceFix {
-    header: Header,
+pub(super) struct NavSatFix {
+    header: RosHeader,
     /// 0: the receiver has a fix.
     status: i8,
     /// 1: GPS.
@@ -104,8 +104,8 @@ pub(super) struct PlaceFix {
 
 /// `rcl_interfaces/Log`: a text message from the vehicle.
 #[derive(Serialize)]
-pub(super) struct ShownText {
-    stamp: Time,
+pub(super) struct RosLog {
+    stamp: RosTime,
     level: u8,
     name: &'static str,
     text: String,
@@ -114,7 +114,7 @@ pub(super) struct ShownText {
     line: u32,
 }
 
-impl ShownText {
+impl RosLog {
     pub(super) const TOPIC: &'static str = "/rosout";
     pub(super) const KIND: &'static str = "rcl_interfaces/msg/Log";
     pub(super) const SCHEMA: &'static str = concat!(
@@ -134,18 +134,18 @@ impl ShownText {
             _ => 10,
         };
         let (name, file, function, line) = ("vehicle", "", "", 0);
-        ShownText { stamp: Time::of(time_us), level, name, text: text.to_owned(), file, function, line }
+        RosLog { stamp: RosTime::of(time_us), level, name, text: text.to_owned(), file, function, line }
     }
 }
 
 /// A parameter that was changed during the log.
 #[derive(Serialize)]
-pub(super) struct ParameterChange {
+pub(super) struct RosParameterChange {
     pub(super) name: String,
     pub(super) value: f64,
 }
 
-impl ParameterChange {
+impl RosParameterChange {
     pub(super) const TOPIC: &'static str = "/parameter_change";
     pub(super) const KIND: &'static str = "afbc_msgs/msg/ParameterChange";
     pub(super) const SCHEMA: &'static str = "string name\nfloat64 value\n";
@@ -153,15 +153,15 @@ impl ParameterChange {
 
 /// Newest attitudes of the vehicle and of its setpoint, as rotations from forward-right-down to north-east-down.
 #[derive(Default)]
-pub(super) struct Scene {
+pub(super) struct SceneAttitudes {
     attitude: Option<Quaternion<f64>>,
     desired: Option<Quaternion<f64>>,
 }
 
-impl Scene {
+impl SceneAttitudes {
     /// Takes a message of the log; returns a message to add, if the log's message gives one.
-    pub(super) fn update(&mut self, format: &Format, data: &[u8]) -> Option<RosMessage> {
-        let fields = Fields { format, data };
+    pub(super) fn update(&mut self, format: &UlogFormat, data: &[u8]) -> Option<RosMessage> {
+        let fields = FieldReader { format, data };
         match format.name.as_str() {
             "vehicle_attitude" => self.attitude = fields.quaternion(["q[0]", "q[1]", "q[2]", "q[3]"]),
             "vehicle_attitude_setpoint" => self.desired = fields.quaternion(["q_d[0]", "q_d[1]", "q_d[2]", "q_d[3]"]),
@@ -175,12 +175,12 @@ impl Scene {
 }
 
 /// Fields of one message.
-struct Fields<'a> {
-    format: &'a Format,
+struct FieldReader<'a> {
+    format: &'a UlogFormat,
     data: &'a [u8],
 }
 
-impl Fields<'_> {
+impl FieldReader<'_> {
     fn float(&self, name: &str) -> Option<f64> {
         let from = self.data.get(self.format.place(name, FieldType::Float)?..)?;
         Some(f32::from_le_bytes(*from.first_chunk()?).into())
@@ -191,8 +191,8 @@ impl Fields<'_> {
         Some(f64::from_le_bytes(*from.first_chunk()?))
     }
 
-    fn time(&self) -> Option<Time> {
-        time_us(self.format, self.data).map(Time::of)
+    fn time(&self) -> Option<RosTime> {
+        time_us(self.format, self.data).map(RosTime::of)
     }
 
     fn vector(&self, names: [&str; 3]) -> Option<Vector3<f64>> {
@@ -213,8 +213,8 @@ impl Fields<'_> {
         let from_flu = Quaternion::new(0.0, 1.0, 0.0, 0.0);
         // A message whose quaternion is zero gives no frame.
         let rotation = UnitQuaternion::try_new(to_enu * attitude * from_flu, 1e-3)?;
-        let frame = FrameTransform {
-            header: Header { stamp: self.time()?, frame_id: "map" },
+        let frame = TransformStamped {
+            header: RosHeader { stamp: self.time()?, frame_id: "map" },
             child_frame_id,
             translation: [ned.y, ned.x, -ned.z],
             rotation: rotation.coords.into(),
@@ -227,8 +227,8 @@ impl Fields<'_> {
         let degrees = |name| self.double(name).filter(|value| value.is_finite());
         let variance = |name| self.float(name).map_or(0.0, |sigma| sigma * sigma);
         let (horizontal, vertical) = (variance("eph"), variance("epv"));
-        let fix = PlaceFix {
-            header: Header { stamp: self.time()?, frame_id: "base_link" },
+        let fix = NavSatFix {
+            header: RosHeader { stamp: self.time()?, frame_id: "base_link" },
             status: 0,
             service: 1,
             latitude_deg: degrees("lat")?,

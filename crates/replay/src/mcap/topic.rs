@@ -1,6 +1,6 @@
 //! Converts a topic of the log to a topic of ROS 2 with the same fields in the same order.
 
-use crate::ulog::{Field, FieldType as Type, Format, LoggedTopic};
+use crate::ulog::{FieldType as Type, MessageField, UlogFormat, UlogSubscription};
 use serde::ser::{Serialize, SerializeTuple, Serializer};
 use std::collections::HashSet;
 use std::fmt::Write as _;
@@ -23,13 +23,13 @@ pub(super) struct McapSample<'a> {
 }
 
 /// Returns the time of a message since power-up, if it has one \[us\].
-pub(super) fn time_us(format: &Format, data: &[u8]) -> Option<u64> {
+pub(super) fn time_us(format: &UlogFormat, data: &[u8]) -> Option<u64> {
     data.get(format.timestamp()?..)?.first_chunk().map(|bytes| u64::from_le_bytes(*bytes))
 }
 
 impl McapTopic {
     /// Makes the topic of the file for a topic of the log.
-    pub(super) fn of(topic: &LoggedTopic) -> Self {
+    pub(super) fn of(topic: &UlogSubscription) -> Self {
         let format = &topic.format;
         let name = match topic.instance {
             0 => format!("/{}", format.name),
@@ -97,7 +97,7 @@ fn ros_type(kind: Type) -> &'static str {
 
 /// Returns the fields in the format `ros2msg`. Fields `q[0]`, `q[1]` and so on become an array. A nested field such as
 /// `esc[0].rpm` becomes `esc_0_rpm`.
-fn schema(fields: &[Field]) -> String {
+fn schema(fields: &[MessageField]) -> String {
     let mut schema = String::new();
     let mut names = HashSet::new();
     let mut rest = fields;
@@ -117,11 +117,11 @@ fn schema(fields: &[Field]) -> String {
 }
 
 /// Returns the length of the array at the beginning of the fields; 1 if the first field is no array.
-fn array(fields: &[Field]) -> usize {
+fn array(fields: &[MessageField]) -> usize {
     let [first, ..] = fields else { return 1 };
     let Some(name) = first.name.strip_suffix("[0]") else { return 1 };
     let belongs =
-        |(index, field): &(usize, &Field)| field.name == format!("{name}[{index}]") && field.kind == first.kind;
+        |(index, field): &(usize, &MessageField)| field.name == format!("{name}[{index}]") && field.kind == first.kind;
     fields.iter().enumerate().take_while(belongs).count().max(1)
 }
 

@@ -64,7 +64,7 @@ impl FieldType {
 
 /// A field of a message, or of a nested message.
 #[derive(Debug)]
-pub(crate) struct Field {
+pub(crate) struct MessageField {
     /// Name, such as `q[0]` or `esc[1].rpm`.
     pub(crate) name: String,
     pub(crate) kind: FieldType,
@@ -74,16 +74,16 @@ pub(crate) struct Field {
 
 /// Layout of a message.
 #[derive(Debug)]
-pub(crate) struct Format {
+pub(crate) struct UlogFormat {
     /// Name of the topic.
     pub(crate) name: String,
     /// Fields in the order of their offsets, without padding.
-    pub(crate) fields: Vec<Field>,
+    pub(crate) fields: Vec<MessageField>,
     /// Length of a message \[bytes\].
     pub(crate) size: usize,
 }
 
-impl Format {
+impl UlogFormat {
     /// Returns the offset of a field, if the field has that type.
     pub(crate) fn place(&self, name: &str, kind: FieldType) -> Option<usize> {
         self.fields.iter().find(|field| field.name == name && field.kind == kind).map(|field| field.at)
@@ -118,21 +118,21 @@ impl DeclaredField {
 
 /// The formats of a log.
 #[derive(Debug)]
-pub(crate) struct Formats {
+pub(crate) struct UlogFormats {
     declared: HashMap<String, Vec<DeclaredField>>,
     /// Layouts that were computed before; none for an incomplete format.
-    laid_out: HashMap<String, Option<Rc<Format>>>,
+    laid_out: HashMap<String, Option<Rc<UlogFormat>>>,
     /// Remaining length of all field names \[bytes\].
     left: usize,
 }
 
-impl Default for Formats {
+impl Default for UlogFormats {
     fn default() -> Self {
-        Formats { declared: HashMap::new(), laid_out: HashMap::new(), left: NAMES_OF_ALL }
+        UlogFormats { declared: HashMap::new(), laid_out: HashMap::new(), left: NAMES_OF_ALL }
     }
 }
 
-impl Formats {
+impl UlogFormats {
     /// Takes a declaration, `topic:type name;type[n] name;`. Returns none if it is damaged or contradicts an earlier
     /// one.
     pub(crate) fn declare(&mut self, text: &[u8]) -> Option<()> {
@@ -150,30 +150,30 @@ impl Formats {
 
     /// Returns the format of a topic; none if the topic or a nested message is not declared, or if the format is too
     /// large or too deep.
-    pub(crate) fn of(&mut self, name: &str) -> Option<Rc<Format>> {
+    pub(crate) fn of(&mut self, name: &str) -> Option<Rc<UlogFormat>> {
         if let Some(known) = self.laid_out.get(name) {
             return known.clone();
         }
         let most = self.left.min(NAMES_OF_FORMAT);
-        let mut layout = Layout { declared: &self.declared, fields: Vec::new(), at: 0, left: most };
+        let mut layout = FormatLayout { declared: &self.declared, fields: Vec::new(), at: 0, left: most };
         let is_whole = layout.add(name, "", 0).is_some();
-        let Layout { fields, at, left, .. } = layout;
+        let FormatLayout { fields, at, left, .. } = layout;
         self.left -= most - left;
-        let format = is_whole.then(|| Rc::new(Format { name: name.into(), fields, size: at }));
+        let format = is_whole.then(|| Rc::new(UlogFormat { name: name.into(), fields, size: at }));
         self.laid_out.insert(name.into(), format.clone());
         format
     }
 }
 
 /// A message while its fields are laid out.
-struct Layout<'a> {
+struct FormatLayout<'a> {
     declared: &'a HashMap<String, Vec<DeclaredField>>,
-    fields: Vec<Field>,
+    fields: Vec<MessageField>,
     at: usize,
     left: usize,
 }
 
-impl Layout<'_> {
+impl FormatLayout<'_> {
     /// Adds the fields of the message `name`, whose names get `prefix`.
     fn add(&mut self, name: &str, prefix: &str, depth: usize) -> Option<()> {
         let declared = self.declared;
@@ -194,7 +194,7 @@ impl Layout<'_> {
                         let at = self.at;
                         self.at = Some(at + kind.size()).filter(|end| *end <= LONGEST)?;
                         if !is_padding {
-                            self.fields.push(Field { name, kind, at });
+                            self.fields.push(MessageField { name, kind, at });
                         }
                     }
                     None => {

@@ -10,9 +10,9 @@ mod records;
 mod table;
 mod topics;
 
-pub(crate) use format::{Field, FieldType, Format};
-pub(crate) use reader::{Entry, LogReader, LoggedTopic, ParameterValue};
-pub(crate) use records::{Piece, each, is_ulog};
+pub(crate) use format::{FieldType, MessageField, UlogFormat};
+pub(crate) use reader::{LogReader, UlogEntry, UlogSubscription, UlogValue};
+pub(crate) use records::{FilePiece, each, is_ulog};
 
 use crate::recording::Recording;
 

@@ -1,10 +1,10 @@
 //! Reads logs of this project's own black box. They hold more than PX4's logs: each measurement as offered to the
 //! estimator, and the estimator's settings. So the replayed estimator repeats what it did in flight.
 
-use super::table::{AFBC_AID, AFBC_ESTIMATOR, Row, SENSOR_COMBINED, Tables, VEHICLE_LOCAL_POSITION};
+use super::table::{AFBC_AID, AFBC_ESTIMATOR, MessageRow, SENSOR_COMBINED, TopicTables, VEHICLE_LOCAL_POSITION};
 use super::topics;
 use crate::order::rising;
-use crate::recording::{Aiding, LoggedState, Recording, SampleSource, Sensor, flip};
+use crate::recording::{AidingSample, LoggedState, Recording, SampleSource, Sensor, flip};
 use crate::states;
 use afbc_estimator::{Measurement, Settings, Stamped};
 use afbc_onboard::Configuration;
@@ -20,7 +20,7 @@ const ESTIMATOR: &str = "EST_";
 ///
 /// # Errors
 /// A message, if the log has no IMU samples.
-pub(super) fn recording(tables: &Tables) -> Result<Option<Recording>, String> {
+pub(super) fn recording(tables: &TopicTables) -> Result<Option<Recording>, String> {
     if !tables.announces(AFBC_ESTIMATOR) {
         return Ok(None);
     }
@@ -44,7 +44,7 @@ pub(super) fn recording(tables: &Tables) -> Result<Option<Recording>, String> {
     recording.aiding = rows.iter().filter_map(aiding).collect();
     recording.aiding.sort_by_key(|aiding| aiding.arrived_us);
     for sensor in [Sensor::Tracker, Sensor::Gnss, Sensor::Barometer, Sensor::Magnetometer] {
-        let of = |aiding: &&Aiding| sensor_of(&aiding.measurement.value) == sensor;
+        let of = |aiding: &&AidingSample| sensor_of(&aiding.measurement.value) == sensor;
         let used = recording.aiding.iter().filter(of).count();
         if used > 0 {
             recording.sources.push(SampleSource { sensor, topic: AFBC_AID.0.into(), used, skipped: 0 });
@@ -63,7 +63,7 @@ pub(super) fn recording(tables: &Tables) -> Result<Option<Recording>, String> {
 }
 
 /// Returns the estimator's settings from the log's parameters.
-fn settings(tables: &Tables) -> Settings {
+fn settings(tables: &TopicTables) -> Settings {
     let mut table = ParameterTable::new(Configuration::default());
     for (name, value) in tables.parameters().filter(|(name, _)| name.starts_with(ESTIMATOR)) {
         // A parameter that this version does not have is ignored.
@@ -73,7 +73,7 @@ fn settings(tables: &Tables) -> Settings {
 }
 
 /// Returns a measurement as the estimator was offered it; none if its kind is unknown.
-fn aiding(row: &Row) -> Option<Aiding> {
+fn aiding(row: &MessageRow) -> Option<AidingSample> {
     let names: [&str; NUMBERS] = [
         "numbers[0]",
         "numbers[1]",
@@ -88,7 +88,7 @@ fn aiding(row: &Row) -> Option<Aiding> {
     ];
     let value = Measurement::of_numbers(row.get("kind") as u8, names.map(|name| row.get(name) as f32))?;
     let at_us = row.get("timestamp_sample") as u64;
-    Some(Aiding { arrived_us: row.timestamp_us(), measurement: Stamped { value, at_us } })
+    Some(AidingSample { arrived_us: row.timestamp_us(), measurement: Stamped { value, at_us } })
 }
 
 fn sensor_of(measurement: &Measurement) -> Sensor {
@@ -101,9 +101,9 @@ fn sensor_of(measurement: &Measurement) -> Sensor {
 }
 
 /// Returns velocities and positions in the measurements' local frame.
-fn motions(tables: &Tables) -> (Vec<LoggedState>, SampleSource) {
+fn motions(tables: &TopicTables) -> (Vec<LoggedState>, SampleSource) {
     let rows = tables.first(VEHICLE_LOCAL_POSITION);
-    let state = |row: &Row| {
+    let state = |row: &MessageRow| {
         let valid = |names: [&str; 2]| names.iter().all(|name| row.get(name) > 0.0);
         let of = |names, valid| Some(flip(row.vector(names))).filter(|_| valid);
         states::motion(

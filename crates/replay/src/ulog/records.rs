@@ -14,7 +14,7 @@ pub(crate) fn is_ulog(bytes: &[u8]) -> bool {
 
 /// Where the records of a file end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum End {
+pub(crate) enum RecordsEnd {
     /// The last record ends with the file.
     Whole,
     /// The file ends within the record that begins at this byte.
@@ -24,7 +24,7 @@ pub(crate) enum End {
 }
 
 /// A piece of a file.
-pub(crate) enum Piece<'a> {
+pub(crate) enum FilePiece<'a> {
     /// A record, including its length and kind.
     Record(&'a [u8]),
     /// This many bytes that are no record.
@@ -32,20 +32,20 @@ pub(crate) enum Piece<'a> {
 }
 
 /// A record's kind, content and whole length, or the reason for which there is none.
-enum Cut<'a> {
+enum RecordCut<'a> {
     Record(u8, &'a [u8], usize),
     /// The record is longer than the rest of the file.
     Long,
     None,
 }
 
-fn cut(rest: &[u8]) -> Cut<'_> {
-    let &[low, high, kind, ref content @ ..] = rest else { return Cut::Long };
+fn cut(rest: &[u8]) -> RecordCut<'_> {
+    let &[low, high, kind, ref content @ ..] = rest else { return RecordCut::Long };
     let length = usize::from(u16::from_le_bytes([low, high]));
     match content.get(..length) {
-        _ if !b"FDIMPQARSOLCB".contains(&kind) => Cut::None,
-        Some(content) => Cut::Record(kind, content, 3 + length),
-        None => Cut::Long,
+        _ if !b"FDIMPQARSOLCB".contains(&kind) => RecordCut::None,
+        Some(content) => RecordCut::Record(kind, content, 3 + length),
+        None => RecordCut::Long,
     }
 }
 
@@ -53,7 +53,7 @@ fn cut(rest: &[u8]) -> Cut<'_> {
 fn chains(mut rest: &[u8]) -> bool {
     for _ in 0..CHAIN {
         match cut(rest) {
-            Cut::Record(_, _, length) => rest = rest.get(length..).unwrap_or_default(),
+            RecordCut::Record(_, _, length) => rest = rest.get(length..).unwrap_or_default(),
             _ => return false,
         }
         if rest.is_empty() {
@@ -75,7 +75,7 @@ fn parts(bytes: &[u8]) -> Result<Vec<usize>, String> {
     let after = bytes.get(HEADER..).ok_or("cut within the first 16 bytes; copy it from the vehicle again")?;
     let mut parts = vec![HEADER];
     // Logs of version 0 have no flags.
-    if let Cut::Record(b'B', content, _) = cut(after) {
+    if let RecordCut::Record(b'B', content, _) = cut(after) {
         let mut words =
             content.chunks_exact(8).filter_map(|word| word.first_chunk()).map(|word| u64::from_le_bytes(*word));
         let incompatible = words.nth(1).unwrap_or_default();
@@ -100,38 +100,38 @@ fn parts(bytes: &[u8]) -> Result<Vec<usize>, String> {
 ///
 /// # Errors
 /// One line, if the file is too short or in a newer format; `take` is not called then.
-pub(crate) fn each(bytes: &[u8], mut take: impl FnMut(Piece<'_>, usize)) -> Result<End, String> {
+pub(crate) fn each(bytes: &[u8], mut take: impl FnMut(FilePiece<'_>, usize)) -> Result<RecordsEnd, String> {
     let parts = parts(bytes)?;
-    let mut end = End::Whole;
+    let mut end = RecordsEnd::Whole;
     for (from, to) in parts.iter().zip(parts.iter().skip(1)) {
         // The logger died at the end of a part that is followed by another.
-        if let End::Cut(at) | End::Lost(at) = end {
-            take(Piece::Junk(from - at), at);
+        if let RecordsEnd::Cut(at) | RecordsEnd::Lost(at) = end {
+            take(FilePiece::Junk(from - at), at);
         }
         end = each_of_part(bytes.get(..*to).unwrap_or_default(), *from, &mut take);
     }
     Ok(end)
 }
 
-fn each_of_part(bytes: &[u8], mut at: usize, take: &mut impl FnMut(Piece<'_>, usize)) -> End {
+fn each_of_part(bytes: &[u8], mut at: usize, take: &mut impl FnMut(FilePiece<'_>, usize)) -> RecordsEnd {
     loop {
         let rest = bytes.get(at..).unwrap_or_default();
         if rest.is_empty() {
-            return End::Whole;
+            return RecordsEnd::Whole;
         }
         let found = cut(rest);
-        if let Cut::Record(_, _, length) = found {
-            take(Piece::Record(rest.get(..length).unwrap_or_default()), at);
+        if let RecordCut::Record(_, _, length) = found {
+            take(FilePiece::Record(rest.get(..length).unwrap_or_default()), at);
             at += length;
             continue;
         }
         match (1..rest.len()).find(|next| chains(rest.get(*next..).unwrap_or_default())) {
             Some(next) => {
-                take(Piece::Junk(next), at);
+                take(FilePiece::Junk(next), at);
                 at += next;
             }
-            None if matches!(found, Cut::Long) => return End::Cut(at),
-            None => return End::Lost(at),
+            None if matches!(found, RecordCut::Long) => return RecordsEnd::Cut(at),
+            None => return RecordsEnd::Lost(at),
         }
     }
 }

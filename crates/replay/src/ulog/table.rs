@@ -1,14 +1,14 @@
 //! Collects the needed fields of a log's topics as numbers.
 
-use super::format::{FieldType as Type, Format};
-use super::reader::{Entry, LogReader};
-use super::records::{End, Piece, each};
+use super::format::{FieldType as Type, UlogFormat};
+use super::reader::{LogReader, UlogEntry};
+use super::records::{FilePiece, RecordsEnd, each};
 use std::collections::{HashMap, HashSet};
 
 /// Name of a topic and the fields that are read, in any of the topic's layouts.
-pub(super) type Topic = (&'static str, &'static [&'static str]);
+pub(super) type TopicFields = (&'static str, &'static [&'static str]);
 
-pub(super) const SENSOR_COMBINED: Topic = (
+pub(super) const SENSOR_COMBINED: TopicFields = (
     "sensor_combined",
     &[
         "timestamp",
@@ -45,21 +45,21 @@ const GNSS: &[&str] = &[
     "vel_ned_valid",
     "time_utc_usec",
 ];
-pub(super) const VEHICLE_GPS_POSITION: Topic = ("vehicle_gps_position", GNSS);
-pub(super) const SENSOR_GPS: Topic = ("sensor_gps", GNSS);
-pub(super) const VEHICLE_MAGNETOMETER: Topic = (
+pub(super) const VEHICLE_GPS_POSITION: TopicFields = ("vehicle_gps_position", GNSS);
+pub(super) const SENSOR_GPS: TopicFields = ("sensor_gps", GNSS);
+pub(super) const VEHICLE_MAGNETOMETER: TopicFields = (
     "vehicle_magnetometer",
     &["timestamp", "timestamp_sample", "magnetometer_ga[0]", "magnetometer_ga[1]", "magnetometer_ga[2]"],
 );
-pub(super) const SENSOR_MAG: Topic = ("sensor_mag", &["timestamp", "timestamp_sample", "x", "y", "z"]);
-pub(super) const VEHICLE_AIR_DATA: Topic =
+pub(super) const SENSOR_MAG: TopicFields = ("sensor_mag", &["timestamp", "timestamp_sample", "x", "y", "z"]);
+pub(super) const VEHICLE_AIR_DATA: TopicFields =
     ("vehicle_air_data", &["timestamp", "timestamp_sample", "baro_alt_meter", "baro_pressure_pa"]);
-pub(super) const SENSOR_BARO: Topic = ("sensor_baro", &["timestamp", "timestamp_sample", "altitude", "pressure"]);
-pub(super) const VEHICLE_ATTITUDE: Topic = (
+pub(super) const SENSOR_BARO: TopicFields = ("sensor_baro", &["timestamp", "timestamp_sample", "altitude", "pressure"]);
+pub(super) const VEHICLE_ATTITUDE: TopicFields = (
     "vehicle_attitude",
     &["timestamp", "timestamp_sample", "q[0]", "q[1]", "q[2]", "q[3]", "quat_reset_counter", "delta_q_reset[0]"],
 );
-pub(super) const VEHICLE_LOCAL_POSITION: Topic = (
+pub(super) const VEHICLE_LOCAL_POSITION: TopicFields = (
     "vehicle_local_position",
     &[
         "timestamp",
@@ -89,11 +89,11 @@ pub(super) const VEHICLE_LOCAL_POSITION: Topic = (
         "delta_vz",
     ],
 );
-pub(super) const VEHICLE_LAND_DETECTED: Topic = ("vehicle_land_detected", &["timestamp", "landed"]);
+pub(super) const VEHICLE_LAND_DETECTED: TopicFields = ("vehicle_land_detected", &["timestamp", "landed"]);
 
-pub(super) const ACTUATOR_ARMED: Topic = ("actuator_armed", &["timestamp", "armed"]);
-pub(super) const AFBC_ESTIMATOR: Topic = ("afbc_estimator", &["timestamp", "on_ground"]);
-pub(super) const AFBC_AID: Topic = (
+pub(super) const ACTUATOR_ARMED: TopicFields = ("actuator_armed", &["timestamp", "armed"]);
+pub(super) const AFBC_ESTIMATOR: TopicFields = ("afbc_estimator", &["timestamp", "on_ground"]);
+pub(super) const AFBC_AID: TopicFields = (
     "afbc_aid",
     &[
         "timestamp",
@@ -112,7 +112,7 @@ pub(super) const AFBC_AID: Topic = (
     ],
 );
 
-const TOPICS: [Topic; 13] = [
+const TOPICS: [TopicFields; 13] = [
     SENSOR_COMBINED,
     VEHICLE_GPS_POSITION,
     SENSOR_GPS,
@@ -128,13 +128,13 @@ const TOPICS: [Topic; 13] = [
     AFBC_AID,
 ];
 
-/// A message: its fields in the order of its [`Topic`]; NaN for a field that its layout lacks.
-pub(super) struct Row {
+/// A message: its fields in the order of its [`TopicFields`]; NaN for a field that its layout lacks.
+pub(super) struct MessageRow {
     fields: &'static [&'static str],
     values: Box<[f64]>,
 }
 
-impl Row {
+impl MessageRow {
     /// Returns a field; NaN if the message lacks it.
     pub(super) fn get(&self, name: &str) -> f64 {
         let index = self.fields.iter().position(|field| *field == name);
@@ -161,9 +161,9 @@ impl Row {
 
 /// Contents of a log.
 #[derive(Default)]
-pub(super) struct Tables {
+pub(super) struct TopicTables {
     /// Messages by topic and instance, in the order of the file.
-    rows: HashMap<(&'static str, u8), Vec<Row>>,
+    rows: HashMap<(&'static str, u8), Vec<MessageRow>>,
     parameters: HashMap<String, f64>,
     /// Topics that the log subscribes to, with or without messages.
     announced: HashSet<&'static str>,
@@ -171,9 +171,9 @@ pub(super) struct Tables {
     pub(super) notes: Vec<String>,
 }
 
-impl Tables {
+impl TopicTables {
     /// Returns the instances of a topic that have messages, lowest first.
-    pub(super) fn instances(&self, topic: Topic) -> Vec<(u8, &[Row])> {
+    pub(super) fn instances(&self, topic: TopicFields) -> Vec<(u8, &[MessageRow])> {
         let of = self.rows.iter().filter(|((name, _), _)| *name == topic.0);
         let mut instances: Vec<_> = of.map(|((_, instance), rows)| (*instance, rows.as_slice())).collect();
         instances.sort_by_key(|(instance, _)| *instance);
@@ -181,7 +181,7 @@ impl Tables {
     }
 
     /// Returns true if the log has a subscription to the topic.
-    pub(super) fn announces(&self, topic: Topic) -> bool {
+    pub(super) fn announces(&self, topic: TopicFields) -> bool {
         self.announced.contains(topic.0)
     }
 
@@ -191,7 +191,7 @@ impl Tables {
     }
 
     /// Returns the messages of a topic's lowest instance.
-    pub(super) fn first(&self, topic: Topic) -> &[Row] {
+    pub(super) fn first(&self, topic: TopicFields) -> &[MessageRow] {
         self.instances(topic).first().map_or(&[], |(_, rows)| rows)
     }
 
@@ -202,19 +202,19 @@ impl Tables {
 }
 
 /// Offsets of a topic's fields in a message.
-struct Plan {
-    topic: Topic,
+struct FieldPlaces {
+    topic: TopicFields,
     places: Vec<Option<(Type, usize)>>,
 }
 
-impl Plan {
-    fn of(format: &Format) -> Option<Self> {
+impl FieldPlaces {
+    fn of(format: &UlogFormat) -> Option<Self> {
         let topic = *TOPICS.iter().find(|(name, _)| *name == format.name)?;
         let place = |name: &&str| {
             let field = format.fields.iter().find(|field| field.name == *name)?;
             Some((field.kind, field.at))
         };
-        Some(Plan { topic, places: topic.1.iter().map(place).collect() })
+        Some(FieldPlaces { topic, places: topic.1.iter().map(place).collect() })
     }
 }
 
@@ -238,12 +238,12 @@ fn number(data: &[u8], (kind, at): &(Type, usize)) -> Option<f64> {
 
 /// Selects the records that are read: damage to any other record does not matter.
 #[derive(Default)]
-struct Wanted {
+struct RecordFilter {
     ids: HashSet<[u8; 2]>,
     announced: HashSet<&'static str>,
 }
 
-impl Wanted {
+impl RecordFilter {
     fn has(&mut self, record: &[u8]) -> bool {
         let topic = |name: &[u8]| TOPICS.iter().map(|(topic, _)| *topic).find(|topic| topic.as_bytes() == name);
         match record.get(2..) {
@@ -267,32 +267,32 @@ impl Wanted {
 ///
 /// # Errors
 /// A message that says what is wrong with the file, if nothing can be read.
-pub(super) fn read(bytes: &[u8]) -> Result<Tables, String> {
-    let mut tables = Tables::default();
-    let mut plans: HashMap<u16, Option<Plan>> = HashMap::new();
+pub(super) fn read(bytes: &[u8]) -> Result<TopicTables, String> {
+    let mut tables = TopicTables::default();
+    let mut plans: HashMap<u16, Option<FieldPlaces>> = HashMap::new();
     let (mut dropouts, mut dropped_ms) = (0_u64, 0_u64);
     let (mut pieces, mut length, mut first) = (0_u64, 0, None);
-    let (mut reader, mut wanted) = (LogReader::default(), Wanted::default());
+    let (mut reader, mut wanted) = (LogReader::default(), RecordFilter::default());
     let end = each(bytes, |piece, at| {
         let entry = match piece {
-            Piece::Record(record) if !wanted.has(record) => return,
-            Piece::Record(record) => reader.entry(record).ok_or(record.len()),
-            Piece::Junk(length) => Err(length),
+            FilePiece::Record(record) if !wanted.has(record) => return,
+            FilePiece::Record(record) => reader.entry(record).ok_or(record.len()),
+            FilePiece::Junk(length) => Err(length),
         };
         match entry {
-            Ok(Entry::Message { id, topic, data }) => {
-                let plan = plans.entry(id).or_insert_with(|| Plan::of(&topic.format));
-                if let Some(Plan { topic: (name, fields), places }) = plan {
+            Ok(UlogEntry::Message { id, topic, data }) => {
+                let plan = plans.entry(id).or_insert_with(|| FieldPlaces::of(&topic.format));
+                if let Some(FieldPlaces { topic: (name, fields), places }) = plan {
                     let value = |place: &Option<_>| place.as_ref().and_then(|place| number(data, place));
                     let values = places.iter().map(|place| value(place).unwrap_or(f64::NAN)).collect();
-                    tables.rows.entry((*name, topic.instance)).or_default().push(Row { fields, values });
+                    tables.rows.entry((*name, topic.instance)).or_default().push(MessageRow { fields, values });
                 }
             }
             // Keeps the first value: a later change belongs to another flight.
-            Ok(Entry::Parameter { name, value, .. }) => {
+            Ok(UlogEntry::Parameter { name, value, .. }) => {
                 tables.parameters.entry(name.to_owned()).or_insert(value.number());
             }
-            Ok(Entry::Dropout(lost_ms)) => {
+            Ok(UlogEntry::Dropout(lost_ms)) => {
                 dropouts += 1;
                 dropped_ms += u64::from(lost_ms);
             }
@@ -306,9 +306,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Tables, String> {
     })?;
     tables.announced = wanted.announced;
     match end {
-        End::Whole => {}
-        End::Cut(at) => tables.notes.push(format!("The file ends within the record at byte {at}: it is cut.")),
-        End::Lost(at) => tables.notes.push(format!("Nothing can be read from byte {at} on.")),
+        RecordsEnd::Whole => {}
+        RecordsEnd::Cut(at) => tables.notes.push(format!("The file ends within the record at byte {at}: it is cut.")),
+        RecordsEnd::Lost(at) => tables.notes.push(format!("Nothing can be read from byte {at} on.")),
     }
     if let Some(first) = first {
         let what = format!("{pieces} pieces, {length} bytes in all, the first at byte {first}");

@@ -1,13 +1,14 @@
 //! Interprets PX4's topics in their old and new layouts.
 
 use super::table::{
-    ACTUATOR_ARMED, Row, SENSOR_BARO, SENSOR_COMBINED, SENSOR_GPS, SENSOR_MAG, Tables, Topic, VEHICLE_AIR_DATA,
-    VEHICLE_ATTITUDE, VEHICLE_GPS_POSITION, VEHICLE_LAND_DETECTED, VEHICLE_LOCAL_POSITION, VEHICLE_MAGNETOMETER,
+    ACTUATOR_ARMED, MessageRow, SENSOR_BARO, SENSOR_COMBINED, SENSOR_GPS, SENSOR_MAG, TopicFields, TopicTables,
+    VEHICLE_AIR_DATA, VEHICLE_ATTITUDE, VEHICLE_GPS_POSITION, VEHICLE_LAND_DETECTED, VEHICLE_LOCAL_POSITION,
+    VEHICLE_MAGNETOMETER,
 };
-use crate::aids::{self, Fix};
-use crate::earth::Field;
+use crate::aids::{self, ReceiverFix};
+use crate::earth::EarthField;
 use crate::order::rising;
-use crate::recording::{Aiding, LoggedReset, LoggedState, Recording, SampleSource, Sensor, flip, flip_rotation};
+use crate::recording::{AidingSample, LoggedReset, LoggedState, Recording, SampleSource, Sensor, flip, flip_rotation};
 use crate::{compass, earth, states};
 use afbc_estimator::{GeodeticOrigin, ImuSample};
 
@@ -20,11 +21,11 @@ const NOTHING: f64 = i32::MAX as f64;
 ///
 /// # Errors
 /// A message, if the log has no IMU samples.
-pub(super) fn recording(tables: &Tables) -> Result<Recording, String> {
+pub(super) fn recording(tables: &TopicTables) -> Result<Recording, String> {
     let mut recording =
         Recording { format: "PX4 ULog", notes: tables.notes.clone(), knows_origin: true, ..Recording::default() };
     recording.sources.push(imu(tables, &mut recording.imu)?);
-    let fixes = Fixes::read(tables, &mut recording.notes);
+    let fixes = ReceiverFixes::read(tables, &mut recording.notes);
     let first = aids::begin(&fixes.fixes).copied();
     recording.origin = reference(tables).or_else(|| {
         let [latitude, longitude, altitude] = first?.place;
@@ -52,7 +53,7 @@ pub(super) fn recording(tables: &Tables) -> Result<Recording, String> {
     recording.states = states::merged(attitudes, motions);
     compass::doubt(&mut recording, earth.as_ref());
     recording.resets = resets(tables);
-    let flags = |topic: Topic, of: &dyn Fn(&Row) -> bool| {
+    let flags = |topic: TopicFields, of: &dyn Fn(&MessageRow) -> bool| {
         let values = tables.first(topic).iter().map(|row| (row.timestamp_us(), of(row))).collect();
         rising(values, |(at_us, _)| *at_us).0
     };
@@ -62,9 +63,9 @@ pub(super) fn recording(tables: &Tables) -> Result<Recording, String> {
 }
 
 /// Reads the IMU samples. Each sample is the mean over its integration time, so its time is the middle of that.
-pub(super) fn imu(tables: &Tables, samples: &mut Vec<ImuSample>) -> Result<SampleSource, String> {
+pub(super) fn imu(tables: &TopicTables, samples: &mut Vec<ImuSample>) -> Result<SampleSource, String> {
     let (topic, rows) = (SENSOR_COMBINED.0, tables.first(SENSOR_COMBINED));
-    let sample = |row: &Row| {
+    let sample = |row: &MessageRow| {
         let integral = row.get("gyro_integral_dt");
         // The integration time is in microseconds; in old layouts in seconds.
         let integral_us = if integral < 1.0 { integral * 1e6 } else { integral };
@@ -102,19 +103,19 @@ pub(super) fn imu(tables: &Tables, samples: &mut Vec<ImuSample>) -> Result<Sampl
 }
 
 /// Fixes of the receiver that has the most.
-struct Fixes {
+struct ReceiverFixes {
     topic: &'static str,
-    fixes: Vec<Fix>,
+    fixes: Vec<ReceiverFix>,
     raw: usize,
     /// UTC time of the last message that states it \[us\].
     utc_us: Option<f64>,
 }
 
-impl Fixes {
+impl ReceiverFixes {
     /// Reads the fixes from `vehicle_gps_position`, which EKF2 used, from one receiver or several. Logs without that
     /// topic have the receivers' `sensor_gps`.
-    fn read(tables: &Tables, notes: &mut Vec<String>) -> Self {
-        let mut best = Fixes { topic: VEHICLE_GPS_POSITION.0, fixes: Vec::new(), raw: 0, utc_us: None };
+    fn read(tables: &TopicTables, notes: &mut Vec<String>) -> Self {
+        let mut best = ReceiverFixes { topic: VEHICLE_GPS_POSITION.0, fixes: Vec::new(), raw: 0, utc_us: None };
         for topic in [VEHICLE_GPS_POSITION, SENSOR_GPS] {
             let instances = tables.instances(topic);
             let mut used = 0;
@@ -122,7 +123,7 @@ impl Fixes {
                 let fixes: Vec<_> = rows.iter().filter_map(fix).collect();
                 if fixes.len() > best.fixes.len() || best.raw == 0 {
                     let utc_us = rows.iter().map(|row| row.get("time_utc_usec")).rfind(|utc_us| *utc_us > 0.0);
-                    best = Fixes { topic: topic.0, fixes, raw: rows.len(), utc_us };
+                    best = ReceiverFixes { topic: topic.0, fixes, raw: rows.len(), utc_us };
                     used = *instance;
                 }
             }
@@ -139,7 +140,7 @@ impl Fixes {
 }
 
 /// Returns the row as a fix, if it is three-dimensional.
-fn fix(row: &Row) -> Option<Fix> {
+fn fix(row: &MessageRow) -> Option<ReceiverFix> {
     // New layouts have degrees and metres, old ones 1e-7 degrees and millimetres.
     let either = |new: &str, old: &str, scale: f64| {
         let new = row.get(new);
@@ -153,7 +154,7 @@ fn fix(row: &Row) -> Option<Fix> {
     let velocity_m_s = row.vector(["vel_n_m_s", "vel_e_m_s", "vel_d_m_s"]);
     // NaN makes this true: in a layout without the flag every velocity is valid.
     let is_valid = velocity_m_s.iter().all(|speed| speed.is_finite()) && row.get("vel_ned_valid") != 0.0;
-    let fix = Fix {
+    let fix = ReceiverFix {
         arrived_us: row.timestamp_us(),
         place,
         velocity_m_s: is_valid.then_some(velocity_m_s),
@@ -165,34 +166,34 @@ fn fix(row: &Row) -> Option<Fix> {
 }
 
 /// Returns the first reference of the log's local position, so that both estimates have the same origin.
-fn reference(tables: &Tables) -> Option<GeodeticOrigin> {
+fn reference(tables: &TopicTables) -> Option<GeodeticOrigin> {
     tables.first(VEHICLE_LOCAL_POSITION).iter().find_map(own_origin)
 }
 
-fn own_origin(row: &Row) -> Option<GeodeticOrigin> {
+fn own_origin(row: &MessageRow) -> Option<GeodeticOrigin> {
     let [latitude, longitude, altitude] = row.vector(["ref_lat", "ref_lon", "ref_alt"]);
     // In old layouts the reference is zero until it is set.
     GeodeticOrigin::new(latitude, longitude, altitude).filter(|_| (latitude, longitude) != (0.0, 0.0))
 }
 
 /// Takes heights from the first topic that has any.
-fn barometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> SampleSource {
-    let air = |row: &Row| {
+fn barometer(tables: &TopicTables, all: &mut Vec<AidingSample>, delay_us: u64) -> SampleSource {
+    let air = |row: &MessageRow| {
         let height_m = row.get("baro_alt_meter");
         if height_m.is_finite() { height_m } else { height_of(row.get("baro_pressure_pa")) }
     };
-    let sensor = |row: &Row| {
+    let sensor = |row: &MessageRow| {
         let height_m = row.get("altitude");
         // Pressure is in pascals; in old layouts in hectopascals.
         let pressure = row.get("pressure");
         let pressure_pa = if pressure < 2000.0 { 100.0 * pressure } else { pressure };
         if height_m.is_finite() { height_m } else { height_of(pressure_pa) }
     };
-    let own = |value: &dyn Fn(&Row) -> f64, topic: Topic| -> Vec<Aiding> {
+    let own = |value: &dyn Fn(&MessageRow) -> f64, topic: TopicFields| -> Vec<AidingSample> {
         let rows = tables.first(topic).iter();
         rows.map(|row| aids::height(row.timestamp_us(), row.sampled_us(), value(row), delay_us)).collect()
     };
-    let combined = |row: &Row| {
+    let combined = |row: &MessageRow| {
         let at_us = relative(row, "baro_timestamp_relative")?;
         Some(aids::height(row.timestamp_us(), at_us, row.get("baro_alt_meter"), delay_us))
     };
@@ -206,20 +207,20 @@ fn barometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> SampleSou
 
 /// Takes fields from the first topic that has any, less the bias that EKF2 had learned before the flight, if the log
 /// has it.
-fn magnetometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> SampleSource {
+fn magnetometer(tables: &TopicTables, all: &mut Vec<AidingSample>, delay_us: u64) -> SampleSource {
     const GAUSS: [&str; 3] = ["magnetometer_ga[0]", "magnetometer_ga[1]", "magnetometer_ga[2]"];
     let learned = tables.parameter("EKF2_MAGBIAS_ID").is_some_and(|id| id != 0.0);
     let bias = ["EKF2_MAGBIAS_X", "EKF2_MAGBIAS_Y", "EKF2_MAGBIAS_Z"]
         .map(|name| tables.parameter(name).filter(|_| learned).unwrap_or_default());
-    let gauss = |row: &Row, names: [&str; 3]| {
+    let gauss = |row: &MessageRow, names: [&str; 3]| {
         let ([x, y, z], [dx, dy, dz]) = (row.vector(names), bias);
         [x - dx, y - dy, z - dz]
     };
-    let own = |names: [&str; 3], topic: Topic| -> Vec<Aiding> {
+    let own = |names: [&str; 3], topic: TopicFields| -> Vec<AidingSample> {
         let rows = tables.first(topic).iter();
         rows.map(|row| aids::field(row.timestamp_us(), row.sampled_us(), gauss(row, names), delay_us)).collect()
     };
-    let combined = |row: &Row| {
+    let combined = |row: &MessageRow| {
         let at_us = relative(row, "magnetometer_timestamp_relative")?;
         Some(aids::field(row.timestamp_us(), at_us, gauss(row, GAUSS), delay_us))
     };
@@ -232,8 +233,12 @@ fn magnetometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> Sample
 }
 
 /// Takes the first topic with a usable measurement. If there is none, PX4's current topic is reported as missing.
-fn first_usable(candidates: &mut [(Topic, Vec<Aiding>)], all: &mut Vec<Aiding>, sensor: Sensor) -> SampleSource {
-    let usable = |aiding: &Aiding| aiding.measurement.value.is_plausible();
+fn first_usable(
+    candidates: &mut [(TopicFields, Vec<AidingSample>)],
+    all: &mut Vec<AidingSample>,
+    sensor: Sensor,
+) -> SampleSource {
+    let usable = |aiding: &AidingSample| aiding.measurement.value.is_plausible();
     let found = candidates.iter().position(|(_, aiding)| aiding.iter().any(usable)).unwrap_or(0);
     match candidates.get_mut(found) {
         Some((topic, aiding)) => aids::collect(all, sensor, topic.0, aiding.len(), std::mem::take(aiding)),
@@ -242,7 +247,7 @@ fn first_usable(candidates: &mut [(Topic, Vec<Aiding>)], all: &mut Vec<Aiding>, 
 }
 
 /// Returns the time of a sensor's sample in an old layout's `sensor_combined`; none if the row has no new sample.
-fn relative(row: &Row, name: &str) -> Option<u64> {
+fn relative(row: &MessageRow, name: &str) -> Option<u64> {
     let relative_us = row.get(name);
     let at_us = row.get("timestamp") + relative_us;
     (relative_us < NOTHING && relative_us.abs() < 1e6 && at_us >= 0.0).then_some(at_us as u64)
@@ -254,7 +259,7 @@ fn height_of(pressure_pa: f64) -> f64 {
 }
 
 /// Returns the modelled declination at the first fix; without a fix, the declination stored in the vehicle.
-fn declination(tables: &Tables, earth: Option<&Field>, notes: &mut Vec<String>) -> f32 {
+fn declination(tables: &TopicTables, earth: Option<&EarthField>, notes: &mut Vec<String>) -> f32 {
     let stored = tables.parameter("EKF2_MAG_DECL").map(|degrees| degrees.to_radians() as f32);
     let modelled = earth.map(|field| field.declination_rad);
     modelled.or(stored.filter(|angle| angle.abs() <= core::f32::consts::PI)).unwrap_or_else(|| {
@@ -263,18 +268,18 @@ fn declination(tables: &Tables, earth: Option<&Field>, notes: &mut Vec<String>) 
     })
 }
 
-pub(super) fn attitudes(tables: &Tables) -> (Vec<LoggedState>, SampleSource) {
+pub(super) fn attitudes(tables: &TopicTables) -> (Vec<LoggedState>, SampleSource) {
     let rows = tables.first(VEHICLE_ATTITUDE);
-    let state = |row: &Row| {
+    let state = |row: &MessageRow| {
         let q = flip_rotation(["q[0]", "q[1]", "q[2]", "q[3]"].map(|name| row.get(name)))?;
         Some(LoggedState { at_us: row.sampled_us(), attitude: Some(q), ..LoggedState::default() })
     };
     states::collect(rows.iter().filter_map(state).collect(), rows.len(), Sensor::Attitude, VEHICLE_ATTITUDE.0)
 }
 
-fn motions(tables: &Tables, origin: Option<&GeodeticOrigin>) -> (Vec<LoggedState>, SampleSource) {
+fn motions(tables: &TopicTables, origin: Option<&GeodeticOrigin>) -> (Vec<LoggedState>, SampleSource) {
     let rows = tables.first(VEHICLE_LOCAL_POSITION);
-    let state = |row: &Row| {
+    let state = |row: &MessageRow| {
         let valid = |names: [&str; 2]| names.iter().all(|name| row.get(name) > 0.0);
         let velocity = flip(row.vector(["vx", "vy", "vz"]));
         // The position is relative to this row's reference, which may change in flight.
@@ -295,9 +300,9 @@ fn motions(tables: &Tables, origin: Option<&GeodeticOrigin>) -> (Vec<LoggedState
 }
 
 /// A reset counter, the counted quantity, the fields of the jump's coordinates, and their unit.
-type Counter = (&'static str, &'static str, &'static [&'static str], &'static str);
+type ResetCounter = (&'static str, &'static str, &'static [&'static str], &'static str);
 
-const COUNTERS: [Counter; 4] = [
+const COUNTERS: [ResetCounter; 4] = [
     ("xy_reset_counter", "position", &["delta_xy[0]", "delta_xy[1]"], "m"),
     ("z_reset_counter", "height", &["delta_z"], "m"),
     ("vxy_reset_counter", "velocity", &["delta_vxy[0]", "delta_vxy[1]"], "m/s"),
@@ -305,9 +310,9 @@ const COUNTERS: [Counter; 4] = [
 ];
 
 /// Returns the jumps of the log's own estimate.
-pub(super) fn resets(tables: &Tables) -> Vec<LoggedReset> {
+pub(super) fn resets(tables: &TopicTables) -> Vec<LoggedReset> {
     let mut resets = Vec::new();
-    let mut count = |rows: &[Row], counter: &str, what, unit, by: &dyn Fn(&Row) -> f64| {
+    let mut count = |rows: &[MessageRow], counter: &str, what, unit, by: &dyn Fn(&MessageRow) -> f64| {
         for (before, row) in rows.iter().zip(rows.iter().skip(1)) {
             let (old, new) = (before.get(counter), row.get(counter));
             if old.is_finite() && new.is_finite() && old != new {
@@ -317,11 +322,11 @@ pub(super) fn resets(tables: &Tables) -> Vec<LoggedReset> {
     };
     let motion = tables.first(VEHICLE_LOCAL_POSITION);
     for (counter, what, parts, unit) in COUNTERS {
-        let size = |row: &Row| libm::sqrt(parts.iter().map(|part| row.get(part) * row.get(part)).sum());
+        let size = |row: &MessageRow| libm::sqrt(parts.iter().map(|part| row.get(part) * row.get(part)).sum());
         count(motion, counter, what, unit, &size);
     }
     // The angle of a rotation from its quaternion's w.
-    let turn = |row: &Row| 2.0 * libm::acos(row.get("delta_q_reset[0]").abs().min(1.0)).to_degrees();
+    let turn = |row: &MessageRow| 2.0 * libm::acos(row.get("delta_q_reset[0]").abs().min(1.0)).to_degrees();
     count(tables.first(VEHICLE_ATTITUDE), "quat_reset_counter", "attitude", "degrees", &turn);
     resets.sort_by_key(|reset| reset.at_us);
     resets

@@ -1,7 +1,7 @@
 //! Contents of a campaign's table, for the HTML page and the terminal.
 
 use afbc_campaign::statistics::{Share, percentile};
-use afbc_campaign::{Bad, Summary, Tally};
+use afbc_campaign::{CampaignSummary, ContenderSummary, WorstFlight};
 use afbc_sim::metrics::SETTLED_S;
 
 /// Percentiles in the table.
@@ -17,7 +17,7 @@ pub(super) const HEADS: [(&str, &[&str]); 5] = [
 ];
 
 /// Returns one row of the table, with one cell per column of [`HEADS`].
-pub(super) fn cells(tally: &Tally) -> Vec<String> {
+pub(super) fn cells(tally: &ContenderSummary) -> Vec<String> {
     let Share { value, low, high } = tally.count.share();
     let at = |values: &[f64], percent: f64, scale: f64, digits: usize| match percentile(values, percent) {
         None => "-".into(),
@@ -38,12 +38,12 @@ pub(super) fn percent(share: f64) -> String {
 }
 
 /// Returns the number of flights per contender; in a shard, the number of the shard.
-pub(super) fn flights(summary: &Summary) -> u64 {
+pub(super) fn flights(summary: &CampaignSummary) -> u64 {
     summary.tallies.first().map_or(0, |tally| tally.count.flights)
 }
 
 /// Explains the columns in a few sentences.
-pub(super) fn legend(summary: &Summary) -> String {
+pub(super) fn legend(summary: &CampaignSummary) -> String {
     let lost = summary.tallies.iter().any(|tally| tally.count.kept < tally.count.flights);
     let worse = " A lost flight ranks last; \"lost\" is a percentile that is one.";
     let (worse, of) = if lost { (worse, ", of flights that were not lost") } else { ("", "") };
@@ -55,7 +55,7 @@ pub(super) fn legend(summary: &Summary) -> String {
 }
 
 /// Describes a bad flight and the command that repeats it. `target` is the campaign's name for `sitl campaign`.
-pub(super) fn bad(target: &str, tally: &Tally, bad: &Bad) -> [String; 2] {
+pub(super) fn bad(target: &str, tally: &ContenderSummary, bad: &WorstFlight) -> [String; 2] {
     let how = match &bad.lost {
         Some((time_s, reason)) => format!("lost at t = {time_s:.3} s: {reason}"),
         None => match bad.rmse_position_m {

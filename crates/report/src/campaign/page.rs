@@ -5,10 +5,10 @@ use crate::figures::Picture;
 use crate::report::{picture, sheet};
 use crate::words;
 use afbc_campaign::statistics::Share;
-use afbc_campaign::{Count, Summary};
+use afbc_campaign::{CampaignSummary, SurvivalCount};
 use maud::{Markup, html};
 
-pub(super) fn page(summary: &Summary, figures: &[Picture]) -> String {
+pub(super) fn page(summary: &CampaignSummary, figures: &[Picture]) -> String {
     let manifest = &summary.manifest;
     let title = if manifest.description.is_empty() { &manifest.name } else { &manifest.description };
     sheet(
@@ -35,7 +35,7 @@ pub(super) fn page(summary: &Summary, figures: &[Picture]) -> String {
     )
 }
 
-fn results(summary: &Summary) -> Markup {
+fn results(summary: &CampaignSummary) -> Markup {
     html! {
         table {
             thead {
@@ -52,7 +52,7 @@ fn results(summary: &Summary) -> Markup {
 }
 
 /// Formats the share of flights that were not lost, with its 95 % interval.
-fn not_lost(count: &Count) -> Markup {
+fn not_lost(count: &SurvivalCount) -> Markup {
     let Share { value, low, high } = count.share();
     html! {
         (percent(value))
@@ -60,7 +60,7 @@ fn not_lost(count: &Count) -> Markup {
     }
 }
 
-fn by_trajectory(summary: &Summary) -> Markup {
+fn by_trajectory(summary: &CampaignSummary) -> Markup {
     html! {
         table {
             thead { tr { td {} @for name in &summary.manifest.trajectories { th scope="col" { (name) } } } }
@@ -76,7 +76,7 @@ fn by_trajectory(summary: &Summary) -> Markup {
     }
 }
 
-fn worst(summary: &Summary) -> Markup {
+fn worst(summary: &CampaignSummary) -> Markup {
     let target = summary.manifest.target();
     html! {
         table {
@@ -95,7 +95,7 @@ fn worst(summary: &Summary) -> Markup {
     }
 }
 
-fn drawn(summary: &Summary) -> Markup {
+fn drawn(summary: &CampaignSummary) -> Markup {
     html! {
         table {
             thead {

@@ -2,37 +2,37 @@
 
 use super::cells::PERCENTS;
 use afbc_campaign::statistics::percentile;
-use afbc_campaign::{Count, Manifest, Summary, Tally};
+use afbc_campaign::{CampaignSummary, ContenderSummary, Manifest, SurvivalCount};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
 #[derive(Serialize)]
-struct Page<'a> {
+struct CampaignResultsJson<'a> {
     campaign: &'a Manifest,
-    contenders: Vec<Contender<'a>>,
+    contenders: Vec<CampaignContenderJson<'a>>,
 }
 
 #[derive(Serialize)]
-struct Contender<'a> {
+struct CampaignContenderJson<'a> {
     name: &'a str,
     #[serde(flatten)]
-    all: Success,
+    all: SuccessJson,
     tripped: u64,
-    by_trajectory: BTreeMap<&'a str, Success>,
+    by_trajectory: BTreeMap<&'a str, SuccessJson>,
     /// Percentile; null if the flight at that rank was lost.
-    rmse_position_m: Percentiles,
-    max_position_m: Percentiles,
+    rmse_position_m: PercentilesJson,
+    max_position_m: PercentilesJson,
     /// Percentiles over flights that were not lost.
-    mean_abs_du4_n: Percentiles,
-    saturated_ratio: Percentiles,
+    mean_abs_du4_n: PercentilesJson,
+    saturated_ratio: PercentilesJson,
     /// Numbers of the worst flights, worst first.
     worst_flights: Vec<u64>,
 }
 
 /// Number and share of flights that were not lost.
 #[derive(Serialize)]
-struct Success {
+struct SuccessJson {
     flights: u64,
     kept: u64,
     success_ratio: f64,
@@ -40,10 +40,10 @@ struct Success {
     success_interval_95: [f64; 2],
 }
 
-impl From<&Count> for Success {
-    fn from(count: &Count) -> Self {
+impl From<&SurvivalCount> for SuccessJson {
+    fn from(count: &SurvivalCount) -> Self {
         let share = count.share();
-        Success {
+        SuccessJson {
             flights: count.flights,
             kept: count.kept,
             success_ratio: share.value,
@@ -54,26 +54,26 @@ impl From<&Count> for Success {
 
 /// Percentiles by the nearest-rank method.
 #[derive(Serialize)]
-struct Percentiles {
+struct PercentilesJson {
     p50: Option<f64>,
     p90: Option<f64>,
     p99: Option<f64>,
 }
 
-impl From<&Vec<f64>> for Percentiles {
+impl From<&Vec<f64>> for PercentilesJson {
     fn from(sorted: &Vec<f64>) -> Self {
         let [p50, p90, p99] = PERCENTS.map(|percent| percentile(sorted, percent).filter(|value| value.is_finite()));
-        Percentiles { p50, p90, p99 }
+        PercentilesJson { p50, p90, p99 }
     }
 }
 
-fn contender<'a>(manifest: &'a Manifest, tally: &'a Tally) -> Contender<'a> {
+fn contender<'a>(manifest: &'a Manifest, tally: &'a ContenderSummary) -> CampaignContenderJson<'a> {
     let names = manifest.trajectories.iter().map(String::as_str);
-    Contender {
+    CampaignContenderJson {
         name: &tally.contender,
         all: (&tally.count).into(),
         tripped: tally.tripped,
-        by_trajectory: names.zip(tally.by_trajectory.iter().map(Success::from)).collect(),
+        by_trajectory: names.zip(tally.by_trajectory.iter().map(SuccessJson::from)).collect(),
         rmse_position_m: (&tally.rmse_position_m).into(),
         max_position_m: (&tally.max_position_m).into(),
         mean_abs_du4_n: (&tally.mean_abs_du4_n).into(),
@@ -86,9 +86,12 @@ fn contender<'a>(manifest: &'a Manifest, tally: &'a Tally) -> Contender<'a> {
 ///
 /// # Errors
 /// Fails if writing to `out` fails.
-pub fn write(out: &mut dyn Write, summary: &Summary) -> io::Result<()> {
+pub fn write(out: &mut dyn Write, summary: &CampaignSummary) -> io::Result<()> {
     let contender = |tally| contender(&summary.manifest, tally);
-    let page = Page { campaign: &summary.manifest, contenders: summary.tallies.iter().map(contender).collect() };
+    let page = CampaignResultsJson {
+        campaign: &summary.manifest,
+        contenders: summary.tallies.iter().map(contender).collect(),
+    };
     serde_json::to_writer_pretty(&mut *out, &page)?;
     writeln!(out)
 }

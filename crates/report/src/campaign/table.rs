@@ -2,13 +2,13 @@
 
 use super::cells::{HEADS, bad, cells, flights, legend};
 use crate::table::{line_width, wrap};
-use afbc_campaign::Summary;
+use afbc_campaign::CampaignSummary;
 
 /// Space between columns.
 const GAP: usize = 2;
 
 /// A group of columns with a common title.
-struct Group {
+struct ColumnGroup {
     title: &'static str,
     heads: &'static [&'static str],
     widths: Vec<usize>,
@@ -16,7 +16,7 @@ struct Group {
     first: usize,
 }
 
-impl Group {
+impl ColumnGroup {
     fn room(&self) -> usize {
         self.widths.iter().map(|width| width + GAP).sum()
     }
@@ -36,14 +36,14 @@ fn right(text: &str, to: usize) -> String {
 }
 
 /// Returns the groups; each column is as wide as its widest cell or head.
-fn groups(body: &[Vec<String>]) -> Vec<Group> {
+fn groups(body: &[Vec<String>]) -> Vec<ColumnGroup> {
     let mut first = 0;
     let mut groups = Vec::new();
     for (title, heads) in HEADS {
         let cell = |row: &Vec<String>, index: usize| row.get(index).map_or(0, |cell| width(cell));
         let widest = |index: usize| body.iter().map(|row| cell(row, index)).max().unwrap_or(0);
         let widths = heads.iter().enumerate().map(|(index, head)| widest(first + index).max(width(head))).collect();
-        let mut group = Group { title, heads, widths, first };
+        let mut group = ColumnGroup { title, heads, widths, first };
         let lacks = (width(title) + GAP).saturating_sub(group.room());
         group.widths.iter_mut().take(1).for_each(|width| *width += lacks);
         first += heads.len();
@@ -53,10 +53,10 @@ fn groups(body: &[Vec<String>]) -> Vec<Group> {
 }
 
 /// Divides the groups into tables that fit the width of a line.
-fn parts(groups: Vec<Group>, name_width: usize) -> Vec<Vec<Group>> {
-    let mut parts: Vec<Vec<Group>> = Vec::new();
+fn parts(groups: Vec<ColumnGroup>, name_width: usize) -> Vec<Vec<ColumnGroup>> {
+    let mut parts: Vec<Vec<ColumnGroup>> = Vec::new();
     for group in groups {
-        let used = |part: &Vec<Group>| name_width + part.iter().map(Group::room).sum::<usize>();
+        let used = |part: &Vec<ColumnGroup>| name_width + part.iter().map(ColumnGroup::room).sum::<usize>();
         match parts.last_mut().filter(|part| used(part) + group.room() <= line_width()) {
             Some(part) => part.push(group),
             None => parts.push(vec![group]),
@@ -67,20 +67,20 @@ fn parts(groups: Vec<Group>, name_width: usize) -> Vec<Vec<Group>> {
 
 /// Formats the results of every contender, and the worst flight of each with the command that repeats it. `target` is
 /// the campaign's name for `sitl campaign`.
-pub fn table(summary: &Summary, target: &str) -> String {
+pub fn table(summary: &CampaignSummary, target: &str) -> String {
     let manifest = &summary.manifest;
     let mut lines = vec![format!("{}: {} flights each", manifest.name, flights(summary))];
     let body: Vec<_> = summary.tallies.iter().map(cells).collect();
     let name_width = summary.tallies.iter().map(|tally| width(&tally.contender)).max().unwrap_or(0);
     for part in parts(groups(&body), name_width) {
-        let row = |name: &str, cells: &dyn Fn(&Group) -> String| {
+        let row = |name: &str, cells: &dyn Fn(&ColumnGroup) -> String| {
             let cells: String = part.iter().map(cells).collect();
             format!("{name:<name_width$}{cells}")
         };
         let head = row("", &|group| group.cells(group.heads.iter().copied()));
         lines.extend(["─".repeat(width(&head)), row("", &|group| right(group.title, group.room())), head]);
         for (tally, cells) in summary.tallies.iter().zip(&body) {
-            let own = |group: &Group| group.cells(cells.iter().skip(group.first).map(String::as_str));
+            let own = |group: &ColumnGroup| group.cells(cells.iter().skip(group.first).map(String::as_str));
             lines.push(row(&tally.contender, &own));
         }
     }

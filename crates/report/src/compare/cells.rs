@@ -3,12 +3,12 @@
 use crate::differences::{self, number};
 use crate::grid::{Grid, GridCell};
 use crate::words;
-use afbc_campaign::compare::{Comparison, Entry, MEASURES, Measure};
+use afbc_campaign::compare::{Comparison, ContenderFlights, MEASURES, Measure};
 use afbc_campaign::statistics::Median;
 use afbc_sim::metrics::SETTLED_S;
 
 /// Function that formats a median.
-type Shown = fn(&Median, &Measure) -> String;
+type MedianFormat = fn(&Median, &Measure) -> String;
 
 /// Formats a median without its interval.
 pub(super) fn alone(median: &Median, measure: &Measure) -> String {
@@ -17,7 +17,7 @@ pub(super) fn alone(median: &Median, measure: &Measure) -> String {
 
 /// Returns the medians of one contender, and whether each is the best of its column; `None` if a median is a lost
 /// flight's.
-pub(super) fn cells(comparison: &Comparison, entry: &Entry, shown: Shown) -> Option<Vec<GridCell>> {
+pub(super) fn cells(comparison: &Comparison, entry: &ContenderFlights, shown: MedianFormat) -> Option<Vec<GridCell>> {
     let cell = |figure: &Measure| {
         let text = shown(&entry.median(figure.value)?, figure);
         Some(GridCell { text, best: comparison.is_best(entry, figure) })
@@ -31,7 +31,7 @@ pub(super) fn cells(comparison: &Comparison, entry: &Entry, shown: Shown) -> Opt
 
 /// Returns the tables for a paper: the medians of all figures of merit, and the differences in distance.
 pub(super) fn grids(comparison: &Comparison) -> Vec<Grid> {
-    let row = |entry: &Entry| {
+    let row = |entry: &ContenderFlights| {
         let cells = cells(comparison, entry, differences::median);
         (entry.contender().title().to_owned(), cells.unwrap_or_else(|| vec!["lost".into()]))
     };
@@ -54,7 +54,7 @@ pub(super) fn heads(comparison: &Comparison) -> Vec<&'static str> {
 }
 
 /// Describes the losses of a contender.
-pub(super) fn lost(entry: &Entry) -> String {
+pub(super) fn lost(entry: &ContenderFlights) -> String {
     let of = entry.flights.len();
     let first = entry.flights.iter().find_map(|flight| flight.lost.map(|lost| (flight.seed, lost)));
     match first {

@@ -2,7 +2,7 @@
 
 use crate::differences::{self, FigureOverSeeds};
 use crate::words::measured;
-use afbc_campaign::compare::{Average, Comparison, DISTANCE, Entry, MEASURES, Measure, Outcome};
+use afbc_campaign::compare::{Average, Comparison, ContenderFlights, DISTANCE, FlightOutcome, MEASURES, Measure};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -20,7 +20,7 @@ pub(super) fn csv(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result
     csv.write_record(head.chain(["lost_at_s"]))?;
     for comparison in comparisons {
         for entry in &comparison.entries {
-            for Outcome { seed, lost, metrics, .. } in &entry.flights {
+            for FlightOutcome { seed, lost, metrics, .. } in &entry.flights {
                 let contender = entry.contender();
                 let who = [comparison.scenario.name.clone(), contender.name.clone(), contender.kind().name().into()];
                 let figures = measures.iter().map(|figure| measured(metrics, (figure.value)(metrics)));
@@ -33,14 +33,14 @@ pub(super) fn csv(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result
 }
 
 #[derive(Serialize)]
-struct Compared<'a> {
+struct ComparedJson<'a> {
     scenario: &'a str,
     against: &'a str,
-    contenders: Vec<Contender<'a>>,
+    contenders: Vec<ComparedContenderJson<'a>>,
 }
 
 #[derive(Serialize)]
-struct Contender<'a> {
+struct ComparedContenderJson<'a> {
     name: &'a str,
     controller: &'a str,
     seeds: Vec<u64>,
@@ -61,9 +61,9 @@ pub fn json(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result<()> {
     let compared = comparisons.iter().map(|comparison| {
         let figures = differences::figures(comparison, measures());
         let entries = comparison.entries.iter().zip(figures);
-        Compared {
+        ComparedJson {
             scenario: &comparison.scenario.name,
-            against: differences::against(comparison),
+            against: differences::baseline(comparison),
             contenders: entries.map(|(entry, figures)| contender(comparison, entry, figures)).collect(),
         }
     });
@@ -71,11 +71,15 @@ pub fn json(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result<()> {
     writeln!(out)
 }
 
-fn contender<'a>(comparison: &Comparison, entry: &'a Entry, figures: Vec<FigureOverSeeds>) -> Contender<'a> {
+fn contender<'a>(
+    comparison: &Comparison,
+    entry: &'a ContenderFlights,
+    figures: Vec<FigureOverSeeds>,
+) -> ComparedContenderJson<'a> {
     let averages = |part: fn(Average) -> f64| {
         MEASURES.iter().map(|figure| (figure.name, entry.average(figure.value).map(part))).collect()
     };
-    Contender {
+    ComparedContenderJson {
         name: &entry.contender().name,
         controller: entry.contender().kind().name(),
         seeds: entry.flights.iter().map(|flight| flight.seed).collect(),

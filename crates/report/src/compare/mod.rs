@@ -45,19 +45,19 @@ pub fn write(folder: &Folder, comparisons: &[Comparison]) -> Result<Vec<PathBuf>
     folder.only(&names.chain(svgs.iter().map(|(name, _)| name.as_str())).collect::<Vec<_>>())?;
 
     let mut paths = vec![
-        folder.place("comparison.csv", |out| files::csv(out, comparisons))?,
-        folder.place("comparison.json", |out| files::json(out, comparisons))?,
-        folder.place("statistics.csv", |out| differences::csv(out, comparisons, &files::measures()))?,
+        folder.write("comparison.csv", |out| files::csv(out, comparisons))?,
+        folder.write("comparison.json", |out| files::json(out, comparisons))?,
+        folder.write("statistics.csv", |out| differences::csv(out, comparisons, &files::measures()))?,
     ];
     for (name, format) in [("tables.md", TableFormat::Markdown), ("tables.tex", TableFormat::Latex)] {
         let text = tables(comparisons, format);
-        paths.push(folder.place(name, |out| out.write_all(text.as_bytes()))?);
+        paths.push(folder.write(name, |out| out.write_all(text.as_bytes()))?);
     }
     for (name, svg) in &svgs {
-        paths.push(folder.place(name, |out| out.write_all(svg.as_bytes()))?);
+        paths.push(folder.write(name, |out| out.write_all(svg.as_bytes()))?);
     }
     let page = page::page(comparisons, &sets);
-    paths.push(folder.place("report.html", |out| out.write_all(page.as_bytes()))?);
+    paths.push(folder.write("report.html", |out| out.write_all(page.as_bytes()))?);
     Ok(paths)
 }
 

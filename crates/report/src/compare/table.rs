@@ -5,7 +5,7 @@ use crate::differences;
 use crate::grid::Grid;
 use crate::table::wrap;
 use crate::words;
-use afbc_campaign::compare::{Comparison, Entry};
+use afbc_campaign::compare::{Comparison, ContenderFlights};
 
 /// Formats one block per scenario, with one line per contender.
 pub fn table(comparisons: &[Comparison]) -> String {
@@ -22,7 +22,7 @@ pub fn table(comparisons: &[Comparison]) -> String {
 }
 
 fn block(comparison: &Comparison, lines: &mut Vec<String>) {
-    let row = |entry: &Entry| {
+    let row = |entry: &ContenderFlights| {
         let cells = cells(comparison, entry, alone).unwrap_or_default();
         (entry.contender().title().to_owned(), cells)
     };

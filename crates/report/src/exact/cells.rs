@@ -15,7 +15,7 @@ const LISTED_MAX: usize = 40;
 const RATE_HZ: f64 = 1000.0;
 
 /// Difference of one quantity between the two settings.
-pub(super) struct Row {
+pub(super) struct ExactRow {
     pub(super) name: &'static str,
     pub(super) cells: [String; 3],
 }
@@ -27,7 +27,7 @@ pub(crate) fn quantities(replay: &ExactReplay) -> impl Iterator<Item = (usize, &
 }
 
 /// Returns how far each quantity differs under the changed settings; "-" if nothing could be compared.
-pub(super) fn rows(replay: &ExactReplay, comparison: &ChangeComparison) -> Vec<Row> {
+pub(super) fn rows(replay: &ExactReplay, comparison: &ChangeComparison) -> Vec<ExactRow> {
     let row = |(index, quantity): (usize, &ReplayQuantity)| {
         let figure = comparison.figures.get(index).copied().unwrap_or_default();
         let cells = match figure.rms() {
@@ -39,7 +39,7 @@ pub(super) fn rows(replay: &ExactReplay, comparison: &ChangeComparison) -> Vec<R
                 format!("{:.3} s", figure.largest_at_s),
             ],
         };
-        Row { name: quantity.title, cells }
+        ExactRow { name: quantity.title, cells }
     };
     quantities(replay).map(row).collect()
 }
@@ -200,7 +200,7 @@ pub fn table(log: &ReplayedLog<'_>) -> String {
 }
 
 /// Returns the lines of the table.
-fn columns(rows: &[Row]) -> Vec<String> {
+fn columns(rows: &[ExactRow]) -> Vec<String> {
     let width = |text: &str| text.chars().count();
     let first = rows.iter().map(|row| width(row.name)).max().unwrap_or_default();
     let pad = |text: &str, to: usize| " ".repeat(to.saturating_sub(width(text)));

@@ -26,7 +26,7 @@ pub(super) fn csv(out: &mut dyn Write, replay: &ExactReplay) -> io::Result<()> {
 }
 
 #[derive(Serialize)]
-struct Summary<'a> {
+struct ExactReplayJson<'a> {
     log: &'a str,
     vehicle: &'a str,
     law: &'a str,
@@ -40,32 +40,32 @@ struct Summary<'a> {
     bytes: u64,
     damaged_frames: u64,
     cut_bytes: usize,
-    parameters: Vec<ParameterWords<'a>>,
+    parameters: Vec<ParameterJson<'a>>,
     same_ticks: u64,
     is_same: bool,
     problem: Option<String>,
     first_different_tick: Option<u32>,
     first_different_start: Option<u32>,
-    change: Option<Changed>,
+    change: Option<ChangedJson>,
 }
 
 #[derive(Serialize)]
-struct ParameterWords<'a> {
+struct ParameterJson<'a> {
     name: Option<&'a str>,
     value: f32,
     at_s: Option<f64>,
 }
 
 #[derive(Serialize)]
-struct Changed {
+struct ChangedJson {
     settings: Vec<String>,
     other_mode_ticks: u64,
     other_mode_from_s: Option<f64>,
-    differences: Vec<Difference>,
+    differences: Vec<DifferenceJson>,
 }
 
 #[derive(Serialize)]
-struct Difference {
+struct DifferenceJson {
     name: &'static str,
     unit: &'static str,
     ticks: u64,
@@ -82,7 +82,7 @@ pub fn json(out: &mut dyn Write, log: &ReplayedLog<'_>) -> io::Result<()> {
     let ReplayedLog { name, replay } = log;
     let first = replay.first_difference.as_ref();
     let parameters = replay.parameters.iter();
-    let summary = Summary {
+    let summary = ExactReplayJson {
         log: name,
         vehicle: &replay.vehicle,
         law: &replay.law,
@@ -97,7 +97,7 @@ pub fn json(out: &mut dyn Write, log: &ReplayedLog<'_>) -> io::Result<()> {
         damaged_frames: replay.damaged.0,
         cut_bytes: replay.cut_bytes,
         parameters: parameters
-            .map(|it| ParameterWords { name: it.name.as_deref(), value: it.value, at_s: it.at_s })
+            .map(|it| ParameterJson { name: it.name.as_deref(), value: it.value, at_s: it.at_s })
             .collect(),
         same_ticks: replay.same_ticks,
         is_same: replay.is_same(),
@@ -110,11 +110,11 @@ pub fn json(out: &mut dyn Write, log: &ReplayedLog<'_>) -> io::Result<()> {
     writeln!(out)
 }
 
-fn changed(replay: &ExactReplay, comparison: &ChangeComparison) -> Changed {
+fn changed(replay: &ExactReplay, comparison: &ChangeComparison) -> ChangedJson {
     let differences = quantities(replay).map(|(index, quantity)| {
         let figure = comparison.figures.get(index).copied().unwrap_or_default();
         let rms = figure.rms();
-        Difference {
+        DifferenceJson {
             name: quantity.name,
             unit: quantity.unit,
             ticks: figure.count,
@@ -123,7 +123,7 @@ fn changed(replay: &ExactReplay, comparison: &ChangeComparison) -> Changed {
             largest_at_s: rms.filter(|_| figure.largest > 0.0).map(|_| figure.largest_at_s),
         }
     });
-    Changed {
+    ChangedJson {
         settings: comparison.changes.iter().map(SettingChange::to_string).collect(),
         other_mode_ticks: comparison.other_mode,
         other_mode_from_s: comparison.other_mode_s,

@@ -30,13 +30,13 @@ pub fn write(folder: &Folder, log: &ReplayedLog<'_>) -> Result<Vec<PathBuf>, Err
     let names = ["change.csv", "summary.json", "report.html"].into_iter();
     folder.only(&names.chain(svgs.iter().map(String::as_str)).collect::<Vec<_>>())?;
     let mut paths = vec![
-        folder.place("change.csv", |out| files::csv(out, log.replay))?,
-        folder.place("summary.json", |out| files::json(out, log))?,
+        folder.write("change.csv", |out| files::csv(out, log.replay))?,
+        folder.write("summary.json", |out| files::json(out, log))?,
     ];
     for (name, picture) in svgs.iter().zip(&pictures) {
-        paths.push(folder.place(name, |out| out.write_all(picture.svg.as_bytes()))?);
+        paths.push(folder.write(name, |out| out.write_all(picture.svg.as_bytes()))?);
     }
     let page = page::page(log, &pictures);
-    paths.push(folder.place("report.html", |out| out.write_all(page.as_bytes()))?);
+    paths.push(folder.write("report.html", |out| out.write_all(page.as_bytes()))?);
     Ok(paths)
 }

@@ -8,9 +8,9 @@ mod packed;
 mod paths;
 mod scene;
 
-pub(crate) use chart::{ExplorableChart, LegendEntry, Pen, Span, TracePanel};
+pub(crate) use chart::{ExplorableChart, LegendEntry, LineStyle, TimeSpan, TracePanel};
 pub(crate) use paths::with_short_paths;
-pub(crate) use scene::{ExplorableScene, Place, rotors_on_a_circle_m};
+pub(crate) use scene::{ExplorableScene, TimedPose, rotors_on_a_circle_m};
 
 use maud::{Markup, PreEscaped, html};
 use serde::Serialize;

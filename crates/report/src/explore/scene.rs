@@ -1,6 +1,6 @@
 //! Interactive view of flights in space.
 
-use super::chart::Pen;
+use super::chart::LineStyle;
 use super::packed::deltas;
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -22,16 +22,16 @@ pub(crate) struct ExplorableScene {
     pub(crate) high_m: [f64; 3],
     /// Positions of the rotors in the body frame \[m\].
     pub(crate) rotors_m: Vec<[f64; 2]>,
-    pub(crate) tracks: Vec<Track>,
+    pub(crate) tracks: Vec<FlightTrack>,
 }
 
 /// The path of a vehicle, stored as differences on a grid: times in millionths of the scene's duration, positions in
 /// 2^-16 of the box's edges from its lower corner, angles in 2^-16 of a turn.
 #[derive(Serialize)]
-pub(crate) struct Track {
+pub(crate) struct FlightTrack {
     name: String,
     #[serde(flatten)]
-    pen: Pen,
+    pen: LineStyle,
     times: Vec<i64>,
     position: [Vec<i64>; 3],
     /// Roll, pitch and yaw; `None` for a reference.
@@ -39,7 +39,7 @@ pub(crate) struct Track {
 }
 
 /// Time \[s\], position \[m\], and roll, pitch and yaw \[rad\].
-pub(crate) type Place = (f64, Vector3<f64>, Vector3<f64>);
+pub(crate) type TimedPose = (f64, Vector3<f64>, Vector3<f64>);
 
 /// Returns made-up rotor positions on a circle \[m\], for a vehicle of which only the number of rotors is known.
 pub(crate) fn rotors_on_a_circle_m(count: usize) -> Vec<[f64; 2]> {
@@ -52,7 +52,10 @@ pub(crate) fn rotors_on_a_circle_m(count: usize) -> Vec<[f64; 2]> {
 
 impl ExplorableScene {
     /// Returns a scene whose box contains all these places, still without tracks; `None` for fewer than two places.
-    pub(crate) fn around<'a>(places: impl Iterator<Item = &'a Place> + Clone, rotors_m: Vec<[f64; 2]>) -> Option<Self> {
+    pub(crate) fn around<'a>(
+        places: impl Iterator<Item = &'a TimedPose> + Clone,
+        rotors_m: Vec<[f64; 2]>,
+    ) -> Option<Self> {
         places.clone().nth(1)?;
         let end_s = places.clone().map(|place| place.0).fold(0.0, f64::max);
         let limits = places.fold(None, |limits: Option<[Vector3<f64>; 2]>, place| {
@@ -85,22 +88,22 @@ impl ExplorableScene {
     }
 
     /// Adds the path of a vehicle, or of its reference, which has no attitude.
-    pub(crate) fn add(&mut self, name: String, pen: Pen, places: &[Place], is_reference: bool) {
+    pub(crate) fn add(&mut self, name: String, pen: LineStyle, places: &[TimedPose], is_reference: bool) {
         let stride = places.len().div_ceil(POINTS_MAX).max(1);
         // Keep the last place even if the stride skips it.
         let last = places.last().filter(|_| places.len() % stride != 1 && stride > 1);
-        let few: Vec<&Place> = places.iter().step_by(stride).chain(last).collect();
+        let few: Vec<&TimedPose> = places.iter().step_by(stride).chain(last).collect();
         let (low, high) = (Vector3::from(self.low_m), Vector3::from(self.high_m));
         let along = |axis: usize| {
             let [low, high] = [low, high].map(|corner| corner.get(axis).copied().unwrap_or_default());
-            let value = move |place: &&Place| place.1.get(axis).copied().unwrap_or_default();
+            let value = move |place: &&TimedPose| place.1.get(axis).copied().unwrap_or_default();
             deltas(few.iter().map(value), low, high, BOX_STEPS)
         };
         let about = |axis: usize| {
-            let value = move |place: &&Place| place.2.get(axis).copied().unwrap_or_default();
+            let value = move |place: &&TimedPose| place.2.get(axis).copied().unwrap_or_default();
             deltas(few.iter().map(value), 0.0, core::f64::consts::TAU, TURN_STEPS)
         };
-        self.tracks.push(Track {
+        self.tracks.push(FlightTrack {
             name,
             pen,
             times: deltas(few.iter().map(|place| place.0), 0.0, self.end_s, TIME_STEPS),

@@ -1,11 +1,11 @@
 //! Figures of a campaign: distributions over its flights, and losses against the drawn quantities.
 
 use super::canvas::{self, Canvas, Ink, WIDTH_PX};
-use super::panel::{BOTTOM_PX, Frame};
+use super::panel::{BOTTOM_PX, PanelFrame};
 use super::picture::Picture;
 use crate::words;
 use afbc_campaign::statistics::{Share, percentile};
-use afbc_campaign::{BINS, Count, Drawn, Summary, Tally};
+use afbc_campaign::{BINS, CampaignSummary, ContenderSummary, DrawnQuantity, SurvivalCount};
 use afbc_drawing::{PlotAxis, Point, Ticks};
 use core::ops::Range;
 
@@ -35,20 +35,21 @@ const INTERVALS_OPACITY: f64 = 0.6;
 const TOP: f64 = 104.0;
 
 /// Draws all figures of a campaign; figures without data are left out.
-pub(crate) fn draw(summary: &Summary) -> Vec<Picture> {
+pub(crate) fn draw(summary: &CampaignSummary) -> Vec<Picture> {
     let flights = summary.tallies.first().map_or(0, |tally| tally.count.flights);
     let conditions = format!("{}: {flights} flights each", summary.manifest.name);
     let lost = summary.tallies.iter().any(|tally| tally.count.kept < tally.count.flights);
     let ends = if lost { " A curve ends at the share of flights not lost." } else { "" };
-    let errors = Distribution {
+    let errors = DistributionFigure {
         title: "Position error",
         label: "root mean square distance from the reference [m]",
         values: |tally| &tally.rmse_position_m,
     };
-    let smoothness =
-        Distribution {
-            title: "Smoothness", label: "mean |ΔU₄| per step [N]", values: |tally| &tally.mean_abs_du4_n
-        };
+    let smoothness = DistributionFigure {
+        title: "Smoothness",
+        label: "mean |ΔU₄| per step [N]",
+        values: |tally| &tally.mean_abs_du4_n,
+    };
     let figure = |name, caption, svg: Option<String>| svg.map(|svg| Picture { name, caption, svg, explorable: None });
     let interval = "Pale: 95 % interval of the share. Mark: end of a curve.";
     let not_lost = if lost { " of the flights that were not lost" } else { " of the flights" };
@@ -75,12 +76,12 @@ pub(crate) fn draw(summary: &Summary) -> Vec<Picture> {
     figures.into_iter().flatten().collect()
 }
 
-fn is_spread(drawn: &Drawn) -> bool {
+fn is_spread(drawn: &DrawnQuantity) -> bool {
     drawn.ends[0] < drawn.ends[1]
 }
 
 /// Returns the contenders' names with their line styles, in the campaign's order.
-fn legend(summary: &Summary) -> Vec<(String, Ink)> {
+fn legend(summary: &CampaignSummary) -> Vec<(String, Ink)> {
     let names: Vec<&str> = summary.tallies.iter().map(|tally| tally.contender.as_str()).collect();
     names.iter().map(|name| (*name).to_owned()).zip(canvas::inks(&names, LINE_PX)).collect()
 }
@@ -95,26 +96,27 @@ fn begun(title: &'static str, conditions: &str, legend: &[(String, Ink)]) -> Can
 }
 
 /// A figure of cumulative distributions with a logarithmic value axis.
-struct Distribution {
+struct DistributionFigure {
     title: &'static str,
     label: &'static str,
-    values: fn(&Tally) -> &[f64],
+    values: fn(&ContenderSummary) -> &[f64],
 }
 
 /// One contender's distribution: a value, and the share of flights below it with the ends of its interval \[%\].
-type Curve = Vec<(f64, [f64; 3])>;
+type DistributionCurve = Vec<(f64, [f64; 3])>;
 
-impl Distribution {
+impl DistributionFigure {
     /// Draws the figure; `None` if no flight has a value.
-    fn draw(&self, summary: &Summary, conditions: &str) -> Option<String> {
+    fn draw(&self, summary: &CampaignSummary, conditions: &str) -> Option<String> {
         let range = self.range(summary)?;
-        let curves: Vec<Curve> = summary.tallies.iter().map(|tally| curve((self.values)(tally), &range)).collect();
+        let curves: Vec<DistributionCurve> =
+            summary.tallies.iter().map(|tally| curve((self.values)(tally), &range)).collect();
         let legend = legend(summary);
         let top_px = canvas::head_px(&legend);
         let mut canvas = begun(self.title, conditions, &legend);
         let place_px = [(0.0, top_px + 6.0), (WIDTH_PX - MARGIN_PX, top_px + WIDE_PX)];
         let linear = frame_in(place_px, range, 0.0..TOP);
-        let frame = Frame { x: PlotAxis { is_logarithmic: true, ..linear.x }, ..linear };
+        let frame = PanelFrame { x: PlotAxis { is_logarithmic: true, ..linear.x }, ..linear };
         let (values, shares) = (frame.x.ticks(X_TICKS), Ticks::linear(0.0, 100.0, Y_TICKS));
         mesh(&mut canvas, &frame, [&values, &shares], [self.label, "flights [%]"]);
         let opacity = INTERVAL_OPACITY.min(INTERVALS_OPACITY / legend.len() as f64);
@@ -143,7 +145,7 @@ impl Distribution {
     }
 
     /// Returns the range from the smallest value to a high percentile; the worst few flights would squeeze the rest.
-    fn range(&self, summary: &Summary) -> Option<Range<f64>> {
+    fn range(&self, summary: &CampaignSummary) -> Option<Range<f64>> {
         let finite = |tally| (self.values)(tally).iter().filter(is_shown).copied();
         let low = summary.tallies.iter().flat_map(finite).fold(f64::INFINITY, f64::min);
         let high = summary.tallies.iter().filter_map(|tally| percentile(&finite(tally).collect::<Vec<_>>(), 99.5));
@@ -157,7 +159,7 @@ fn is_shown(value: &&f64) -> bool {
 }
 
 /// Returns a curve of few points through the distribution of the sorted `values` within `range`.
-fn curve(values: &[f64], range: &Range<f64>) -> Curve {
+fn curve(values: &[f64], range: &Range<f64>) -> DistributionCurve {
     let step = (values.len() / POINTS).max(1);
     let ranks = (0..values.len()).filter(|rank| (rank + 1) % step == 0 || rank + 1 == values.len());
     let points = ranks.filter_map(|rank| {
@@ -169,7 +171,7 @@ fn curve(values: &[f64], range: &Range<f64>) -> Curve {
 }
 
 /// Returns true if one curve hides another: they coincide at half of its points or more.
-fn coincide(curve: &Curve, other: &Curve, axis: &PlotAxis) -> bool {
+fn coincide(curve: &DistributionCurve, other: &DistributionCurve, axis: &PlotAxis) -> bool {
     let at = |share: f64| other.iter().find(|(_, [of, ..])| *of >= share).map(|(value, _)| axis.at(*value));
     let same =
         |(value, [share, ..]): &&(f64, [f64; 3])| at(*share).is_some_and(|x| (x - axis.at(*value)).abs() < SAME_PX);
@@ -177,7 +179,7 @@ fn coincide(curve: &Curve, other: &Curve, axis: &PlotAxis) -> bool {
 }
 
 /// Draws the share of flights not lost against each drawn quantity, one panel per quantity.
-fn success(summary: &Summary, conditions: &str) -> String {
+fn success(summary: &CampaignSummary, conditions: &str) -> String {
     let legend = legend(summary);
     let panels: Vec<_> = summary.manifest.drawn.iter().enumerate().filter(|(_, drawn)| is_spread(drawn)).collect();
     // Many contenders side by side need wider panels.
@@ -198,7 +200,7 @@ fn success(summary: &Summary, conditions: &str) -> String {
 }
 
 /// Returns the lower end of the axis of shares \[%\], below all intervals.
-fn lowest(summary: &Summary) -> f64 {
+fn lowest(summary: &CampaignSummary) -> f64 {
     let counts = summary.tallies.iter().flat_map(|tally| tally.by_draw.iter().flatten());
     let low = counts.filter(|count| count.flights > 0).map(|count| count.share().low).fold(1.0, f64::min);
     (10.0 * low).floor().min(9.0) * 10.0
@@ -208,8 +210,8 @@ fn lowest(summary: &Summary) -> f64 {
 fn success_panel(
     canvas: &mut Canvas,
     place_px: [Point; 2],
-    drawn: &Drawn,
-    contenders: &[(Ink, Option<&[Count; BINS]>)],
+    drawn: &DrawnQuantity,
+    contenders: &[(Ink, Option<&[SurvivalCount; BINS]>)],
     bottom: f64,
 ) {
     let [low, high] = drawn.ends;
@@ -245,12 +247,12 @@ fn success_panel(
 }
 
 /// Creates a frame between two corners, with room for labels on the left and below.
-fn frame_in([(left, top), (right, bottom)]: [Point; 2], x: Range<f64>, y: Range<f64>) -> Frame {
-    Frame::new([(left + LEFT_PX, top), (right, bottom - BOTTOM_PX)], x, y)
+fn frame_in([(left, top), (right, bottom)]: [Point; 2], x: Range<f64>, y: Range<f64>) -> PanelFrame {
+    PanelFrame::new([(left + LEFT_PX, top), (right, bottom - BOTTOM_PX)], x, y)
 }
 
 /// Draws axes, grid and labels.
-fn mesh(canvas: &mut Canvas, frame: &Frame, [x_ticks, y_ticks]: [&Ticks; 2], [x_title, y_title]: [&str; 2]) {
+fn mesh(canvas: &mut Canvas, frame: &PanelFrame, [x_ticks, y_ticks]: [&Ticks; 2], [x_title, y_title]: [&str; 2]) {
     frame.grid(canvas, x_ticks, y_ticks);
     frame.bottom(canvas, x_ticks.marks().map(|(value, label)| (value, short(label))), x_title);
     frame.left(canvas, y_ticks, y_title, frame.x.from - LEFT_PX + FREE_PX);

@@ -1,7 +1,7 @@
 //! Drawing surface of a figure, in pixels, and the elements that all figures share.
 
 use super::palette::{self, BLACK, GREY};
-use crate::explore::Pen;
+use crate::explore::LineStyle;
 use afbc_drawing::{Drawing, Point, Rgb, Shape, Stroke, SvgStyle, SvgUnit, TextAnchor};
 
 /// Width of every figure.
@@ -51,9 +51,9 @@ impl Ink {
     }
 
     /// Returns the same style for the page's script.
-    pub(super) fn pen(self) -> Pen {
+    pub(super) fn pen(self) -> LineStyle {
         let (colors, width_px) = (palette::both(self.color), self.width_px);
-        Pen { colors, width_px, opacity: self.opacity, dash_px: self.dashes_px() }
+        LineStyle { colors, width_px, opacity: self.opacity, dash_px: self.dashes_px() }
     }
 }
 

@@ -6,7 +6,7 @@ use super::panel::FRAME_INK;
 use super::picture::Picture;
 use crate::differences::number;
 use crate::words;
-use afbc_campaign::compare::{Comparison, Entry, MEASURES};
+use afbc_campaign::compare::{Comparison, ContenderFlights, MEASURES};
 use afbc_drawing::TextAnchor;
 use afbc_sim::metrics::SETTLED_S;
 
@@ -33,7 +33,7 @@ pub(crate) fn draw(comparison: &Comparison) -> Option<Picture> {
         panel(&mut canvas, comparison, index, corner);
     }
     let mut caption = format!("Root mean square errors from {SETTLED_S} s to the end; shorter is better.");
-    let lost = |entry: &Entry| entry.lost() > 0;
+    let lost = |entry: &ContenderFlights| entry.lost() > 0;
     if comparison.is_repeated() && !comparison.entries.iter().all(lost) {
         caption += " Median over all seeds; thin bars: its interval of at least 95 %.";
     }
@@ -47,7 +47,7 @@ pub(crate) fn draw(comparison: &Comparison) -> Option<Picture> {
 /// Draws one error of every contender; the last argument is the panel's top left corner.
 fn panel(canvas: &mut Canvas, comparison: &Comparison, index: usize, (left_px, top_px): (f64, f64)) {
     let Some(figure) = MEASURES.get(index) else { return };
-    let median = |entry: &Entry| entry.median(figure.value);
+    let median = |entry: &ContenderFlights| entry.median(figure.value);
     let medians = || comparison.entries.iter().filter_map(median);
     let ends = medians().flat_map(|median| [median.value].into_iter().chain(median.interval.into_iter().flatten()));
     let largest = ends.filter(|end| end.is_finite()).fold(1e-9, f64::max);

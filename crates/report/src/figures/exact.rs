@@ -3,18 +3,18 @@
 use super::canvas::Ink;
 use super::marks::moments;
 use super::picture::Picture;
-use super::plotted::{LINE_PX, REFERENCE};
-use super::time_chart::{Chart, FINE_PX, Line, PLOT_PX, Panel};
+use super::plotted_flight::{LINE_PX, REFERENCE};
+use super::time_chart::{ChartLine, ChartPanel, FINE_PX, PLOT_PX, TimeChart};
 use super::{palette, reduce};
-use crate::explore::{ExplorableScene, Place, rotors_on_a_circle_m};
+use crate::explore::{ExplorableScene, TimedPose, rotors_on_a_circle_m};
 use afbc_replay::exact::{ChangeRow, ExactReplay, QUANTITIES};
 use nalgebra::Vector3;
 
 /// A panel: its label, the name of its quantity, and the factor to the panel's unit.
-type Pane = (&'static str, &'static str, f64);
+type ExactPanel = (&'static str, &'static str, f64);
 
 const DEGREES: f64 = 180.0 / core::f64::consts::PI;
-const MOTORS: [Pane; 8] = [
+const MOTORS: [ExactPanel; 8] = [
     ("ω⟨1⟩ [rad/s]", "omega1_rad_s", 1.0),
     ("ω⟨2⟩ [rad/s]", "omega2_rad_s", 1.0),
     ("ω⟨3⟩ [rad/s]", "omega3_rad_s", 1.0),
@@ -24,7 +24,7 @@ const MOTORS: [Pane; 8] = [
     ("ω⟨7⟩ [rad/s]", "omega7_rad_s", 1.0),
     ("ω⟨8⟩ [rad/s]", "omega8_rad_s", 1.0),
 ];
-const DEMANDS: [Pane; 7] = [
+const DEMANDS: [ExactPanel; 7] = [
     ("φ⟨d⟩ [°]", "roll_setpoint_rad", DEGREES),
     ("θ⟨d⟩ [°]", "pitch_setpoint_rad", DEGREES),
     ("ψ⟨d⟩ [°]", "yaw_setpoint_rad", DEGREES),
@@ -33,7 +33,7 @@ const DEMANDS: [Pane; 7] = [
     ("U⟨2⟩ [N]", "u2_n", 1.0),
     ("U⟨3⟩ [N]", "u3_n", 1.0),
 ];
-const ESTIMATE: [Pane; 6] = [
+const ESTIMATE: [ExactPanel; 6] = [
     ("x [m]", "x_m", 1.0),
     ("y [m]", "y_m", 1.0),
     ("z [m]", "z_m", 1.0),
@@ -50,13 +50,13 @@ pub(crate) fn draw(replay: &ExactReplay) -> Vec<Picture> {
     let own = Ink::new(palette::color("afbc"), LINE_PX);
     let line = |ink: Ink, is_reference: bool, value: &dyn Fn(&ChangeRow) -> Option<f64>| {
         let points = rows.iter().filter_map(|row| Some((row.time_s, value(row)?)));
-        Line { ink, points: reduce::envelope(points, end_s, ink.columns(FINE_PX)), lost_s: None, is_reference }
+        ChartLine { ink, points: reduce::envelope(points, end_s, ink.columns(FINE_PX)), lost_s: None, is_reference }
     };
-    let panel = |(label, name, factor): &Pane| {
+    let panel = |(label, name, factor): &ExactPanel| {
         let index = QUANTITIES.iter().position(|quantity| quantity.name == *name)?;
         let scaled =
             |value: Option<&f32>| value.filter(|value| value.is_finite()).map(|value| f64::from(*value) * factor);
-        let panel = Panel {
+        let panel = ChartPanel {
             label,
             zero: false,
             lines: vec![
@@ -73,7 +73,7 @@ pub(crate) fn draw(replay: &ExactReplay) -> Vec<Picture> {
         ("demands", "Demands", "Attitude that the law wants, heading, and its inputs before rotor limits.", &DEMANDS),
         ("estimate", "Estimate", "Estimated position and attitude.", &ESTIMATE),
     ] {
-        let panels: Vec<Panel> = panes.iter().filter_map(panel).collect();
+        let panels: Vec<ChartPanel> = panes.iter().filter_map(panel).collect();
         if end_s <= 0.0 || panels.is_empty() {
             continue;
         }
@@ -84,7 +84,7 @@ pub(crate) fn draw(replay: &ExactReplay) -> Vec<Picture> {
             " Thin line: the flight core is in another mode.",
         );
         let legend = vec![("as flown".to_owned(), REFERENCE), ("changed".to_owned(), own)];
-        let chart = Chart { title, conditions: &conditions, marks, end_s, legend, panels };
+        let chart = TimeChart { title, conditions: &conditions, marks, end_s, legend, panels };
         pictures.push(chart.picture(name, caption));
     }
     pictures
@@ -96,7 +96,7 @@ pub(crate) fn space(replay: &ExactReplay) -> Option<ExplorableScene> {
     let index = |name: &str| QUANTITIES.iter().position(|quantity| quantity.name == name);
     let position = [index("x_m")?, index("y_m")?, index("z_m")?];
     let attitude = [index("roll_rad")?, index("pitch_rad")?, index("yaw_rad")?];
-    let places = |values: fn(&ChangeRow) -> &[f32]| -> Vec<Place> {
+    let places = |values: fn(&ChangeRow) -> &[f32]| -> Vec<TimedPose> {
         let three = |row: &ChangeRow, [x, y, z]: [usize; 3]| {
             let value = |i: usize| values(row).get(i).filter(|value| value.is_finite()).map(|value| f64::from(*value));
             Some(Vector3::new(value(x)?, value(y)?, value(z)?))

@@ -2,8 +2,8 @@
 
 use super::marks::marks;
 use super::picture::Picture;
-use super::plotted::{LINE_PX, Plotted, REFERENCE};
-use super::time_chart::{Chart, Line, PLOT_PX, Panel};
+use super::plotted_flight::{LINE_PX, PlottedFlight, REFERENCE};
+use super::time_chart::{ChartLine, ChartPanel, PLOT_PX, TimeChart};
 use super::{canvas, trajectory};
 use crate::words;
 use afbc_sim::flight::{EstimateErrors, Sample};
@@ -12,34 +12,34 @@ use afbc_sim::metrics::tracking_error;
 use nalgebra::Vector4;
 
 /// A quantity of a log row.
-type Value = fn(&Sample) -> f64;
+type RowValue = fn(&Sample) -> f64;
 /// One of U1..U4.
-type Input = fn(&Vector4<f64>) -> f64;
+type InputValue = fn(&Vector4<f64>) -> f64;
 
 /// Fig. 5: label, actual value, reference.
-const OUTPUTS: [(&str, Value, Value); 4] = [
+const OUTPUTS: [(&str, RowValue, RowValue); 4] = [
     ("x [m]", |s| s.motion.position_m.x, |s| s.reference.position_m.x),
     ("y [m]", |s| s.motion.position_m.y, |s| s.reference.position_m.y),
     ("z [m]", |s| s.motion.position_m.z, |s| s.reference.position_m.z),
     ("ψ [rad]", |s| s.motion.attitude_rad.z, |s| s.reference.yaw_rad),
 ];
 /// Fig. 6: label, actual value, and the angle that the law demands.
-const ATTITUDE: [(&str, Value, Value); 2] = [
+const ATTITUDE: [(&str, RowValue, RowValue); 2] = [
     ("φ [rad]", |s| s.motion.attitude_rad.x, |s| s.trace.filtered[0].angle.into()),
     ("θ [rad]", |s| s.motion.attitude_rad.y, |s| s.trace.filtered[1].angle.into()),
 ];
 /// Fig. 7: label, error. No-break spaces keep the space next to a subscript.
-const ERRORS: [(&str, Value); 4] = [
+const ERRORS: [(&str, RowValue); 4] = [
     ("x⟨d⟩\u{a0}− x [m]", |s| tracking_error(s).x),
     ("y⟨d⟩\u{a0}− y [m]", |s| tracking_error(s).y),
     ("z⟨d⟩\u{a0}− z [m]", |s| tracking_error(s).z),
     ("ψ⟨d⟩\u{a0}− ψ [rad]", |s| tracking_error(s).w),
 ];
 /// A coordinate of the vehicle's own estimate: label, error and standard deviation.
-type Coordinate = (&'static str, fn(&EstimateErrors) -> f32, fn(&EstimateErrors) -> f32);
+type EstimateCoordinate = (&'static str, fn(&EstimateErrors) -> f32, fn(&EstimateErrors) -> f32);
 
 /// Errors of the estimate, which are small: in centimetres and degrees.
-const ESTIMATE: [Coordinate; 9] = [
+const ESTIMATE: [EstimateCoordinate; 9] = [
     ("x [cm]", |e| 100.0 * e.position_error_m.x, |e| 100.0 * e.position_sigma_m.x),
     ("y [cm]", |e| 100.0 * e.position_error_m.y, |e| 100.0 * e.position_sigma_m.y),
     ("z [cm]", |e| 100.0 * e.position_error_m.z, |e| 100.0 * e.position_sigma_m.z),
@@ -51,7 +51,8 @@ const ESTIMATE: [Coordinate; 9] = [
     ("about z [°]", |e| e.attitude_error_rad.z.to_degrees(), |e| e.attitude_sigma_rad.z.to_degrees()),
 ];
 /// Fig. 8: label, input.
-const INPUTS: [(&str, Input); 4] = [("U₁ [N]", |u| u.x), ("U₂ [N]", |u| u.y), ("U₃ [N]", |u| u.z), ("U₄ [N]", |u| u.w)];
+const INPUTS: [(&str, InputValue); 4] =
+    [("U₁ [N]", |u| u.x), ("U₂ [N]", |u| u.y), ("U₃ [N]", |u| u.z), ("U₄ [N]", |u| u.w)];
 
 /// Draws the figures in `names`, in that order. Each pair is a figure's name and its new name.
 pub(crate) fn named(flights: &[&ScenarioFlight], names: &[(&str, &'static str)]) -> Vec<Picture> {
@@ -72,24 +73,25 @@ pub(crate) fn draw(flights: &[&ScenarioFlight]) -> Vec<Picture> {
     let end_s = if last_s > 0.0 { last_s } else { scenario.duration_s };
     let names: Vec<&str> = flights.iter().map(|flight| flight.run.contender.name.as_str()).collect();
     let inks = canvas::inks(&names, LINE_PX);
-    let laws: Vec<Plotted> = flights.iter().zip(inks).map(|(flight, ink)| Plotted { flight, ink }).collect();
+    let laws: Vec<PlottedFlight> =
+        flights.iter().zip(inks).map(|(flight, ink)| PlottedFlight { flight, ink }).collect();
     // Draw the roughest lines first, so that they hide nothing.
-    let mut rough_first: Vec<&Plotted> = laws.iter().collect();
-    let roughness = |law: &Plotted| law.flight.run.metrics.mean_abs_delta_u.sum();
+    let mut rough_first: Vec<&PlottedFlight> = laws.iter().collect();
+    let roughness = |law: &PlottedFlight| law.flight.run.metrics.mean_abs_delta_u.sum();
     rough_first.sort_by(|a, b| roughness(b).total_cmp(&roughness(a)));
-    let each = |value: Value| rough_first.iter().map(move |law| law.line(law.ink(), end_s, value));
+    let each = |value: RowValue| rough_first.iter().map(move |law| law.line(law.ink(), end_s, value));
 
-    let reference = Plotted { flight: longest, ink: REFERENCE };
+    let reference = PlottedFlight { flight: longest, ink: REFERENCE };
     let outputs = OUTPUTS.map(|(label, value, wanted)| {
-        let wanted = Line { lost_s: None, is_reference: true, ..reference.line(REFERENCE, end_s, wanted) };
-        Panel { label, zero: false, lines: core::iter::once(wanted).chain(each(value)).collect() }
+        let wanted = ChartLine { lost_s: None, is_reference: true, ..reference.line(REFERENCE, end_s, wanted) };
+        ChartPanel { label, zero: false, lines: core::iter::once(wanted).chain(each(value)).collect() }
     });
     let attitude = ATTITUDE.map(|(label, value, wanted)| {
-        let wanted = |law: &&Plotted| Line { is_reference: true, ..law.line(law.pale(), end_s, wanted) };
-        Panel { label, zero: true, lines: rough_first.iter().map(wanted).chain(each(value)).collect() }
+        let wanted = |law: &&PlottedFlight| ChartLine { is_reference: true, ..law.line(law.pale(), end_s, wanted) };
+        ChartPanel { label, zero: true, lines: rough_first.iter().map(wanted).chain(each(value)).collect() }
     });
-    let errors = ERRORS.map(|(label, value)| Panel { label, zero: true, lines: each(value).collect() });
-    let controls = INPUTS.map(|(label, input)| Panel {
+    let errors = ERRORS.map(|(label, value)| ChartPanel { label, zero: true, lines: each(value).collect() });
+    let controls = INPUTS.map(|(label, input)| ChartPanel {
         label,
         zero: true,
         lines: rough_first.iter().map(|law| law.input(end_s, input)).collect(),
@@ -98,12 +100,12 @@ pub(crate) fn draw(flights: &[&ScenarioFlight]) -> Vec<Picture> {
     let of =
         |sample: &Sample, value: fn(&EstimateErrors) -> f32| sample.estimated.map_or(f64::NAN, |e| value(&e).into());
     let estimate = ESTIMATE.map(|(label, error, sigma)| {
-        let band = |law: &&Plotted| {
+        let band = |law: &&PlottedFlight| {
             let edge = |sign: f64| law.line(law.pale(), end_s, move |s| sign * 3.0 * of(s, sigma));
-            [1.0, -1.0].map(|sign| Line { is_reference: true, ..edge(sign) })
+            [1.0, -1.0].map(|sign| ChartLine { is_reference: true, ..edge(sign) })
         };
         let lines = rough_first.iter().flat_map(band);
-        Panel {
+        ChartPanel {
             label,
             zero: true,
             lines: lines.chain(rough_first.iter().map(|law| law.line(law.ink(), end_s, |s| of(s, error)))).collect(),
@@ -121,7 +123,7 @@ pub(crate) fn draw(flights: &[&ScenarioFlight]) -> Vec<Picture> {
     let chatter = controls.iter().any(|panel| panel.has_chatter(end_s));
     let chart = |name, caption: &str, title, legend, panels| {
         let marks = marks(scenario, end_s, PLOT_PX);
-        Chart { title, conditions: &conditions, marks, end_s, legend, panels }.picture(name, caption)
+        TimeChart { title, conditions: &conditions, marks, end_s, legend, panels }.picture(name, caption)
     };
     let jumps = if chatter { " Filled band: chatter, the input jumps between its edges." } else { "" };
     let mut pictures = vec![

@@ -8,7 +8,7 @@ use afbc_scenario::Scenario;
 
 /// An event with a label, at an instant or over an interval.
 #[derive(Clone, Debug)]
-pub(super) struct Mark {
+pub(super) struct TimeMark {
     pub(super) label: String,
     pub(super) start_s: f64,
     pub(super) end_s: f64,
@@ -24,8 +24,8 @@ pub(super) struct Mark {
     pub(super) label_px: f64,
 }
 
-impl Mark {
-    fn overlaps(&self, other: &Mark) -> bool {
+impl TimeMark {
+    fn overlaps(&self, other: &TimeMark) -> bool {
         self.is_band && other.is_band && self.start_s < other.end_s && other.start_s < self.end_s
     }
 }
@@ -34,11 +34,11 @@ impl Mark {
 pub(super) const LABEL_PX: f64 = 11.0;
 
 /// All marks of one time axis.
-pub(super) struct Marks {
+pub(super) struct TimeMarks {
     /// Changes of the vehicle or its sensors: parameters, payloads, rotor faults, outages.
-    pub(super) changes: Vec<Mark>,
+    pub(super) changes: Vec<TimeMark>,
     /// Gusts of force and of wind.
-    pub(super) gusts: Vec<Mark>,
+    pub(super) gusts: Vec<TimeMark>,
     /// Number of rows of labels.
     pub(super) lanes: usize,
     /// Explanation of the thin lines, for the caption.
@@ -47,7 +47,7 @@ pub(super) struct Marks {
 
 /// Returns the marks of `scenario` on a time axis from 0 to `end_s` that is `width_px` wide. Events with the same start
 /// and end share a mark.
-pub(super) fn marks(scenario: &Scenario, end_s: f64, width_px: f64) -> Marks {
+pub(super) fn marks(scenario: &Scenario, end_s: f64, width_px: f64) -> TimeMarks {
     let (environment, realism) = (&scenario.environment, &scenario.realism);
     let forces = environment.gusts().iter().map(|gust| {
         let (letter, index) = words::gust(gust);
@@ -78,37 +78,43 @@ pub(super) fn moments(
     end_s: f64,
     width_px: f64,
     onset: &'static str,
-) -> Marks {
+) -> TimeMarks {
     let mut moments = merged(moments.map(|(label, time_s)| (label, time_s, f64::INFINITY)), end_s, 0.5 * width_px);
     moments.iter_mut().for_each(|mark| mark.is_band = false);
     placed(Vec::new(), moments, end_s, width_px, onset)
 }
 
 /// Assigns each mark its row.
-fn placed(mut changes: Vec<Mark>, mut gusts: Vec<Mark>, end_s: f64, width_px: f64, onset: &'static str) -> Marks {
+fn placed(
+    mut changes: Vec<TimeMark>,
+    mut gusts: Vec<TimeMark>,
+    end_s: f64,
+    width_px: f64,
+    onset: &'static str,
+) -> TimeMarks {
     // Occupied intervals of each row.
     let mut lanes = Vec::new();
     for mark in gusts.iter_mut().chain(&mut changes) {
         place(mark, width_px / end_s, width_px, &mut lanes);
     }
-    Marks { changes, gusts, lanes: lanes.len(), onset }
+    TimeMarks { changes, gusts, lanes: lanes.len(), onset }
 }
 
 /// Returns sorted marks within the axis. Events with equal intervals share a mark unless its label would exceed
 /// `longest_px`.
-fn merged(intervals: impl Iterator<Item = (String, f64, f64)>, axis_end_s: f64, longest_px: f64) -> Vec<Mark> {
-    let mut marks: Vec<Mark> = Vec::new();
+fn merged(intervals: impl Iterator<Item = (String, f64, f64)>, axis_end_s: f64, longest_px: f64) -> Vec<TimeMark> {
+    let mut marks: Vec<TimeMark> = Vec::new();
     for (label, start_s, end_s) in intervals {
         let (start_s, end_s) = (start_s.max(0.0), end_s.min(axis_end_s));
         if start_s >= end_s {
             continue;
         }
         let has_room =
-            |mark: &Mark| text_width_px(&mark.label, LABEL_PX) + text_width_px(&label, LABEL_PX) < longest_px;
-        let same = |mark: &&mut Mark| mark.start_s == start_s && mark.end_s == end_s && has_room(mark);
+            |mark: &TimeMark| text_width_px(&mark.label, LABEL_PX) + text_width_px(&label, LABEL_PX) < longest_px;
+        let same = |mark: &&mut TimeMark| mark.start_s == start_s && mark.end_s == end_s && has_room(mark);
         match marks.iter_mut().find(same) {
             Some(mark) => mark.label = format!("{}, {label}", mark.label),
-            None => marks.push(Mark {
+            None => marks.push(TimeMark {
                 label,
                 start_s,
                 end_s,
@@ -126,16 +132,16 @@ fn merged(intervals: impl Iterator<Item = (String, f64, f64)>, axis_end_s: f64, 
 
 /// Assigns tints to bands. Equal labels get equal tints, and different labels different tints as far as possible.
 /// Overlapping bands never share a tint unless there are too few tints.
-fn separate(marks: &mut dyn Iterator<Item = &mut Mark>) {
+fn separate(marks: &mut dyn Iterator<Item = &mut TimeMark>) {
     let mut labels: Vec<String> = Vec::new();
-    let mut done: Vec<Mark> = Vec::new();
+    let mut done: Vec<TimeMark> = Vec::new();
     for mark in marks.filter(|mark| mark.is_band) {
         let known = labels.iter().position(|label| *label == mark.label);
         let first = known.unwrap_or(labels.len());
         if known.is_none() {
             labels.push(mark.label.clone());
         }
-        let under: Vec<&Mark> = done.iter().filter(|other| other.overlaps(mark)).collect();
+        let under: Vec<&TimeMark> = done.iter().filter(|other| other.overlaps(mark)).collect();
         let tints = TINTS.iter().cycle().skip(first % TINTS.len()).take(TINTS.len());
         let free = tints.clone().find(|tint| under.iter().all(|other| other.tint != **tint));
         mark.tint = *free.or(tints.clone().next()).unwrap_or(&mark.tint);
@@ -145,7 +151,7 @@ fn separate(marks: &mut dyn Iterator<Item = &mut Mark>) {
 }
 
 /// Puts `mark` into the lowest row with room for its band and label. The label is on its band, or next to a short band.
-fn place(mark: &mut Mark, px_per_s: f64, width_px: f64, lanes: &mut Vec<Vec<(f64, f64)>>) {
+fn place(mark: &mut TimeMark, px_per_s: f64, width_px: f64, lanes: &mut Vec<Vec<(f64, f64)>>) {
     let half = (0.5 * text_width_px(&mark.label, LABEL_PX) + 3.0).min(0.5 * width_px);
     let (start_px, end_px) = (mark.start_s * px_per_s, mark.end_s * px_per_s);
     let end_px = if mark.is_band { end_px } else { start_px };

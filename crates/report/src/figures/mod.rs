@@ -15,7 +15,7 @@ mod marks;
 mod palette;
 mod panel;
 mod picture;
-mod plotted;
+mod plotted_flight;
 mod reduce;
 #[cfg(feature = "replays")]
 pub(super) mod replay;

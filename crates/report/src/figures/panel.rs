@@ -21,15 +21,15 @@ const BOX_INK: Ink = Ink::new(FRAME, 0.25);
 
 /// Position of a panel's plot, and its axes.
 #[derive(Clone, Copy)]
-pub(super) struct Frame {
+pub(super) struct PanelFrame {
     pub(super) x: PlotAxis,
     pub(super) y: PlotAxis,
 }
 
-impl Frame {
+impl PanelFrame {
     /// Creates a frame between its top left and bottom right corner.
     pub(super) fn new([(left, top), (right, bottom)]: [Point; 2], x: Range<f64>, y: Range<f64>) -> Self {
-        Frame {
+        PanelFrame {
             x: PlotAxis { low: x.start, high: x.end, from: left, to: right, is_logarithmic: false },
             y: PlotAxis { low: y.start, high: y.end, from: bottom, to: top, is_logarithmic: false },
         }
@@ -57,7 +57,7 @@ impl Frame {
 
     /// Draws the box around the plot.
     pub(super) fn outline(&self, canvas: &mut Canvas) {
-        let Frame { x, y } = self;
+        let PanelFrame { x, y } = self;
         canvas.line([(x.from, y.to), (x.to, y.to), (x.to, y.from), (x.from, y.from), (x.from, y.to)], BOX_INK);
     }
 

@@ -1,12 +1,12 @@
 //! Figures of panels above each other with a common time axis.
 
 use super::canvas::{self, Canvas, Ink, WIDTH_PX};
-use super::marks::{LABEL_PX, Mark, Marks};
+use super::marks::{LABEL_PX, TimeMark, TimeMarks};
 use super::palette::{self, EDGE, GREY};
-use super::panel::{BOTTOM_PX, FRAME_INK, Frame};
+use super::panel::{BOTTOM_PX, FRAME_INK, PanelFrame};
 use super::picture::{CROSS, Picture};
 use super::reduce::{clip, envelope, simplify};
-use crate::explore::{Explorable, ExplorableChart, LegendEntry, Span, TracePanel};
+use crate::explore::{Explorable, ExplorableChart, LegendEntry, TimeSpan, TracePanel};
 use afbc_drawing::TextAnchor;
 use core::ops::Range;
 
@@ -40,7 +40,7 @@ const BAND_END: Ink = Ink { opacity: 0.5, ..ONSET };
 const BAND_OPACITY: f64 = 0.6;
 
 /// A value over time.
-pub(super) struct Line {
+pub(super) struct ChartLine {
     pub(super) ink: Ink,
     /// Points with increasing time, reduced for [`FINE_PX`].
     pub(super) points: Vec<(f64, f64)>,
@@ -51,15 +51,15 @@ pub(super) struct Line {
 }
 
 /// A panel with one quantity.
-pub(super) struct Panel {
+pub(super) struct ChartPanel {
     pub(super) label: &'static str,
     /// Whether to draw a line at zero.
     pub(super) zero: bool,
     /// Lines from back to front.
-    pub(super) lines: Vec<Line>,
+    pub(super) lines: Vec<ChartLine>,
 }
 
-impl Panel {
+impl ChartPanel {
     /// Returns true if a line chatters so much that it fills a band: in at least a twentieth of the columns, its height
     /// is several line widths.
     pub(super) fn has_chatter(&self, end_s: f64) -> bool {
@@ -80,17 +80,17 @@ impl Panel {
 }
 
 /// A whole figure.
-pub(super) struct Chart<'a> {
+pub(super) struct TimeChart<'a> {
     pub(super) title: &'static str,
     pub(super) conditions: &'a str,
     /// Events to mark, laid out for the width of a plot.
-    pub(super) marks: Marks,
+    pub(super) marks: TimeMarks,
     pub(super) end_s: f64,
     pub(super) legend: Vec<(String, Ink)>,
-    pub(super) panels: Vec<Panel>,
+    pub(super) panels: Vec<ChartPanel>,
 }
 
-impl Chart<'_> {
+impl TimeChart<'_> {
     /// Returns the figure; its caption is completed by an explanation of the marks.
     pub(super) fn picture(&self, name: &'static str, caption: &str) -> Picture {
         let (svg, words) = (self.svg(), self.words());
@@ -109,7 +109,7 @@ impl Chart<'_> {
         if all.any(|mark| mark.is_band) {
             words += " Shaded: duration of the event named above.";
         }
-        let losses = |panel: &Panel| {
+        let losses = |panel: &ChartPanel| {
             let range = range(&panel.lines, LEAST_ROOM);
             let lost = panel.lines.iter().filter(|line| line.lost_s.is_some() && !line.is_reference);
             let ends: Vec<_> = lost.filter_map(|line| line.points.last()).map(|(_, v)| range.contains(v)).collect();
@@ -128,7 +128,7 @@ impl Chart<'_> {
     /// Returns the same chart for the page's script.
     fn explorable(&self) -> ExplorableChart {
         let legend = self.legend.iter().map(|(name, ink)| LegendEntry { name: name.clone(), pen: ink.pen() });
-        let panel = |panel: &Panel| {
+        let panel = |panel: &ChartPanel| {
             let range = range(&panel.lines, LEAST_ROOM);
             let label = panel.label.to_owned();
             let mut traced = TracePanel { label, low: range.start, high: range.end, traces: Vec::new() };
@@ -141,7 +141,7 @@ impl Chart<'_> {
             }
             traced
         };
-        let span = |mark: &Mark| Span {
+        let span = |mark: &TimeMark| TimeSpan {
             label: mark.label.clone(),
             start_s: mark.start_s,
             end_s: if mark.is_band { mark.end_s } else { mark.start_s },
@@ -168,13 +168,13 @@ impl Chart<'_> {
     }
 
     /// Draws one panel with its top at `y_px`; the last panel has the time axis.
-    fn panel(&self, canvas: &mut Canvas, panel: &Panel, y_px: f64, is_last: bool) {
+    fn panel(&self, canvas: &mut Canvas, panel: &ChartPanel, y_px: f64, is_last: bool) {
         let (marks, end_s) = (&self.marks, self.end_s);
         let plot_height_px = PANEL_PX - GAP_PX;
         let range = range(&panel.lines, LEAST_ROOM);
         let (low, high) = (range.start, range.end);
         let corners = [(LEFT_PX, y_px), (WIDTH_PX - RIGHT_PX, y_px + plot_height_px)];
-        let frame = Frame::new(corners, 0.0..end_s, range);
+        let frame = PanelFrame::new(corners, 0.0..end_s, range);
         let (times, values) = (frame.x.ticks(T_TICKS), frame.y.ticks(Y_TICKS));
 
         let bands = || marks.changes.iter().chain(&marks.gusts).filter(|mark| mark.is_band);
@@ -199,7 +199,7 @@ impl Chart<'_> {
         }
 
         let scale = (PLOT_PX / end_s, plot_height_px / (high - low));
-        for Line { ink, points, lost_s, is_reference } in &panel.lines {
+        for ChartLine { ink, points, lost_s, is_reference } in &panel.lines {
             let pieces = clip(&envelope(points.iter().copied(), end_s, ink.columns(PLOT_PX)), low, high);
             for piece in &pieces {
                 canvas.line(frame.all(&simplify(piece, scale, 0.2)), *ink);
@@ -237,7 +237,7 @@ impl Chart<'_> {
 /// Returns the value range of a panel: all values of the references and the surviving flights. A lost flight counts
 /// until shortly before its end, and extends the range to at most three times the others' range. If all vehicles are
 /// lost, the range is not limited.
-pub(super) fn range(lines: &[Line], least_room: f64) -> Range<f64> {
+pub(super) fn range(lines: &[ChartLine], least_room: f64) -> Range<f64> {
     let all = extent(lines.iter());
     let survived = lines.iter().any(|line| line.lost_s.is_none() && !line.is_reference);
     let others = extent(lines.iter().filter(|line| line.lost_s.is_none()));
@@ -254,7 +254,7 @@ pub(super) fn range(lines: &[Line], least_room: f64) -> Range<f64> {
 }
 
 /// Returns the smallest and largest value of some lines, if there are any.
-fn extent<'a>(lines: impl Iterator<Item = &'a Line>) -> Option<(f64, f64)> {
+fn extent<'a>(lines: impl Iterator<Item = &'a ChartLine>) -> Option<(f64, f64)> {
     let mut extent = None;
     for line in lines {
         // A lost flight counts until one second before its end, or 90 % of a flight shorter than 10 s.

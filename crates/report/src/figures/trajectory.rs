@@ -1,12 +1,12 @@
 //! A figure of the flights in space: a box seen from above its front right corner.
 
 use super::canvas::{self, Canvas, Ink, WIDTH_PX};
-use super::marks::{LABEL_PX, Mark, marks};
+use super::marks::{LABEL_PX, TimeMark, marks};
 use super::palette::{BLACK, FRAME, GREY, GRID};
 use super::picture::{CROSS, Picture};
-use super::plotted::{Plotted, REFERENCE};
+use super::plotted_flight::{PlottedFlight, REFERENCE};
 use super::reduce::simplify;
-use super::time_chart::{Line, PLOT_PX, range};
+use super::time_chart::{ChartLine, PLOT_PX, range};
 use crate::explore::{Explorable, ExplorableScene};
 use afbc_drawing::{Point, Rgb, TextAnchor, Ticks};
 use afbc_sim::flight::Sample;
@@ -28,7 +28,7 @@ const AZIMUTH_RAD: f64 = -0.96;
 const ELEVATION_RAD: f64 = 0.42;
 
 /// The box and its projection.
-struct View {
+struct BoxProjection {
     low_m: Vector3<f64>,
     high_m: Vector3<f64>,
     /// Drawn lengths of the edges, in a common unit.
@@ -37,7 +37,7 @@ struct View {
     middle_px: (f64, f64),
 }
 
-impl View {
+impl BoxProjection {
     /// Creates a view of the box between two corners, moved down by `below_px`. The floor is true to scale unless an
     /// edge would become too short.
     fn new(low_m: Vector3<f64>, high_m: Vector3<f64>, below_px: f64) -> Self {
@@ -45,12 +45,17 @@ impl View {
         let longer = span.x.max(span.y);
         let edges = Vector3::new((span.x / longer).max(0.5), (span.y / longer).max(0.5), BOX_HEIGHT);
         let [left, top, width, height] = ROOM_PX;
-        let view =
-            View { low_m, high_m, edges, px: 1.0, middle_px: (left + 0.5 * width, top + below_px + 0.5 * height) };
+        let view = BoxProjection {
+            low_m,
+            high_m,
+            edges,
+            px: 1.0,
+            middle_px: (left + 0.5 * width, top + below_px + 0.5 * height),
+        };
         // Outermost corners of the outline, relative to the centre.
         let (right, _) = view.direction(Vector3::new(0.5, 0.5, 0.0));
         let (_, down) = view.direction(Vector3::new(0.5, -0.5, -0.5));
-        View { px: (0.5 * width / right).min(0.5 * height / down), ..view }
+        BoxProjection { px: (0.5 * width / right).min(0.5 * height / down), ..view }
     }
 
     /// Projects a vector, given in edges of the box, to the picture: right and down.
@@ -76,7 +81,7 @@ impl View {
 
 /// Draws the flights of `laws`, and the reference of the longest flight.
 pub(super) fn picture(
-    laws: &[Plotted],
+    laws: &[PlottedFlight],
     longest: &ScenarioFlight,
     conditions: &str,
     mut legend: Vec<(String, Ink)>,
@@ -85,7 +90,7 @@ pub(super) fn picture(
     let end_s = longest.run.log.last().map_or(0.0, |last| last.time_s);
     let range_along = |axis: Vector3<f64>| {
         let flown = laws.iter().map(|law| law.line(law.ink(), end_s, |s| s.motion.position_m.dot(&axis)));
-        let wanted = laws.iter().map(|law| Line {
+        let wanted = laws.iter().map(|law| ChartLine {
             is_reference: true,
             lost_s: None,
             ..law.line(REFERENCE, end_s, |s| s.reference.position_m.dot(&axis))
@@ -95,8 +100,8 @@ pub(super) fn picture(
     let ranges = [Vector3::x(), Vector3::y(), Vector3::z()].map(range_along);
     let marks = marks(scenario, end_s, PLOT_PX);
     // Where bands overlap, the lower ones are wider.
-    let band = |change: &Mark| Ink::new(change.tint, BAND_PX + 6.0 * change.depth as f64);
-    let mut changes: Vec<&Mark> = marks.changes.iter().collect();
+    let band = |change: &TimeMark| Ink::new(change.tint, BAND_PX + 6.0 * change.depth as f64);
+    let mut changes: Vec<&TimeMark> = marks.changes.iter().collect();
     for (i, change) in changes.iter().enumerate() {
         if changes.iter().take(i).all(|other| (&other.label, other.tint) != (&change.label, change.tint)) {
             legend.push((change.label.clone(), Ink::new(change.tint, BAND_PX)));
@@ -105,7 +110,7 @@ pub(super) fn picture(
     changes.sort_by_key(|change| core::cmp::Reverse(change.depth));
     let (mut bands, mut crosses) = (false, false);
     let below_px = canvas::head_px(&legend) - canvas::head_px(&[]);
-    let view = View::new(
+    let view = BoxProjection::new(
         Vector3::from(ranges.each_ref().map(|range| range.start)),
         Vector3::from(ranges.each_ref().map(|range| range.end)),
         below_px,
@@ -150,7 +155,7 @@ pub(super) fn picture(
 }
 
 /// Returns the same flights for the page's script.
-fn scene(laws: &[Plotted], longest: &ScenarioFlight, view: &View) -> ExplorableScene {
+fn scene(laws: &[PlottedFlight], longest: &ScenarioFlight, view: &BoxProjection) -> ExplorableScene {
     let scenario = &longest.scenario;
     let arm_m = scenario.vehicle.arm_m;
     let end_s = longest.run.log.last().map_or(0.0, |last| last.time_s);
@@ -175,7 +180,11 @@ fn scene(laws: &[Plotted], longest: &ScenarioFlight, view: &View) -> ExplorableS
 
 /// Draws labelled dots at the `places` that are in the box. Dots at the same position share one label. Returns the
 /// number of places in the box.
-fn dot_all<'a>(canvas: &mut Canvas, view: &View, places: impl Iterator<Item = (Vector3<f64>, &'a str)>) -> usize {
+fn dot_all<'a>(
+    canvas: &mut Canvas,
+    view: &BoxProjection,
+    places: impl Iterator<Item = (Vector3<f64>, &'a str)>,
+) -> usize {
     let mut dots: Vec<(Point, String)> = Vec::new();
     let mut count = 0;
     for (place, label) in places.filter(|(place, _)| view.contains(place)) {
@@ -193,7 +202,7 @@ fn dot_all<'a>(canvas: &mut Canvas, view: &View, places: impl Iterator<Item = (V
 }
 
 /// Draws a dot with a label on the side away from the centre.
-fn dot(canvas: &mut Canvas, view: &View, (x, y): Point, label: &str) {
+fn dot(canvas: &mut Canvas, view: &BoxProjection, (x, y): Point, label: &str) {
     let (dx, dy) = (x - view.middle_px.0, y - view.middle_px.1);
     let away = 15.0 / libm::hypot(dx, dy).max(1.0);
     canvas.dot((x, y), 3.0, BLACK);
@@ -203,7 +212,7 @@ fn dot(canvas: &mut Canvas, view: &View, (x, y): Point, label: &str) {
 
 /// Draws a path up to where it first leaves the box. Repeated laps are drawn once. Returns whether any of it is in the
 /// box.
-fn path(canvas: &mut Canvas, view: &View, places: impl Iterator<Item = Vector3<f64>>, ink: Ink) -> bool {
+fn path(canvas: &mut Canvas, view: &BoxProjection, places: impl Iterator<Item = Vector3<f64>>, ink: Ink) -> bool {
     let mut inked = HashSet::new();
     let mut pieces = Vec::new();
     let mut piece = Vec::new();
@@ -231,7 +240,7 @@ fn path(canvas: &mut Canvas, view: &View, places: impl Iterator<Item = Vector3<f
 }
 
 /// Draws the floor and the back walls with grid, numbers and names of the axes.
-fn furniture(canvas: &mut Canvas, view: &View) {
+fn furniture(canvas: &mut Canvas, view: &BoxProjection) {
     let (low, high) = (view.low_m, view.high_m);
     let line = |canvas: &mut Canvas, a: Vector3<f64>, b: Vector3<f64>, color: Rgb| {
         canvas.line([view.at(a), view.at(b)], Ink::new(color, 0.75));

@@ -31,8 +31,9 @@ use std::path::PathBuf;
 pub fn write(folder: &Folder, flown: &[ScenarioFlight], claims: &[Claim]) -> Result<Vec<PathBuf>, Error> {
     let groups = groups::groups(flown);
     let sets: Vec<_> = groups.iter().map(|group| figures::flights::draw(&group.flights)).collect();
-    let svg_name =
-        |group: &groups::Group<'_>, figure: &figures::Picture| format!("{}{}.svg", group.figure_prefix, figure.name);
+    let svg_name = |group: &groups::ScenarioGroup<'_>, figure: &figures::Picture| {
+        format!("{}{}.svg", group.figure_prefix, figure.name)
+    };
     let mut names = vec!["summary.json".to_owned(), "report.html".to_owned()];
     for (group, figures) in groups.iter().zip(&sets) {
         names.extend(group.csv_names.iter().cloned());
@@ -43,14 +44,14 @@ pub fn write(folder: &Folder, flown: &[ScenarioFlight], claims: &[Claim]) -> Res
     let mut paths = Vec::new();
     for (group, figures) in groups.iter().zip(&sets) {
         for (flight, name) in group.flights.iter().zip(&group.csv_names) {
-            paths.push(folder.place(name, |out| csv::write(out, flight))?);
+            paths.push(folder.write(name, |out| csv::write(out, flight))?);
         }
         for figure in figures {
-            paths.push(folder.place(&svg_name(group, figure), |out| out.write_all(figure.svg.as_bytes()))?);
+            paths.push(folder.write(&svg_name(group, figure), |out| out.write_all(figure.svg.as_bytes()))?);
         }
     }
-    paths.push(folder.place("summary.json", |out| summary::write(out, flown))?);
+    paths.push(folder.write("summary.json", |out| summary::write(out, flown))?);
     let page = report::page(&groups, &sets, claims);
-    paths.push(folder.place("report.html", |out| out.write_all(page.as_bytes()))?);
+    paths.push(folder.write("report.html", |out| out.write_all(page.as_bytes()))?);
     Ok(paths)
 }

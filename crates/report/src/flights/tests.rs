@@ -274,7 +274,7 @@ fn a_full_disk_says_free_some_space() {
     let full = || fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     // Write to a full disk; `wrap` wraps the error as the library does.
     let fill = |name: &str, wrap: &dyn Fn(&mut dyn io::Write) -> io::Result<()>| {
-        let mut disk = afbc_files::Disk { file: full(), failure: None };
+        let mut disk = afbc_files::CheckedFile { file: full(), failure: None };
         let failed = wrap(&mut disk).unwrap_err();
         folder.error(name, disk.cause(failed)).to_string()
     };

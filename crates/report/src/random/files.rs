@@ -1,9 +1,9 @@
 //! Writes `flights.csv` and `random.json`.
 
-use super::Judged;
-use super::judged::Group;
+use super::RandomResults;
+use super::results::VehicleGroup;
 use crate::words::measured;
-use afbc_campaign::compare::Outcome;
+use afbc_campaign::compare::FlightOutcome;
 use afbc_campaign::random::{Ranking, is_level};
 use serde::Serialize;
 use std::io::{self, Write};
@@ -36,7 +36,7 @@ const FLOWN: [&str; 10] = [
 ];
 
 /// Writes one row per flight of each contender. A lost flight's figures cover the time until the loss.
-pub(super) fn csv(out: &mut dyn Write, judged: &Judged<'_>) -> io::Result<()> {
+pub(super) fn csv(out: &mut dyn Write, judged: &RandomResults<'_>) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     csv.write_record(FLIGHT.into_iter().chain(FLOWN))?;
     for flown in judged.flown {
@@ -54,7 +54,7 @@ pub(super) fn csv(out: &mut dyn Write, judged: &Judged<'_>) -> io::Result<()> {
             flight.scenario.description.clone(),
         ];
         for (contender, outcome) in judged.contenders().iter().zip(&flown.outcomes) {
-            let Outcome { lost, tripped, metrics, .. } = outcome;
+            let FlightOutcome { lost, tripped, metrics, .. } = outcome;
             let rms_m = metrics.rmse.xyz().norm();
             let level = lost.is_none() && best_m.is_some_and(|best_m| is_level(rms_m, best_m));
             let none = || [String::new(), String::new()];
@@ -79,27 +79,27 @@ pub(super) fn csv(out: &mut dyn Write, judged: &Judged<'_>) -> io::Result<()> {
 }
 
 #[derive(Serialize)]
-struct Whole<'a> {
+struct RandomSuiteJson<'a> {
     suite: &'static str,
     first_seed: u64,
     seeds: u64,
     flights_per_vehicle: u64,
     sensors: &'static str,
     against: &'a str,
-    groups: Vec<GroupWords<'a>>,
+    groups: Vec<VehicleGroupJson<'a>>,
 }
 
 #[derive(Serialize)]
-struct GroupWords<'a> {
+struct VehicleGroupJson<'a> {
     /// Name of the vehicle; null for all vehicles together.
     vehicle: Option<&'a str>,
     flights: usize,
     lost_by_all: &'a [&'a str],
-    contenders: Vec<Words<'a>>,
+    contenders: Vec<RankedContenderJson<'a>>,
 }
 
 #[derive(Serialize)]
-struct Words<'a> {
+struct RankedContenderJson<'a> {
     name: &'a str,
     controller: &'static str,
     best_or_level: usize,
@@ -108,11 +108,11 @@ struct Words<'a> {
     lost_alone: usize,
     median_m: Option<f64>,
     geometric_mean_m: Option<f64>,
-    log_difference: Option<Paired>,
+    log_difference: Option<PairedJson>,
 }
 
 #[derive(Serialize)]
-struct Paired {
+struct PairedJson {
     flights: usize,
     mean: f64,
     interval_95: Option<[f64; 2]>,
@@ -125,25 +125,25 @@ struct Paired {
 ///
 /// # Errors
 /// Fails if writing to `out` fails.
-pub fn json(out: &mut dyn Write, judged: &Judged<'_>) -> io::Result<()> {
+pub fn json(out: &mut dyn Write, judged: &RandomResults<'_>) -> io::Result<()> {
     let random = judged.random;
-    let whole = Whole {
+    let whole = RandomSuiteJson {
         suite: afbc_campaign::random::NAME,
         first_seed: random.seeds.start,
         seeds: random.seeds.end - random.seeds.start,
         flights_per_vehicle: random.flights,
         sensors: random.seen.scenario(),
-        against: judged.against_name(),
+        against: judged.baseline_name(),
         groups: judged.groups.iter().map(|group| of_group(judged, group)).collect(),
     };
     serde_json::to_writer_pretty(&mut *out, &whole)?;
     writeln!(out)
 }
 
-fn of_group<'a>(judged: &Judged<'a>, group: &'a Group<'a>) -> GroupWords<'a> {
+fn of_group<'a>(judged: &RandomResults<'a>, group: &'a VehicleGroup<'a>) -> VehicleGroupJson<'a> {
     let words = |(contender, ranking): (&'a afbc_scenario::contender::Contender, &Ranking)| {
         let Ranking { wins, lost, lost_alone, median_m, geometric_m, difference } = *ranking;
-        Words {
+        RankedContenderJson {
             name: &contender.name,
             controller: contender.kind().name(),
             best_or_level: wins,
@@ -152,7 +152,7 @@ fn of_group<'a>(judged: &Judged<'a>, group: &'a Group<'a>) -> GroupWords<'a> {
             lost_alone,
             median_m,
             geometric_mean_m: geometric_m,
-            log_difference: difference.map(|difference| Paired {
+            log_difference: difference.map(|difference| PairedJson {
                 flights: difference.flights,
                 mean: difference.mean,
                 interval_95: difference.interval,
@@ -162,7 +162,7 @@ fn of_group<'a>(judged: &Judged<'a>, group: &'a Group<'a>) -> GroupWords<'a> {
             }),
         }
     };
-    GroupWords {
+    VehicleGroupJson {
         vehicle: group.vehicle,
         flights: group.flights,
         lost_by_all: &group.lost_by_all,

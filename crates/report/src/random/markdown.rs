@@ -1,13 +1,13 @@
 //! The contenders' ranking as Markdown, for a document.
 
-use super::Judged;
+use super::RandomResults;
 use super::cells::{cells, heads, legend, notes};
 use crate::table::wrap;
 use core::fmt::Write;
 
 /// Formats as Markdown: the settings, one table per vehicle and one for all vehicles, and an explanation of the
 /// columns.
-pub fn markdown(judged: &Judged<'_>) -> String {
+pub fn markdown(judged: &RandomResults<'_>) -> String {
     let mut page = paragraph(&format!("Drawn from {}.", judged.words()));
     let escaped = |cell: &str| cell.replace('[', "\\[").replace(']', "\\]");
     for group in &judged.groups {

@@ -1,14 +1,14 @@
 //! The HTML page of the suite `random`.
 
-use super::Judged;
+use super::RandomResults;
 use super::cells::{cells, heads, legend, notes};
-use super::judged::Group;
-use super::shown::Shown;
+use super::results::VehicleGroup;
+use super::shown_flight::ShownFlight;
 use crate::report::{sheet, space_of_many};
 use afbc_campaign::random::TILT_MAX_RAD;
 use maud::{Markup, html};
 
-pub(super) fn page(judged: &Judged<'_>, shown: Vec<Shown>) -> String {
+pub(super) fn page(judged: &RandomResults<'_>, shown: Vec<ShownFlight>) -> String {
     sheet(
         "Suite random",
         &html! {
@@ -25,7 +25,7 @@ pub(super) fn page(judged: &Judged<'_>, shown: Vec<Shown>) -> String {
             }
             @if !shown.is_empty() {
                 p {
-                    "Of each vehicle the flight in which " (judged.against()) " stands worst against the best, or "
+                    "Of each vehicle the flight in which " (judged.baseline()) " stands worst against the best, or "
                     "which it lost and another kept:"
                 }
             }
@@ -39,7 +39,7 @@ pub(super) fn page(judged: &Judged<'_>, shown: Vec<Shown>) -> String {
 }
 
 /// Returns a table with one row per contender.
-fn rankings(judged: &Judged<'_>, group: &Group<'_>) -> Markup {
+fn rankings(judged: &RandomResults<'_>, group: &VehicleGroup<'_>) -> Markup {
     html! {
         table {
             thead { tr {

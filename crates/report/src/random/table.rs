@@ -1,12 +1,12 @@
 //! Formats the contenders' ranking for the terminal.
 
-use super::Judged;
+use super::RandomResults;
 use super::cells::{cells, heads, legend, notes};
 use crate::grid::parts;
 use crate::table::wrap;
 
 /// Formats the contenders' ranking: one block per vehicle and one for all vehicles, and an explanation of the columns.
-pub fn table(judged: &Judged<'_>) -> String {
+pub fn table(judged: &RandomResults<'_>) -> String {
     let mut rows: Vec<(String, Vec<String>)> = Vec::new();
     for group in &judged.groups {
         let head = format!("{}, {} flights", group.name(), group.flights);

@@ -1,6 +1,6 @@
 //! Texts and numbers about a replay, for the HTML page and the terminal.
 
-use super::Replay;
+use super::ReplayedRecording;
 use afbc_estimator::{AidSource, Resets};
 use afbc_replay::{ErrorFigure, EstimatorStart, SampleSource};
 
@@ -10,17 +10,17 @@ pub(super) const HEADS: [&str; 4] = ["RMS", "largest", "within 3σ", "valid"];
 const RESETS_MAX: usize = 12;
 
 /// Differences of one quantity.
-pub(super) struct Row {
+pub(super) struct ReplayTableRow {
     pub(super) name: &'static str,
     pub(super) cells: [String; 4],
 }
 
 /// Returns the differences; "-" if nothing could be compared.
-pub(super) fn rows(replay: &Replay<'_>) -> Vec<Row> {
+pub(super) fn rows(replay: &ReplayedRecording<'_>) -> Vec<ReplayTableRow> {
     let f = &replay.replayed.figures;
     let number = |value: Option<f64>, unit: &str| value.map_or("-".into(), |value| format!("{value:.3} {unit}"));
     let percent = |share: Option<f64>| share.map_or("-".into(), |share| format!("{:.1} %", 100.0 * share));
-    let row = |name, figure: &ErrorFigure, unit: &str| Row {
+    let row = |name, figure: &ErrorFigure, unit: &str| ReplayTableRow {
         name,
         cells: [
             number(figure.rms(), unit),
@@ -41,14 +41,14 @@ pub(super) fn rows(replay: &Replay<'_>) -> Vec<Row> {
 }
 
 /// Summarises the log: "PX4 ULog, 31.1 s, inertial sensor at 250 Hz".
-pub(super) fn conditions(replay: &Replay<'_>) -> String {
+pub(super) fn conditions(replay: &ReplayedRecording<'_>) -> String {
     let recording = replay.recording;
     let (length_s, rate_hz) = (recording.duration_s(), recording.imu_rate_hz());
     format!("{}, {length_s:.1} s, inertial sensor at {rate_hz:.0} Hz", recording.format)
 }
 
 /// Describes the data used and the course of the replay, one sentence per fact.
-pub(super) fn sentences(replay: &Replay<'_>) -> Vec<String> {
+pub(super) fn sentences(replay: &ReplayedRecording<'_>) -> Vec<String> {
     let (recording, replayed) = (replay.recording, replay.replayed);
     let used = recording.sources.iter().filter(|source| source.used > 0).map(|source| {
         let skipped = if source.skipped > 0 { format!(", {} not used", source.skipped) } else { String::new() };
@@ -122,7 +122,7 @@ pub(super) const AIDS: [(&str, AidSource); 5] = [
     ("heading", AidSource::Heading),
 ];
 
-fn start(replay: &Replay<'_>) -> String {
+fn start(replay: &ReplayedRecording<'_>) -> String {
     let from_s = replay.replayed.from_s;
     match replay.replayed.start {
         EstimatorStart::AtRest(at_s) => format!("Started at rest after {at_s:.1} s; compared from {from_s:.1} s on."),

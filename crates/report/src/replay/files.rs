@@ -1,6 +1,6 @@
 //! Writes `replay.csv` and `summary.json`.
 
-use super::{Replay, cells};
+use super::{ReplayedRecording, cells};
 use afbc_estimator::Estimate;
 use afbc_replay::{EstimatorStart, Figures, LoggedState, ReplayRow};
 use afbc_types::State;
@@ -47,7 +47,7 @@ pub fn columns(rows: &[ReplayRow]) -> Vec<(String, Vec<f64>)> {
 }
 
 /// Writes both estimates over time; a missing value gives an empty field.
-pub(super) fn csv(out: &mut dyn Write, replay: &Replay<'_>) -> io::Result<()> {
+pub(super) fn csv(out: &mut dyn Write, replay: &ReplayedRecording<'_>) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     csv.write_record(std::iter::once("time_s".to_owned()).chain(head()))?;
     for row in &replay.replayed.rows {
@@ -97,13 +97,13 @@ fn joined(
 }
 
 #[derive(Serialize)]
-struct Summary<'a> {
+struct ReplayJson<'a> {
     log: &'a str,
     format: &'a str,
     duration_s: f64,
     imu_rate_hz: f64,
     declination_deg: f64,
-    sources: Vec<Source<'a>>,
+    sources: Vec<SourceJson<'a>>,
     missing: Vec<&'a str>,
     unusable: Vec<&'a str>,
     notes: &'a [String],
@@ -118,16 +118,16 @@ struct Summary<'a> {
     position_rms_m: Option<f64>,
     horizontal_rms_m: Option<f64>,
     height_rms_m: Option<f64>,
-    largest: Largest,
-    within_3_sigma_ratio: Parts,
-    valid_ratio: Parts,
-    aids: Vec<Aid>,
+    largest: LargestJson,
+    within_3_sigma_ratio: PartsJson,
+    valid_ratio: PartsJson,
+    aids: Vec<AidJson>,
     resets: BTreeMap<&'static str, u32>,
-    logged_resets: Vec<LoggedReset>,
+    logged_resets: Vec<ResetJson>,
 }
 
 #[derive(Serialize)]
-struct Source<'a> {
+struct SourceJson<'a> {
     sensor: &'a str,
     topic: &'a str,
     used: usize,
@@ -135,35 +135,35 @@ struct Source<'a> {
 }
 
 #[derive(Serialize)]
-struct Largest {
+struct LargestJson {
     attitude_deg: Option<f64>,
     velocity_m_s: Option<f64>,
     position_m: Option<f64>,
 }
 
 #[derive(Serialize)]
-struct Parts {
+struct PartsJson {
     attitude: Option<f64>,
     velocity: Option<f64>,
     position: Option<f64>,
 }
 
-impl Parts {
+impl PartsJson {
     fn of(figures: &Figures, part: fn(&afbc_replay::ErrorFigure) -> Option<f64>) -> Self {
         let Figures { attitude, velocity, position, .. } = figures;
-        Parts { attitude: part(attitude), velocity: part(velocity), position: part(position) }
+        PartsJson { attitude: part(attitude), velocity: part(velocity), position: part(position) }
     }
 }
 
 #[derive(Serialize)]
-struct Aid {
+struct AidJson {
     name: &'static str,
     fused: u32,
     rejected: u32,
 }
 
 #[derive(Serialize)]
-struct LoggedReset {
+struct ResetJson {
     at_s: f64,
     what: &'static str,
     by: Option<f64>,
@@ -174,8 +174,8 @@ struct LoggedReset {
 ///
 /// # Errors
 /// Fails if writing to `out` fails.
-pub fn json(out: &mut dyn Write, replay: &Replay<'_>) -> io::Result<()> {
-    let Replay { name, recording, replayed } = replay;
+pub fn json(out: &mut dyn Write, replay: &ReplayedRecording<'_>) -> io::Result<()> {
+    let ReplayedRecording { name, recording, replayed } = replay;
     let (start, started_at_s, start_reason) = match replayed.start {
         EstimatorStart::AtRest(at_s) => ("at-rest", Some(at_s), None),
         EstimatorStart::FromLog(at_s, None) => ("from-log", Some(at_s), Some("the vehicle was in the air".to_owned())),
@@ -186,7 +186,7 @@ pub fn json(out: &mut dyn Write, replay: &Replay<'_>) -> io::Result<()> {
     let largest = |figure: &afbc_replay::ErrorFigure| figure.rms().map(|_| figure.largest);
     let first_us = recording.imu.first().map_or(0, |sample| sample.at_us);
     let resets = &replayed.resets;
-    let summary = Summary {
+    let summary = ReplayJson {
         log: name,
         format: recording.format,
         duration_s: recording.duration_s(),
@@ -195,7 +195,7 @@ pub fn json(out: &mut dyn Write, replay: &Replay<'_>) -> io::Result<()> {
         sources: recording
             .sources
             .iter()
-            .map(|it| Source { sensor: it.sensor.title(), topic: &it.topic, used: it.used, skipped: it.skipped })
+            .map(|it| SourceJson { sensor: it.sensor.title(), topic: &it.topic, used: it.used, skipped: it.skipped })
             .collect(),
         missing: recording.missing().map(|source| source.topic.as_str()).collect(),
         unusable: recording.unusable().map(|source| source.topic.as_str()).collect(),
@@ -211,18 +211,18 @@ pub fn json(out: &mut dyn Write, replay: &Replay<'_>) -> io::Result<()> {
         position_rms_m: figures.position.rms(),
         horizontal_rms_m: figures.horizontal.rms(),
         height_rms_m: figures.height.rms(),
-        largest: Largest {
+        largest: LargestJson {
             attitude_deg: largest(&figures.attitude),
             velocity_m_s: largest(&figures.velocity),
             position_m: largest(&figures.position),
         },
-        within_3_sigma_ratio: Parts::of(figures, afbc_replay::ErrorFigure::within_ratio),
-        valid_ratio: Parts::of(figures, afbc_replay::ErrorFigure::valid_ratio),
+        within_3_sigma_ratio: PartsJson::of(figures, afbc_replay::ErrorFigure::within_ratio),
+        valid_ratio: PartsJson::of(figures, afbc_replay::ErrorFigure::valid_ratio),
         aids: cells::AIDS
             .iter()
             .map(|(name, aid)| {
                 let record = replayed.aids.of(*aid);
-                Aid { name, fused: record.accepted, rejected: record.rejected }
+                AidJson { name, fused: record.accepted, rejected: record.rejected }
             })
             .collect(),
         resets: BTreeMap::from([
@@ -237,7 +237,7 @@ pub fn json(out: &mut dyn Write, replay: &Replay<'_>) -> io::Result<()> {
         logged_resets: recording
             .resets
             .iter()
-            .map(|reset| LoggedReset {
+            .map(|reset| ResetJson {
                 at_s: (reset.at_us as f64 - first_us as f64) * 1e-6,
                 what: reset.what,
                 by: Some(reset.by).filter(|by| by.is_finite()),

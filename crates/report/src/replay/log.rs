@@ -4,7 +4,7 @@ use afbc_replay::{Recording, Replayed};
 
 /// A log with the result of its replay.
 #[derive(Clone, Copy, Debug)]
-pub struct Replay<'a> {
+pub struct ReplayedRecording<'a> {
     /// Name of the log.
     pub name: &'a str,
     /// Contents of the log.

@@ -6,7 +6,7 @@ mod log;
 mod page;
 
 pub use files::{columns, json};
-pub use log::Replay;
+pub use log::ReplayedRecording;
 
 use crate::figures;
 use crate::table::wrap;
@@ -30,26 +30,26 @@ pub fn folder_name(name: &str) -> String {
 ///
 /// # Errors
 /// Fails at the first file that cannot be written, or that another command has written.
-pub fn write(folder: &Folder, replay: &Replay<'_>) -> Result<Vec<PathBuf>, Error> {
+pub fn write(folder: &Folder, replay: &ReplayedRecording<'_>) -> Result<Vec<PathBuf>, Error> {
     let pictures = figures::replay::draw(replay.recording, replay.replayed);
     let svgs: Vec<_> = pictures.iter().map(|picture| format!("{}.svg", picture.name)).collect();
     let names = ["replay.csv", "summary.json", "report.html"].into_iter();
     folder.only(&names.chain(svgs.iter().map(String::as_str)).collect::<Vec<_>>())?;
     let mut paths = vec![
-        folder.place("replay.csv", |out| files::csv(out, replay))?,
-        folder.place("summary.json", |out| files::json(out, replay))?,
+        folder.write("replay.csv", |out| files::csv(out, replay))?,
+        folder.write("summary.json", |out| files::json(out, replay))?,
     ];
     for (name, picture) in svgs.iter().zip(&pictures) {
-        paths.push(folder.place(name, |out| out.write_all(picture.svg.as_bytes()))?);
+        paths.push(folder.write(name, |out| out.write_all(picture.svg.as_bytes()))?);
     }
     let page = page::page(replay, &pictures);
-    paths.push(folder.place("report.html", |out| out.write_all(page.as_bytes()))?);
+    paths.push(folder.write("report.html", |out| out.write_all(page.as_bytes()))?);
     Ok(paths)
 }
 
 /// Formats the table for the terminal.
 #[must_use]
-pub fn table(replay: &Replay<'_>) -> String {
+pub fn table(replay: &ReplayedRecording<'_>) -> String {
     let mut lines = Vec::new();
     wrap(&mut lines, "", &format!("{}: {}.", replay.name, cells::conditions(replay)));
     lines.push(String::new());

@@ -1,11 +1,11 @@
 //! The HTML page of a replay.
 
-use super::{Replay, cells};
+use super::{ReplayedRecording, cells};
 use crate::figures::{self, Picture};
 use crate::report::{picture, sheet, space};
 use maud::html;
 
-pub(super) fn page(replay: &Replay<'_>, pictures: &[Picture]) -> String {
+pub(super) fn page(replay: &ReplayedRecording<'_>, pictures: &[Picture]) -> String {
     let rows = cells::rows(replay);
     sheet(
         &format!("{}, replayed", replay.name),

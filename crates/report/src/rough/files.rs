@@ -68,7 +68,7 @@ pub(super) fn csv(out: &mut dyn Write, results: &RoughResults<'_>) -> io::Result
 }
 
 #[derive(Serialize)]
-struct Whole<'a> {
+struct RoughSuiteJson<'a> {
     suite: &'static str,
     first_seed: u64,
     seeds: u64,
@@ -76,11 +76,11 @@ struct Whole<'a> {
     duration_s: Option<f64>,
     vehicles: Vec<&'a str>,
     contender: Option<&'a str>,
-    classes: Vec<Words>,
+    classes: Vec<ClassJson>,
 }
 
 #[derive(Serialize)]
-struct Words {
+struct ClassJson {
     /// Name of the class; null for all flights.
     class: Option<&'static str>,
     meaning: Option<&'static str>,
@@ -102,7 +102,7 @@ struct Words {
 /// Fails if writing to `out` fails.
 pub fn json(out: &mut dyn Write, results: &RoughResults<'_>) -> io::Result<()> {
     let rough = results.rough;
-    let whole = Whole {
+    let whole = RoughSuiteJson {
         suite: NAME,
         first_seed: rough.seeds.start,
         seeds: rough.seeds.end - rough.seeds.start,
@@ -116,9 +116,9 @@ pub fn json(out: &mut dyn Write, results: &RoughResults<'_>) -> io::Result<()> {
     writeln!(out)
 }
 
-fn words(row: &ClassRow) -> Words {
+fn words(row: &ClassRow) -> ClassJson {
     let class = CLASSES.iter().find(|class| Some(class.name) == row.class);
-    Words {
+    ClassJson {
         class: row.class,
         meaning: row.class.map(|_| class.map_or(MIXTURE_MEANING, |class| class.meaning)),
         known: row.class.map(|_| class.is_some_and(|class| class.known)),

@@ -40,11 +40,11 @@ pub fn write(folder: &Folder, results: &RoughResults<'_>) -> Result<Vec<PathBuf>
     let body = html! { p { (shown.caption) "." } (shown.section()) (cells::meanings()) };
     let page = sheet("Suite rough-estimate", &body);
     Ok(vec![
-        folder.place("flights.csv", |out| files::csv(out, results))?,
-        folder.place("rough-estimate.json", |out| files::json(out, results))?,
-        folder.place("tables.md", |out| out.write_all(md.as_bytes()))?,
-        folder.place("tables.tex", |out| out.write_all(tex.as_bytes()))?,
-        folder.place("report.html", |out| out.write_all(page.as_bytes()))?,
+        folder.write("flights.csv", |out| files::csv(out, results))?,
+        folder.write("rough-estimate.json", |out| files::json(out, results))?,
+        folder.write("tables.md", |out| out.write_all(md.as_bytes()))?,
+        folder.write("tables.tex", |out| out.write_all(tex.as_bytes()))?,
+        folder.write("report.html", |out| out.write_all(page.as_bytes()))?,
     ])
 }
 

@@ -1,10 +1,10 @@
 //! Writes `suite.csv` and `suite.json`.
 
 use super::FlownSuite;
-use super::cells::{FIGURES, Figure};
+use super::cells::{FIGURES, SuiteFigure};
 use crate::differences::{self, FigureOverSeeds};
 use crate::words::measured;
-use afbc_campaign::compare::{Comparison, Entry, Measure, Outcome};
+use afbc_campaign::compare::{Comparison, ContenderFlights, FlightOutcome, Measure};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -19,7 +19,7 @@ pub(super) fn csv(out: &mut dyn Write, flown: FlownSuite<'_>) -> io::Result<()> 
     csv.write_record(head.into_iter().chain(inputs).chain(tail))?;
     for comparison in flown.comparisons {
         for entry in &comparison.entries {
-            for Outcome { seed, lost, tripped, metrics } in &entry.flights {
+            for FlightOutcome { seed, lost, tripped, metrics } in &entry.flights {
                 let contender = entry.contender();
                 let who = [comparison.scenario.name.clone(), contender.name.clone(), contender.kind().name().into()];
                 let errors = [metrics.rmse.xyz().norm(), metrics.max_distance_m, metrics.rmse.w];
@@ -40,16 +40,16 @@ fn over_seeds(comparison: &Comparison) -> Vec<Vec<FigureOverSeeds>> {
 }
 
 #[derive(Serialize)]
-struct Flight<'a> {
+struct SuiteFlightJson<'a> {
     flight: &'a str,
     description: &'a str,
     against: &'a str,
-    published: Vec<Published<'a>>,
-    contenders: Vec<Contender<'a>>,
+    published: Vec<PublishedJson<'a>>,
+    contenders: Vec<SuiteContenderJson<'a>>,
 }
 
 #[derive(Serialize)]
-struct Published<'a> {
+struct PublishedJson<'a> {
     law: &'a str,
     rms_m: f64,
     source: &'a str,
@@ -57,7 +57,7 @@ struct Published<'a> {
 }
 
 #[derive(Serialize)]
-struct Contender<'a> {
+struct SuiteContenderJson<'a> {
     name: &'a str,
     controller: &'a str,
     seeds: Vec<u64>,
@@ -77,17 +77,17 @@ struct Contender<'a> {
 /// Fails if writing to `out` fails.
 pub fn json(out: &mut dyn Write, flown: FlownSuite<'_>) -> io::Result<()> {
     let sources = &flown.suite.sources;
-    let flights = flown.rows().map(|(flight, comparison)| Flight {
+    let flights = flown.rows().map(|(flight, comparison)| SuiteFlightJson {
         flight: &comparison.scenario.name,
         description: &comparison.scenario.description,
-        against: differences::against(comparison),
+        against: differences::baseline(comparison),
         published: flight
             .published
             .iter()
             .filter_map(|figure| {
                 let source = sources.get(figure.source)?;
                 let (citation, differs) = (source.citation.as_str(), source.differs.as_str());
-                Some(Published { law: &figure.law, rms_m: figure.rms_m, source: citation, differs })
+                Some(PublishedJson { law: &figure.law, rms_m: figure.rms_m, source: citation, differs })
             })
             .collect(),
         contenders: comparison.entries.iter().zip(over_seeds(comparison)).map(contender).collect(),
@@ -96,11 +96,11 @@ pub fn json(out: &mut dyn Write, flown: FlownSuite<'_>) -> io::Result<()> {
     writeln!(out)
 }
 
-fn contender((entry, figures): (&Entry, Vec<FigureOverSeeds>)) -> Contender<'_> {
+fn contender((entry, figures): (&ContenderFlights, Vec<FigureOverSeeds>)) -> SuiteContenderJson<'_> {
     let lost = entry.flights.iter().find_map(|flight| flight.lost);
     let mean = |measure: &Measure| entry.average(measure.value).map(|average| average.mean);
     let trips: Vec<_> = entry.flights.iter().filter_map(|flight| flight.tripped).collect();
-    Contender {
+    SuiteContenderJson {
         name: &entry.contender().name,
         controller: entry.contender().kind().name(),
         seeds: entry.flights.iter().map(|flight| flight.seed).collect(),
@@ -109,7 +109,7 @@ fn contender((entry, figures): (&Entry, Vec<FigureOverSeeds>)) -> Contender<'_> 
         tripped: trips.len(),
         first_tripped_at_s: trips.first().map(|trip| trip.time_s),
         first_trip: trips.first().map(|trip| trip.reason),
-        mean: FIGURES.iter().map(|Figure { measure, .. }| (measure.name, mean(measure))).collect(),
+        mean: FIGURES.iter().map(|SuiteFigure { measure, .. }| (measure.name, mean(measure))).collect(),
         figures,
     }
 }

@@ -1,8 +1,8 @@
 //! A heat map: each contender's distance divided by the best contender's.
 
 use super::FlownSuite;
-use super::cells::{FIGURES, Figure, lost};
-use afbc_campaign::compare::{Comparison, Entry};
+use super::cells::{FIGURES, SuiteFigure, lost};
+use afbc_campaign::compare::{Comparison, ContenderFlights};
 use core::f64::consts::LN_2;
 use maud::{Markup, html};
 
@@ -43,8 +43,8 @@ pub(super) fn anchor(comparison: &Comparison) -> String {
 }
 
 /// Returns a contender's median as a multiple of the best contender's; `None` if it lost a vehicle.
-fn ratio(figure: &Figure, comparison: &Comparison, entry: &Entry) -> Option<f64> {
-    let median = |entry: &Entry| entry.median(figure.measure.value).map(|median| median.value);
+fn ratio(figure: &SuiteFigure, comparison: &Comparison, entry: &ContenderFlights) -> Option<f64> {
+    let median = |entry: &ContenderFlights| entry.median(figure.measure.value).map(|median| median.value);
     let best = comparison.entries.iter().filter_map(median).min_by(f64::total_cmp)?;
     let own = median(entry)?;
     // The ratio is also 1 if both are zero.
@@ -60,7 +60,7 @@ fn cell(ratio: Option<f64>, lost: Option<String>) -> Markup {
 }
 
 /// Returns the geometric mean of a contender's ratios, and the number of flights that it lost.
-fn mean(figure: &Figure, comparisons: &[Comparison], index: usize) -> Markup {
+fn mean(figure: &SuiteFigure, comparisons: &[Comparison], index: usize) -> Markup {
     let entries = || comparisons.iter().filter_map(|comparison| Some((comparison, comparison.entries.get(index)?)));
     let ratios: Vec<f64> = entries().filter_map(|(comparison, entry)| ratio(figure, comparison, entry)).collect();
     let lost = entries().count() - ratios.len();

@@ -1,8 +1,8 @@
 //! Results of a suite: tables of flights and contenders for page, terminal and documents, CSV and JSON.
 
 mod cells;
-mod drawn;
 mod files;
+mod flight_figures;
 mod flown;
 mod heat;
 mod markdown;
@@ -20,7 +20,7 @@ use crate::grid::{self, TableFormat};
 use afbc_campaign::compare::Comparison;
 use afbc_files::{Error, Folder};
 use cells::FIGURES;
-use drawn::Drawn;
+use flight_figures::FlightFigures;
 use std::path::PathBuf;
 
 /// Writes all results of a suite into `folder`, and removes all earlier files of the same command. Returns the paths
@@ -38,7 +38,7 @@ use std::path::PathBuf;
 /// # Errors
 /// Fails at the first file that cannot be written, or that another command has written.
 pub fn write(folder: &Folder, flown: FlownSuite<'_>) -> Result<Vec<PathBuf>, Error> {
-    let drawn: Vec<Drawn> = flown.comparisons.iter().map(Drawn::of).collect();
+    let drawn: Vec<FlightFigures> = flown.comparisons.iter().map(FlightFigures::of).collect();
     let name = |comparison: &Comparison| format!("{}.svg", comparison.scenario.name);
     let svgs: Vec<_> =
         flown.comparisons.iter().zip(&drawn).filter_map(|(c, drawn)| Some((name(c), drawn.errors.as_ref()?))).collect();
@@ -47,22 +47,22 @@ pub fn write(folder: &Folder, flown: FlownSuite<'_>) -> Result<Vec<PathBuf>, Err
     folder.only(&names.chain(svgs.iter().map(|(name, _)| name.as_str())).collect::<Vec<_>>())?;
 
     let mut paths = vec![
-        folder.place("suite.csv", |out| files::csv(out, flown))?,
-        folder.place("suite.json", |out| files::json(out, flown))?,
-        folder.place("statistics.csv", |out| {
+        folder.write("suite.csv", |out| files::csv(out, flown))?,
+        folder.write("suite.json", |out| files::json(out, flown))?,
+        folder.write("statistics.csv", |out| {
             differences::csv(out, flown.comparisons, &FIGURES.each_ref().map(|figure| &figure.measure))
         })?,
-        folder.place("standing.csv", |out| standing::csv(out, flown))?,
+        folder.write("standing.csv", |out| standing::csv(out, flown))?,
     ];
     for (name, format) in [("tables.md", TableFormat::Markdown), ("tables.tex", TableFormat::Latex)] {
         let text = tables(flown, format);
-        paths.push(folder.place(name, |out| out.write_all(text.as_bytes()))?);
+        paths.push(folder.write(name, |out| out.write_all(text.as_bytes()))?);
     }
     for (name, errors) in &svgs {
-        paths.push(folder.place(name, |out| out.write_all(errors.svg.as_bytes()))?);
+        paths.push(folder.write(name, |out| out.write_all(errors.svg.as_bytes()))?);
     }
     let page = page::page(flown, drawn);
-    paths.push(folder.place("report.html", |out| out.write_all(page.as_bytes()))?);
+    paths.push(folder.write("report.html", |out| out.write_all(page.as_bytes()))?);
     Ok(paths)
 }
 

@@ -1,7 +1,7 @@
 //! The HTML page of a suite.
 
-use super::cells::{FIGURES, Figure, lost, trip};
-use super::drawn::Drawn;
+use super::cells::{FIGURES, SuiteFigure, lost, trip};
+use super::flight_figures::FlightFigures;
 use super::{FlownSuite, heat, standing};
 use crate::report::{picture, sheet, space_of_many};
 use crate::words;
@@ -9,7 +9,7 @@ use afbc_campaign::suite::SuiteFlight;
 use afbc_sim::metrics::SETTLED_S;
 use maud::{Markup, html};
 
-pub(super) fn page(flown: FlownSuite<'_>, drawn: Vec<Drawn>) -> String {
+pub(super) fn page(flown: FlownSuite<'_>, drawn: Vec<FlightFigures>) -> String {
     let suite = flown.suite;
     sheet(
         &format!("Suite {}", suite.name),
@@ -52,7 +52,7 @@ fn tilt(flight: &SuiteFlight) -> String {
 }
 
 /// Returns a table with one row per flight and one column per contender.
-fn results(flown: FlownSuite<'_>, figure: &Figure) -> Markup {
+fn results(flown: FlownSuite<'_>, figure: &SuiteFigure) -> Markup {
     html! {
         table {
             thead { tr {

@@ -4,44 +4,44 @@ use super::FlownSuite;
 use super::cells::{FIGURES, lost};
 use crate::differences::{TEST, TEST_LEGEND, median, test};
 use crate::grid::{Grid, GridCell};
-use afbc_campaign::compare::{Comparison, DISTANCE, Entry};
-use afbc_campaign::random::{Difference, RESAMPLES, Ranking, Score, rankings};
+use afbc_campaign::compare::{Comparison, ContenderFlights, DISTANCE};
+use afbc_campaign::random::{RESAMPLES, Ranking, RankingDifference, Score, rankings};
 use serde::Serialize;
 use std::io::{self, Write};
 
 /// Ranks the contenders: every flight counts once, with the median distance over its seeds.
 fn standing(flown: FlownSuite<'_>) -> Vec<Ranking> {
     let score = |(flight, comparison): (usize, &Comparison)| {
-        let rms_m = |entry: &Entry| entry.median(DISTANCE.value).map(|median| median.value);
+        let rms_m = |entry: &ContenderFlights| entry.median(DISTANCE.value).map(|median| median.value);
         // Each flight is its own cluster: unlike flights of one seed, no two of these belong together.
         Score { seed: flight as u64, rms_m: comparison.entries.iter().map(rms_m).collect() }
     };
     let scores: Vec<Score> = flown.comparisons.iter().enumerate().map(score).collect();
-    rankings(&scores, flown.comparisons.first().map_or(0, |first| first.against))
+    rankings(&scores, flown.comparisons.first().map_or(0, |first| first.baseline))
 }
 
-fn contenders(flown: FlownSuite<'_>) -> &[Entry] {
+fn contenders(flown: FlownSuite<'_>) -> &[ContenderFlights] {
     flown.comparisons.first().map_or(&[], |first| first.entries.as_slice())
 }
 
 /// Returns the title of the reference contender.
-fn against(flown: FlownSuite<'_>) -> &str {
+fn baseline(flown: FlownSuite<'_>) -> &str {
     flown
         .comparisons
         .first()
-        .and_then(|first| Some(first.entries.get(first.against)?.contender().title()))
+        .and_then(|first| Some(first.entries.get(first.baseline)?.contender().title()))
         .unwrap_or("")
 }
 
 /// Returns the ranking as a table.
 pub(super) fn grid(flown: FlownSuite<'_>) -> Grid {
-    let against = against(flown);
-    let row = |(entry, ranking): (&Entry, &Ranking)| {
+    let baseline = baseline(flown);
+    let row = |(entry, ranking): (&ContenderFlights, &Ranking)| {
         let [mut ratio, mut p, mut effect] = [const { String::new() }; 3];
-        if let Some(Difference { mean, interval, test: tested, p_holm, .. }) = ranking.difference {
+        if let Some(RankingDifference { mean, interval, test: tested, p_holm, .. }) = ranking.difference {
             let of = |log: f64| format!("{:.2}", libm::exp(log));
             ratio = of(mean) + &interval.map_or(String::new(), |ends| format!(" [{}, {}]", of(ends[0]), of(ends[1])));
-            if entry.contender().title() != against {
+            if entry.contender().title() != baseline {
                 [p, effect] = test(&tested, p_holm);
             }
         }
@@ -49,13 +49,13 @@ pub(super) fn grid(flown: FlownSuite<'_>) -> Grid {
         let cells = counts.into_iter().chain([ratio, p, effect]).map(GridCell::from);
         (entry.contender().title().to_owned(), cells.collect())
     };
-    let over = format!("over {against} [95 %]");
+    let over = format!("over {baseline} [95 %]");
     let heads = ["law", "best or level", "lost", &over].into_iter().chain(TEST).map(String::from).collect();
     let flights = flown.comparisons.len();
     let note = format!(
         "Of the root mean square distance from the reference, by each flight's median over the seeds. best or level: \
          flights in which a law is best, or within 5 % or 0.2 mm of the best. lost: flights that are lost by most \
-         seeds. over {against}: geometric mean of the law's distance over that of {against} in the flights that both \
+         seeds. over {baseline}: geometric mean of the law's distance over that of {baseline} in the flights that both \
          keep, with its 95 % interval (bootstrap over the flights, {RESAMPLES} resamples). {TEST_LEGEND}"
     );
     Grid {
@@ -69,7 +69,7 @@ pub(super) fn grid(flown: FlownSuite<'_>) -> Grid {
 /// Returns the tables for a paper: the distances of every flight, and the contenders' ranking.
 pub(super) fn grids(flown: FlownSuite<'_>) -> Vec<Grid> {
     let [distance, ..] = FIGURES;
-    let cell = |comparison: &Comparison, entry: &Entry| GridCell {
+    let cell = |comparison: &Comparison, entry: &ContenderFlights| GridCell {
         text: match (lost(entry), entry.median(DISTANCE.value)) {
             (None, Some(own)) => median(&own, &DISTANCE),
             (lost, _) => lost.unwrap_or_default(),

@@ -1,7 +1,9 @@
 //! Helpers for the tests: small reports to write, and readers of their SVG and HTML.
 #![allow(dead_code, reason = "each test file uses a part")]
 
-use afbc_campaign::{self as campaign, Drawn, FIGURES, Manifest, QUANTITIES, Row, Shard, Summary};
+use afbc_campaign::{
+    self as campaign, CampaignSummary, DrawnQuantity, FIGURES, Manifest, QUANTITIES, ResultRow, Shard,
+};
 use afbc_files::Folder;
 use afbc_plant::{CosineGust, Environment, Gust, GustKind, Payload, PlantParameter, PlantParameterChange, RotorFault};
 use afbc_scenario::contender::{Contender, ControllerKind};
@@ -70,10 +72,15 @@ pub(crate) fn flown(scenario: &Scenario, names: &[&str]) -> Vec<ScenarioFlight> 
 }
 
 /// Returns a campaign whose flights have the same results for all contenders, except those that are `lost`.
-pub(crate) fn gone_alike(names: &[&str], drawn: &[&str], flights: u64, lost: impl Fn(&str, u64) -> bool) -> Summary {
+pub(crate) fn gone_alike(
+    names: &[&str],
+    drawn: &[&str],
+    flights: u64,
+    lost: impl Fn(&str, u64) -> bool,
+) -> CampaignSummary {
     let drawn = drawn.iter().map(|name| {
         let quantity = QUANTITIES.iter().find(|quantity| quantity.range.name == *name).unwrap();
-        Drawn { name: (*name).into(), meaning: quantity.meaning.into(), ends: [0.5, 1.5] }
+        DrawnQuantity { name: (*name).into(), meaning: quantity.meaning.into(), ends: [0.5, 1.5] }
     });
     let any = campaign::built_in("robustness").unwrap().read().unwrap();
     let manifest = Manifest {
@@ -84,7 +91,7 @@ pub(crate) fn gone_alike(names: &[&str], drawn: &[&str], flights: u64, lost: imp
         drawn: drawn.collect(),
         ..Manifest::new(&any, Shard::WHOLE)
     };
-    let mut summary = Summary::new(&manifest);
+    let mut summary = CampaignSummary::new(&manifest);
     for flight in 0..flights {
         for name in names {
             let draws = manifest.drawn.iter().map(|_| 0.5 + (flight as f64 + 0.5) / flights as f64);
@@ -93,7 +100,7 @@ pub(crate) fn gone_alike(names: &[&str], drawn: &[&str], flights: u64, lost: imp
                 "lost_at_s" | "tripped_at_s" => lost.then_some(1.0),
                 _ => Some(0.01 * (1.0 + flight as f64)),
             });
-            summary.add(&Row {
+            summary.add(&ResultRow {
                 flight,
                 seed: flight,
                 contender: (*name).into(),

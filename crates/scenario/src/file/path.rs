@@ -7,7 +7,7 @@ use super::reference::{START, flyable};
 use crate::trajectory::polynomial::{COEFFICIENTS, PolynomialCoefficients, PolynomialPiece, through};
 use crate::trajectory::spline::PathSamples;
 use crate::trajectory::{Reference, Trajectory, nearest_heading};
-use afbc_files::read::{FileError, Separated, Source, Table};
+use afbc_files::read::{DelimitedFormat, FileError, SourceFile, Table};
 use afbc_types::Range;
 use csv::{ReaderBuilder, StringRecord};
 use std::path::Path;
@@ -43,7 +43,7 @@ pub(super) fn read(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let shown = path.display().to_string();
     let text = std::fs::read_to_string(&path)
         .map_err(|error| table.fault_at(FILE, format!("{shown} cannot be read ({error}); name a file of text")))?;
-    let file = PathLines { source: Source { file: &shown, text: &text } };
+    let file = PathLines { source: SourceFile { file: &shown, text: &text } };
     let mut pieces = file.pieces().map_err(|error| table.through(FILE, error))?;
     let first_s = pieces.first().map_or(0.0, |piece| piece.start_s);
     let start_s = start_s.unwrap_or(first_s);
@@ -75,7 +75,7 @@ fn paced(piece: &PolynomialPiece, first_s: f64, start_s: f64, pace: f64) -> Poly
 
 /// A path's file.
 struct PathLines<'a> {
-    source: Source<'a>,
+    source: SourceFile<'a>,
 }
 
 impl PathLines<'_> {
@@ -179,8 +179,8 @@ impl PathLines<'_> {
         Ok(())
     }
 
-    fn form(&self) -> Separated {
-        Separated::of(self.source.text.as_bytes())
+    fn form(&self) -> DelimitedFormat {
+        DelimitedFormat::of(self.source.text.as_bytes())
     }
 
     fn column(&self, rows: &[StringRecord], place: usize, head: &StringRecord) -> Result<Vec<f64>, FileError> {

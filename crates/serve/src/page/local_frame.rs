@@ -13,7 +13,7 @@ pub(crate) struct LocalFrame {
 
 impl LocalFrame {
     /// Updates the offset after a step.
-    pub(crate) fn look(&mut self, vehicle: &ServedVehicle) {
+    pub(crate) fn update(&mut self, vehicle: &ServedVehicle) {
         let Some(report) = vehicle.report() else { return };
         // With a tracker, both frames are the same.
         let told = vehicle.scenario().instruments.tracker.is_some();

@@ -1,7 +1,7 @@
 //! The web page's ground station: sends commands to the vehicle as MAVLink messages, and handles the answers.
 
 use crate::Server;
-use afbc_ground::{Client, Patience, UploadEnd};
+use afbc_ground::{Client, RetryPolicy, UploadEnd};
 use afbc_mavlink::{
     Address, CommandResult, Downlink, ExternalTarget, MavCmd, MavSeverity, MissionItem, MissionType, PositionTarget,
     Uplink, VehicleCommand,
@@ -73,7 +73,7 @@ impl PageStation {
             server.hear(VEHICLE, PEER, frame);
         });
         if speaks {
-            self.client.beat_every(Some(HEARTBEAT_MS));
+            self.client.set_heartbeat_period(Some(HEARTBEAT_MS));
         }
     }
 
@@ -81,7 +81,7 @@ impl PageStation {
     pub(crate) fn command(&mut self, server: &mut Server, command: VehicleCommand) {
         // A new command cancels what was to follow the last one.
         (self.once_armed, self.target_m) = (None, None);
-        self.client.command(command, Patience::ONCE);
+        self.client.command(command, RetryPolicy::ONCE);
         self.send(server);
     }
 
@@ -93,11 +93,11 @@ impl PageStation {
     }
 
     /// Leads the vehicle to a place of its local frame \[m\] in offboard mode.
-    pub(crate) fn lead(&mut self, server: &mut Server, place_m: Vector3<f32>, offboard: VehicleCommand) {
+    pub(crate) fn fly_to(&mut self, server: &mut Server, place_m: Vector3<f32>, offboard: VehicleCommand) {
         self.target_m = Some(place_m);
         // Send the target first: the vehicle refuses offboard mode without a fresh target.
         self.say_target();
-        self.client.command(offboard, Patience::ONCE);
+        self.client.command(offboard, RetryPolicy::ONCE);
         self.send(server);
     }
 
@@ -120,7 +120,7 @@ impl PageStation {
         server: &mut Server,
         plans: impl IntoIterator<Item = (MissionType, Vec<MissionItem>)>,
     ) {
-        self.client.upload(plans, Patience::ONCE);
+        self.client.upload(plans, RetryPolicy::ONCE);
         self.send(server);
     }
 
@@ -134,7 +134,7 @@ impl PageStation {
     }
 
     /// Handles the received messages after a step, and passes texts for the page to `say`.
-    pub(crate) fn turn(&mut self, server: &mut Server, say: &mut dyn FnMut(MavSeverity, String)) {
+    pub(crate) fn update(&mut self, server: &mut Server, say: &mut dyn FnMut(MavSeverity, String)) {
         let now_ms = (server.now_s() * 1e3).round() as u64;
         // Time does not advance during a pause.
         let goes_on = now_ms != self.now_ms;
@@ -172,7 +172,7 @@ impl PageStation {
         if goes_on && self.now_ms.is_multiple_of(TARGET_MS) {
             self.say_target();
         }
-        self.client.turn(self.now_ms);
+        self.client.update(self.now_ms);
         self.send(server);
     }
 }

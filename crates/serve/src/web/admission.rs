@@ -1,6 +1,6 @@
 //! Access checks for requests of web clients.
 
-use crate::web::head::Head;
+use crate::web::head::RequestHead;
 use crate::web::token::Token;
 use std::net::IpAddr;
 
@@ -14,7 +14,7 @@ pub struct Admission {
 }
 
 /// A refusal: HTTP status and one line with the reason.
-pub(crate) type Refused = (&'static str, String);
+pub(crate) type HttpRefusal = (&'static str, String);
 
 impl Admission {
     /// Creates the rules for this address. On loopback, a request must name this machine. If there is a token, clients
@@ -31,7 +31,7 @@ impl Admission {
     }
 
     /// Checks the request's host and, if a browser sends it, the origin: the page must come from this server.
-    pub(crate) fn check_names(&self, head: &Head) -> Result<(), Refused> {
+    pub(crate) fn check_names(&self, head: &RequestHead) -> Result<(), HttpRefusal> {
         let Some(host) = &head.host else { return Err(("400 Bad Request", "it names no host".into())) };
         if self.loopback && !is_own(host) {
             let cure = "open the address that was printed at the start";
@@ -46,7 +46,7 @@ impl Admission {
     }
 
     /// Checks the token.
-    pub(crate) fn check_token(&self, head: &Head) -> Result<(), Refused> {
+    pub(crate) fn check_token(&self, head: &RequestHead) -> Result<(), HttpRefusal> {
         match &self.token {
             Some(token) if !token.is_told(&head.query) => {
                 let cure = "open the whole address that was printed at the start, with ?token= and what follows";

@@ -1,10 +1,10 @@
 //! Serves one connection, from its first byte to its last.
 
 use crate::web::admission::Admission;
-use crate::web::head::{HEAD_MAX, Head};
+use crate::web::deadline::{DeadlineStream, RateCounter};
+use crate::web::head::{HEAD_MAX, RequestHead};
 use crate::web::http::{answer, refuse, switch};
-use crate::web::places::Place;
-use crate::web::timed::{Rate, Timed};
+use crate::web::slots::ConnectionSlot;
 use afbc_web::PageFile;
 use std::io::{self, Read};
 use std::net::TcpStream;
@@ -36,7 +36,7 @@ const TAKEN: u16 = 4000;
 const TAKEN_BY: &str = "too many pages are open, and another has taken the place of this one; reload to take it back";
 
 /// An event of a client.
-pub(crate) enum Event {
+pub(crate) enum ClientEvent {
     /// A client has connected: its number, its address and the sender of its messages.
     New(u32, String, SyncSender<Arc<str>>),
     /// The client with this number has sent a text.
@@ -46,20 +46,26 @@ pub(crate) enum Event {
 }
 
 /// Data that all connections share.
-pub(crate) struct Shared {
+pub(crate) struct WebState {
     pub(crate) admission: Admission,
     pub(crate) files: Vec<PageFile>,
-    pub(crate) events: SyncSender<Event>,
+    pub(crate) events: SyncSender<ClientEvent>,
 }
 
 /// Serves a connection until it ends.
-pub(crate) fn serve(mut stream: TcpStream, (number, place): (u32, &Place), shared: &Shared) -> io::Result<()> {
+pub(crate) fn serve(
+    mut stream: TcpStream,
+    (number, slot): (u32, &ConnectionSlot),
+    shared: &WebState,
+) -> io::Result<()> {
     stream.set_nodelay(true)?;
-    let (head, rest) = match read_head(&mut Timed::new(&mut stream, HEAD_MAX_TIME))? {
+    let (head, rest) = match read_head(&mut DeadlineStream::new(&mut stream, HEAD_MAX_TIME))? {
         Ok(read) => read,
-        Err(problem) => return refuse(&mut Timed::new(&mut stream, ANSWER_MAX_TIME), "400 Bad Request", problem),
+        Err(problem) => {
+            return refuse(&mut DeadlineStream::new(&mut stream, ANSWER_MAX_TIME), "400 Bad Request", problem);
+        }
     };
-    let out = &mut Timed::new(&mut stream, ANSWER_MAX_TIME);
+    let out = &mut DeadlineStream::new(&mut stream, ANSWER_MAX_TIME);
     if let Err((status, problem)) = shared.admission.check_names(&head) {
         return refuse(out, status, &problem);
     }
@@ -74,10 +80,10 @@ pub(crate) fn serve(mut stream: TcpStream, (number, place): (u32, &Place), share
     }
     match (head.method.as_str(), page) {
         ("GET", Some("socket")) => match &head.socket_key {
-            Some(_) if !place.keep() => refuse(out, "503 Service Unavailable", "too many have come; come again"),
+            Some(_) if !slot.keep() => refuse(out, "503 Service Unavailable", "too many have come; come again"),
             Some(key) => {
                 switch(out, &derive_accept_key(key.as_bytes()))?;
-                converse(stream, rest, (number, place), shared)
+                converse(stream, rest, (number, slot), shared)
             }
             None => refuse(out, "426 Upgrade Required", "here is a WebSocket, version 13"),
         },
@@ -90,7 +96,7 @@ pub(crate) fn serve(mut stream: TcpStream, (number, place): (u32, &Place), share
 }
 
 /// Reads the head of a request; returns it with the bytes that follow it.
-fn read_head(stream: &mut impl Read) -> io::Result<Result<(Head, Vec<u8>), &'static str>> {
+fn read_head(stream: &mut impl Read) -> io::Result<Result<(RequestHead, Vec<u8>), &'static str>> {
     let (mut bytes, mut part) = (Vec::new(), [0; 1024]);
     loop {
         let length = stream.read(&mut part)?;
@@ -98,7 +104,7 @@ fn read_head(stream: &mut impl Read) -> io::Result<Result<(Head, Vec<u8>), &'sta
             return Err(io::ErrorKind::UnexpectedEof.into());
         }
         bytes.extend_from_slice(part.get(..length).unwrap_or_default());
-        match Head::read(&bytes) {
+        match RequestHead::read(&bytes) {
             Ok(Some(head)) => {
                 let rest = bytes.split_off(head.length.min(bytes.len()));
                 return Ok(Ok((head, rest)));
@@ -111,7 +117,12 @@ fn read_head(stream: &mut impl Read) -> io::Result<Result<(Head, Vec<u8>), &'sta
 }
 
 /// Carries messages in both directions until the connection ends.
-fn converse(stream: TcpStream, rest: Vec<u8>, (number, place): (u32, &Place), shared: &Shared) -> io::Result<()> {
+fn converse(
+    stream: TcpStream,
+    rest: Vec<u8>,
+    (number, slot): (u32, &ConnectionSlot),
+    shared: &WebState,
+) -> io::Result<()> {
     let from = stream.peer_addr()?.to_string();
     stream.set_read_timeout(Some(NAP))?;
     stream.set_write_timeout(Some(PATIENCE))?;
@@ -124,13 +135,13 @@ fn converse(stream: TcpStream, rest: Vec<u8>, (number, place): (u32, &Place), sh
     limits.write_buffer_size = 0;
     let mut socket = WebSocket::from_partially_read(stream, rest, Role::Server, Some(limits));
     // The flight's loop handles this event within a millisecond.
-    if shared.events.send(Event::New(number, from, sender)).is_err() {
+    if shared.events.send(ClientEvent::New(number, from, sender)).is_err() {
         return Ok(());
     }
-    let end = exchange(&mut socket, &out, (number, place), shared);
+    let end = exchange(&mut socket, &out, (number, slot), shared);
     // If the flight has ended, nobody receives this event, and that is fine.
-    let _ = shared.events.send(Event::Gone(number));
-    let taken = (!place.is_page()).then(|| CloseFrame { code: CloseCode::Library(TAKEN), reason: TAKEN_BY.into() });
+    let _ = shared.events.send(ClientEvent::Gone(number));
+    let taken = (!slot.is_page()).then(|| CloseFrame { code: CloseCode::Library(TAKEN), reason: TAKEN_BY.into() });
     let _ = socket.close(taken).and_then(|()| socket.flush());
     end
 }
@@ -138,11 +149,11 @@ fn converse(stream: TcpStream, rest: Vec<u8>, (number, place): (u32, &Place), sh
 fn exchange(
     socket: &mut WebSocket<TcpStream>,
     out: &Receiver<Arc<str>>,
-    (number, place): (u32, &Place),
-    shared: &Shared,
+    (number, slot): (u32, &ConnectionSlot),
+    shared: &WebState,
 ) -> io::Result<()> {
-    let mut rate = Rate::new(Instant::now());
-    while place.is_page() {
+    let mut rate = RateCounter::new(Instant::now());
+    while slot.is_page() {
         loop {
             match out.try_recv() {
                 Ok(text) => socket.send(Message::text(text.as_ref())).map_err(in_io)?,
@@ -156,8 +167,8 @@ fn exchange(
                 return Ok(());
             }
             Ok(Message::Text(text)) => {
-                place.speaks();
-                if shared.events.send(Event::Said(number, text.as_str().into())).is_err() {
+                slot.speaks();
+                if shared.events.send(ClientEvent::Said(number, text.as_str().into())).is_err() {
                     return Ok(());
                 }
             }

@@ -8,7 +8,7 @@ const LINES_MAX: usize = 64;
 
 /// The parts of a head that are used.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Head {
+pub(crate) struct RequestHead {
     pub(crate) method: String,
     pub(crate) path: String,
     pub(crate) query: String,
@@ -20,12 +20,12 @@ pub(crate) struct Head {
     pub(crate) length: usize,
 }
 
-impl Head {
+impl RequestHead {
     /// Parses a head; returns `None` as long as it is incomplete.
     ///
     /// # Errors
     /// Fails with what is wrong with the head.
-    pub(crate) fn read(bytes: &[u8]) -> Result<Option<Head>, &'static str> {
+    pub(crate) fn read(bytes: &[u8]) -> Result<Option<RequestHead>, &'static str> {
         let mut lines = [EMPTY_HEADER; LINES_MAX];
         let mut request = Request::new(&mut lines);
         let length = match request.parse(bytes) {
@@ -53,7 +53,7 @@ impl Head {
         let socket_key = only("sec-websocket-key")?.filter(|_| upgrades && version.as_deref() == Some("13"));
         let target = request.path.unwrap_or_default();
         let (path, query) = target.split_once('?').unwrap_or((target, ""));
-        Ok(Some(Head {
+        Ok(Some(RequestHead {
             method: request.method.unwrap_or_default().into(),
             path: path.into(),
             query: query.into(),

@@ -1,7 +1,7 @@
 //! Listens on the port, with a thread for each connection.
 
-use crate::web::client::{Shared, serve};
-use crate::web::places::Places;
+use crate::web::client::{WebState, serve};
+use crate::web::slots::ConnectionSlots;
 use std::io::ErrorKind;
 use std::net::TcpListener;
 use std::sync::Arc;
@@ -12,8 +12,8 @@ use std::time::Duration;
 const NAP: Duration = Duration::from_millis(50);
 
 /// Accepts connections for as long as the program runs.
-pub(crate) fn listen(listener: &TcpListener, shared: &Arc<Shared>) {
-    let places = Places::default();
+pub(crate) fn listen(listener: &TcpListener, shared: &Arc<WebState>) {
+    let slots = ConnectionSlots::default();
     let mut number: u32 = 0;
     loop {
         let stream = match listener.accept() {
@@ -26,12 +26,12 @@ pub(crate) fn listen(listener: &TcpListener, shared: &Arc<Shared>) {
         };
         number = number.wrapping_add(1);
         // A client that is already gone needs no place.
-        let Ok(place) = places.enter(number, &stream) else { continue };
+        let Ok(slot) = slots.enter(number, &stream) else { continue };
         let shared = Arc::clone(shared);
         // If no thread can be started, the connection is closed and its place becomes free.
         let _ = thread::Builder::new().name("page".into()).spawn(move || {
             // It does not matter how a connection ends.
-            let _ = serve(stream, (number, &place), &shared);
+            let _ = serve(stream, (number, &slot), &shared);
         });
     }
 }

@@ -23,15 +23,15 @@
 
 mod admission;
 mod client;
-mod door;
+mod deadline;
 mod head;
 mod http;
 mod listener;
-mod places;
-mod timed;
+mod server;
+mod slots;
 mod token;
 
 pub use admission::Admission;
-pub use door::WebDoor;
-pub use places::{CONNECTIONS_MAX, PAGES_MAX};
+pub use server::WebServer;
+pub use slots::{CONNECTIONS_MAX, PAGES_MAX};
 pub use token::Token;

@@ -1,33 +1,37 @@
 //! `sitl pil`: flight of the firmware in the emulator.
 
-use crate::cli::in_the_loop::{InTheLoop, Recorder, outcome};
+use crate::cli::in_the_loop::{InTheLoopArgs, LoopRecorder, outcome};
 use crate::cli::interrupt;
-use crate::cli::terminal::{Failure, print};
+use crate::cli::terminal::{CommandError, print};
 use afbc_hil::{Host, MessagePeriods, Station};
 use afbc_scenario::Scenario;
 use afbc_sim::flight::Sample;
-use pil::{Emulator, Image, TwinComparison, Twins};
+use pil::{Emulator, FirmwareImage, LockstepComparison, LockstepPair};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
 /// Flies `scenario` with `image`, or with an image built from this source, and prints the results.
-pub(super) fn fly(scenario: &Scenario, flying: &InTheLoop, image: Option<PathBuf>) -> Result<ExitCode, Failure> {
+pub(super) fn fly(
+    scenario: &Scenario,
+    flying: &InTheLoopArgs,
+    image: Option<PathBuf>,
+) -> Result<ExitCode, CommandError> {
     let output = flying.output()?;
     let image = match image {
         Some(image) => image,
-        None => Image::Pil.build(flying.on.for_firmware()?.as_deref())?,
+        None => FirmwareImage::Pil.build(flying.on.for_firmware()?.as_deref())?,
     };
     let host = scenario.vehicle_file.as_ref().map_or_else(Host::new, Host::for_vehicle)?;
     interrupt::ends_it()?;
-    let mut twins = Twins::new(Emulator::start(&image)?, host);
-    let mut recorder = Recorder::new(scenario, output.as_ref())?;
+    let mut lockstep = LockstepPair::new(Emulator::start(&image)?, host);
+    let mut recorder = LoopRecorder::new(scenario, output.as_ref())?;
 
     let start = Instant::now();
     let observe = |sample: &Sample| recorder.observe(sample);
-    let end = afbc_hil::fly(scenario, &mut Station::new(), &mut twins, MessagePeriods::LOCKSTEP, observe)?;
+    let end = afbc_hil::fly(scenario, &mut Station::new(), &mut lockstep, MessagePeriods::LOCKSTEP, observe)?;
     let seconds = start.elapsed().as_secs_f64();
-    let comparison = twins.comparison();
+    let comparison = lockstep.comparison();
     interrupt::is_too_late();
     let metrics = recorder.finish()?;
 
@@ -43,9 +47,9 @@ pub(super) fn fly(scenario: &Scenario, flying: &InTheLoop, image: Option<PathBuf
     Ok(ExitCode::from(u8::from(!good)))
 }
 
-fn figures(comparison: &TwinComparison, seconds: f64) -> String {
-    let TwinComparison { ticks, armed_ticks, bits, differing_ticks, differing_bits, .. } = comparison;
-    let TwinComparison { first_difference, instructions, late_ticks, stack_bytes, .. } = comparison;
+fn figures(comparison: &LockstepComparison, seconds: f64) -> String {
+    let LockstepComparison { ticks, armed_ticks, bits, differing_ticks, differing_bits, .. } = comparison;
+    let LockstepComparison { first_difference, instructions, late_ticks, stack_bytes, .. } = comparison;
     let first = first_difference.map_or(String::new(), |tick| format!(", the first is tick {tick}"));
     let [min, mean, max] = [instructions.min(), instructions.mean(), instructions.max()];
     let rate = *ticks as f64 / seconds;

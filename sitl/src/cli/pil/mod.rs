@@ -3,9 +3,9 @@
 #[cfg(unix)]
 mod emulated;
 
-use super::in_the_loop::InTheLoop;
-use super::target::Target;
-use super::terminal::Failure;
+use super::in_the_loop::InTheLoopArgs;
+use super::target::TargetArg;
+use super::terminal::CommandError;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -15,22 +15,22 @@ use std::process::ExitCode;
 /// QEMU runs the firmware's machine code (built by this command or `cargo fw-pil`). The plant runs on the host, and
 /// both exchange only the link's bytes. Exits with 0 only if no bit differs and the vehicle was not lost.
 #[derive(Args, Debug)]
-pub(crate) struct Pil {
+pub(crate) struct PilArgs {
     /// Name of a built-in scenario, or path of a scenario file
     #[arg(default_value = "paper")]
-    scenario: Target,
+    scenario: TargetArg,
 
     #[command(flatten)]
-    flying: InTheLoop,
+    flying: InTheLoopArgs,
 
     /// Image to fly, instead of building the one of this source
     #[arg(long, value_name = "ELF")]
     image: Option<PathBuf>,
 }
 
-impl Pil {
+impl PilArgs {
     /// Builds the image, flies it and prints the results.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let scenario = self.flying.scenario(&self.scenario)?;
         emulated::fly(&scenario, &self.flying, self.image)
     }
@@ -38,10 +38,10 @@ impl Pil {
 
 #[cfg(not(unix))]
 mod emulated {
-    use super::{ExitCode, Failure, InTheLoop, PathBuf};
+    use super::{CommandError, ExitCode, InTheLoopArgs, PathBuf};
     use afbc_scenario::Scenario;
 
-    pub(super) fn fly(_: &Scenario, _: &InTheLoop, _: Option<PathBuf>) -> Result<ExitCode, Failure> {
+    pub(super) fn fly(_: &Scenario, _: &InTheLoopArgs, _: Option<PathBuf>) -> Result<ExitCode, CommandError> {
         Err("the emulator needs Unix, for its pipes and sockets; `sitl fly` flies the same scenario without it".into())
     }
 }
