@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Whatever changes the program, beside the commit.
+/// Inputs other than the commit that change the program.
 const SOURCES: [&str; 4] = ["build.rs", "src", "../crates", "../vehicles"];
 
 fn main() {

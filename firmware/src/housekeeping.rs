@@ -39,7 +39,7 @@ async fn task() {
 }
 
 /// Returns the number of stack bytes that no longer hold the value painted at start-up.
-#[expect(unsafe_code, reason = "the stack's bounds are linker symbols, and its unused part belongs to no object")]
+#[expect(unsafe_code, reason = "linker symbols bound the stack, and no object uses its free part")]
 #[inline(never)]
 fn deepest_stack() -> u32 {
     unsafe extern "C" {

@@ -141,7 +141,7 @@ pub fn change(table: &ParameterTable, change: RecordChange, number: u16) {
 /// Returns a problem with the parameters' flash as a text for stations. Each problem is returned once.
 pub fn trouble() -> Option<&'static str> {
     if UNREAD.swap(false, Ordering::Relaxed) {
-        return Some("parameters' flash cannot be read: not as set");
+        return Some("parameters' flash unreadable: using defaults");
     }
     UNWRITTEN.swap(false, Ordering::Relaxed).then_some("setting not kept: lost at restart unless set again")
 }

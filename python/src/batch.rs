@@ -69,7 +69,9 @@ impl PyBatch {
         let scenario = asked(scenario.as_ref(), "hover", vehicle.as_ref(), seed.as_ref())?;
         let first = scenario.seed;
         if first > SEEDS.end() - count {
-            return Err(error(format!("seed: {first} given; {count} vehicles have no seeds from there on")));
+            return Err(error(format!(
+                "seed: {first} given; seeds for {count} vehicles from there on exceed the largest seed"
+            )));
         }
         let mut worlds = Vec::new();
         let full = |_| PyMemoryError::new_err(format!("count: {count} vehicles do not fit into memory; take fewer"));

@@ -48,7 +48,7 @@ pub(crate) fn campaign<'py>(
         known.map_err(|problem| error(format!("shard {shard}: {problem}")))
     })?;
     if shard.of > plan.flights {
-        return Err(error(format!("shard {shard}: there are only {} flights; use fewer parts", plan.flights)));
+        return Err(error(format!("shard {shard}: the campaign has only {} flights; use fewer parts", plan.flights)));
     }
     let manifest = Manifest::new(&plan, shard);
     let rows = match out {
@@ -81,7 +81,7 @@ pub(crate) fn campaign<'py>(
 fn kept(plan: &Campaign, folder: &CampaignFolder, watch: &WorkProgress) -> Result<Vec<ResultRow>, String> {
     // Counts the flights flown now; those of earlier runs are reported as one sum.
     let summary = campaigns::fly(plan, folder, watch.stop(), &|done| watch.add(done));
-    let summary = summary.map_err(|error| error.to_string())?.ok_or("interrupted; the same call resumes")?;
+    let summary = summary.map_err(|error| error.to_string())?.ok_or("interrupted; repeat the same call to resume")?;
     concluded(folder, &summary)
 }
 
@@ -95,7 +95,7 @@ pub(crate) fn merge<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let (shards, out) = (shards.named("shards")?, out.named("out")?);
     if shards.is_empty() {
-        return Err(error("shards: none named; name the folders of all shards"));
+        return Err(error("shards: the list is empty; name the folders of all shards"));
     }
     let merged = watched(py, None, None, |_| {
         let (folder, summary) = campaigns::merge(&shards, &out, false).map_err(|error| error.to_string())?;
@@ -108,7 +108,7 @@ pub(crate) fn merge<'py>(
 /// Writes the report of a folder's flights and returns their rows.
 fn concluded(folder: &CampaignFolder, summary: &CampaignSummary) -> Result<Vec<ResultRow>, String> {
     afbc_report::campaign::write(folder.output_folder(), summary).map_err(|error| error.to_string())?;
-    let rows = folder.results().map_err(|error| error.to_string())?.ok_or("the results are gone")?;
+    let rows = folder.results().map_err(|error| error.to_string())?.ok_or("the results have been deleted")?;
     rows.collect::<Result<_, _>>().map_err(|error| error.to_string())
 }
 

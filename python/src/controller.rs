@@ -230,7 +230,7 @@ pub(crate) fn made(
         .ok_or_else(|| error(format!("{law}: no such law; {}", ControllerKind::cure(law))))?;
     let profile = Profile::ALL.into_iter().find(|known| known.name() == *profile).ok_or_else(|| {
         let known = Profile::ALL.map(Profile::name).join(", ");
-        error(format!("{profile}: no such profile; they are {known}"))
+        error(format!("{profile}: no such profile; the profiles are {known}"))
     })?;
     let mut contender = Contender::of(kind, profile);
     let (mut parameters, mut rotors) = (Parameters::PAPER, PLUS.map(|rotor| rotor.to_f64()).to_vec());
@@ -281,6 +281,6 @@ fn set(contender: &mut Contender, name: &str, value: f64) -> PyResult<()> {
     });
     match found {
         true => contender.law.validate().map_err(error),
-        false => Err(error(format!("{name}: no such gain; there are {}", known.join(", ")))),
+        false => Err(error(format!("{name}: no such gain; the gains are {}", known.join(", ")))),
     }
 }

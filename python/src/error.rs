@@ -9,7 +9,7 @@ create_exception!(
     afbc,
     AfbcError,
     PyValueError,
-    "Bad input, in the words of the command line: file, place, cure; a line for each mistake of a file."
+    "Bad input, described as on the command line: file, place and cure, with a line for each mistake of a file."
 );
 
 /// Returns the exception for `problem`. The mistakes of a file have a line each; other problems have one line, whatever

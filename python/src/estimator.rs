@@ -58,7 +58,9 @@ fn three(given: &Vector3Argument<'_>, name: &str) -> PyResult<Vector3<f32>> {
 impl PyEstimator {
     fn offer(&mut self, at_s: &NumberArgument<'_>, value: Measurement) -> PyResult<()> {
         if !value.is_plausible() {
-            return Err(error(format!("{value:?}: not plausible; check units, and that the attitude has length 1")));
+            return Err(error(format!(
+                "{value:?}: the value is not plausible; check units, and that the attitude has length 1"
+            )));
         }
         self.memory.offer(&Stamped { value, at_us: us(at_s, "at_s")? });
         Ok(())
@@ -203,7 +205,7 @@ impl PyEstimator {
                 Some(ImuSample { at_us: now_us, rates_rad_s, specific_force_m_s2 })
             }
             (None, None) => None,
-            _ => return Err(error("rates_rad_s, specific_force_m_s2: a sample has both; give both, or none")),
+            _ => return Err(error("rates_rad_s, specific_force_m_s2: a sample needs both; give both, or none")),
         };
         self.now_us = now_us;
         self.estimate = self.estimator.step(&mut self.memory, now_us, sample.as_ref());

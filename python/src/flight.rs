@@ -113,7 +113,7 @@ impl PyFlight {
         let columns = self.columns(py)?;
         columns.get_item(&column)?.ok_or_else(|| {
             let known = columns.keys();
-            PyKeyError::new_err(format!("no column {column:?}; there are {known}"))
+            PyKeyError::new_err(format!("no column {column:?}; the columns are {known}"))
         })
     }
 
@@ -131,7 +131,7 @@ impl PyFlight {
         let what = match (lost, rms) {
             (Some((time_s, reason)), _) => format!("lost at {time_s} s: {reason}"),
             (None, Some(rms_m)) => format!("{:.3} mm rms", 1000.0 * rms_m),
-            (None, None) => format!("ended before {SETTLED_S} s, from which errors count"),
+            (None, None) => format!("the flight ended before {SETTLED_S} s, from which on errors count"),
         };
         format!("Flight({scenario}, {contender}, {what})")
     }
@@ -183,9 +183,10 @@ fn log_rate(log_hz: Option<&CallArg<'_, u64>>, scenario: &Scenario) -> PyResult<
 /// Returns the names of the argument `controllers`; none if it was not given.
 fn chosen(controllers: Option<&CallArg<'_, Vec<String>>>) -> PyResult<Option<Vec<String>>> {
     match optional(controllers, "controllers")? {
-        Some(names) if names.is_empty() => {
-            Err(error("controllers: none named; name one, or leave it out for the scenario's own"))
-        }
+        Some(names) if names.is_empty() => Err(error(
+            "controllers: the list is empty; name a controller, or leave the argument out for the scenario's own \
+             controllers",
+        )),
         names => Ok(names),
     }
 }
@@ -281,7 +282,7 @@ pub(crate) fn compare<'py>(
     let scenarios = scenarios.named("scenarios")?;
     let mut scenarios = scenarios.iter().map(ScenarioArgument::scenario).collect::<PyResult<Vec<_>>>()?;
     if scenarios.is_empty() {
-        return Err(error("scenarios: none named; name one"));
+        return Err(error("scenarios: the list is empty; name a scenario"));
     }
     let own = comparison::contenders(&scenarios);
     let contenders = match chosen(controllers.as_ref())? {
@@ -312,8 +313,9 @@ fn planned(scenarios: &[Scenario], seeds: Option<u64>) -> PyResult<Vec<PlannedFl
     for scenario in scenarios {
         let seeds = seeds.unwrap_or_else(|| comparison::usual_seeds(scenario));
         let end = scenario.seed.checked_add(seeds);
-        let end =
-            end.ok_or_else(|| error(format!("seeds: {seeds} given; there are not as many from the scenario's")))?;
+        let end = end.ok_or_else(|| {
+            error(format!("seeds: {seeds} given; so many seeds from the scenario's on exceed the largest seed"))
+        })?;
         for contender in &scenario.contenders {
             planned.extend((scenario.seed..end).map(|seed| (scenario, contender, seed)));
         }

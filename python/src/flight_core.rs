@@ -127,7 +127,7 @@ impl PyFlightCore {
         let known = REQUESTS.iter().find(|(name, _)| *name == request);
         let (_, value) = known.ok_or_else(|| {
             let names = REQUESTS.map(|(name, _)| name).join(", ");
-            error(format!("{request}: no such request; they are {names}"))
+            error(format!("{request}: no such request; the requests are {names}"))
         })?;
         self.inbox.request(Ticketed { value: *value, ticket: 0 });
         Ok(())

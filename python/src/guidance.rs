@@ -43,7 +43,7 @@ pub(crate) struct PyGuidance {
 
 impl PyGuidance {
     fn order(&mut self, order: Order) -> PyResult<()> {
-        let full = || error("eight orders wait already; each step answers one");
+        let full = || error("eight orders are waiting already; call step, which answers one");
         self.orders.given.push_back(Ticketed { value: order, ticket: 0 }).map_err(|_| full())
     }
 }
@@ -102,7 +102,7 @@ impl PyGuidance {
         let known = MODES.into_iter().find(|known| words(known) == mode);
         let known = known.ok_or_else(|| {
             let names = MODES.map(|known| words(&known)).join(", ");
-            error(format!("{mode}: no such mode; they are {names}"))
+            error(format!("{mode}: no such mode; the modes are {names}"))
         })?;
         self.order(Order::Select(known))
     }
@@ -118,7 +118,7 @@ impl PyGuidance {
     ) -> PyResult<()> {
         let stick = |stick: CallArg<'_, f64>, name| match stick.named(name)? {
             value if (-1.0..=1.0).contains(&value) => Ok(value as f32),
-            value => Err(error(format!("{name}: {value} given; a stick is within -1 to 1"))),
+            value => Err(error(format!("{name}: {value} given; a stick must be within -1 to 1"))),
         };
         let (roll, pitch) = (stick(roll, "roll")?, stick(pitch, "pitch")?);
         let (yaw, throttle) = (stick(yaw, "yaw")?, stick(throttle, "throttle")?);
@@ -145,7 +145,7 @@ impl PyGuidance {
         let known = FLYING.iter().find(|(name, _)| *name == core);
         let (_, core) = known.ok_or_else(|| {
             let names = FLYING.map(|(name, _)| name).join(", ");
-            error(format!("{core}: no such mode of a flight core; they are {names}"))
+            error(format!("{core}: no such mode of a flight core; the modes are {names}"))
         })?;
         self.now_us += (self.dt_s * 1e6).round() as u64;
         if let Some(sticks) = &mut self.orders.sticks {

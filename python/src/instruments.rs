@@ -47,7 +47,7 @@ impl PyInstruments {
     ) -> PyResult<Self> {
         let scenario = asked(scenario.as_ref(), "outdoor", vehicle.as_ref(), seed.as_ref())?;
         let dt_s = step_s(&dt_s)?;
-        let cure = "has no instruments; give it a table [instruments], or take mocap or outdoor";
+        let cure = "the scenario has no instruments; add a table [instruments], or choose mocap or outdoor";
         let instruments = scenario.instruments(dt_s).map_err(error)?;
         let instruments = instruments.ok_or_else(|| error(format!("{}: {cure}", scenario.name)))?;
         Ok(PyInstruments { instruments })

@@ -21,7 +21,7 @@ pub(crate) fn replay<'py>(py: Python<'py>, log: CallArg<'py, PathBuf>) -> PyResu
     let replayed = replayed.map_err(error)?;
     if let EstimatorStart::Never(why) = replayed.start {
         let log = log.display();
-        return Err(error(format!("{log}: the estimator never started ({why}); record from rest on")));
+        return Err(error(format!("{log}: the estimator never started ({why}); record a log that begins at rest")));
     }
     let dict = PyDict::new(py);
     for (name, values) in afbc_report::replay::columns(&replayed.rows) {

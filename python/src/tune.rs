@@ -49,7 +49,7 @@ pub(crate) fn tune<'py>(
     let threads = argument::threads(threads.as_ref())?;
     let scenarios = optional(scenarios.as_ref(), "scenarios")?;
     if scenarios.as_ref().is_some_and(Vec::is_empty) {
-        return Err(error("scenarios: none named; name one, or leave it out for the training flights"));
+        return Err(error("scenarios: the list is empty; name a scenario, or leave it out for the training flights"));
     }
     let vehicle = vehicle::given(vehicle.as_ref())?;
     let start = match (&vehicle, flying) {

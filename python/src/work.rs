@@ -105,7 +105,8 @@ pub(crate) fn watched<T: Send>(
                 watch.stop.store(true, Ordering::Relaxed);
             }
         }
-        interrupted.and_then(|()| worker.join().map_err(|_| error("a flight ended by a panic; report it")))
+        interrupted
+            .and_then(|()| worker.join().map_err(|_| error("a flight ended with a panic; please report this bug")))
     });
     match law::take_error() {
         Some(error) => Err(error),

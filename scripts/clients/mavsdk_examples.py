@@ -69,7 +69,7 @@ EXAMPLES = {
     "offboard_position_velocity_ned": Example(70, "-- Stopping offboard"),
     "offboard_velocity_body": Example(90, "-- Stopping offboard"),
     "offboard_velocity_ned": Example(70, "-- Stopping offboard"),
-    "rtcm": Example(30, "", "RTK corrections are not used", **FOREVER),
+    "rtcm": Example(30, "", "RTK corrections are not supported", **FOREVER),
     # It ends before anything can be typed; scripts/clients/mavsdk_files.py types.
     "shell": Example(25, "nsh>"),
     "takeoff_and_land": Example(60, "-- Landing"),
@@ -78,7 +78,7 @@ EXAMPLES = {
     "telemetry_is_armed_is_in_air": Example(20, "Is_in_air: False", **FOREVER),
     "telemetry_status_text": Example(20, "Connected", **FOREVER),
     "telemetry_takeoff_and_land": Example(120, "Landing"),
-    "tune": Example(30, "Tune played", "there is no buzzer"),
+    "tune": Example(30, "Tune played", "the vehicle has no buzzer"),
     "upload_params": Example(60, "Params uploaded!", arguments=("udpin://0.0.0.0:14540", PARAMETERS)),
 }
 QUICK = ["geofence", "mission_import", "mission_raw", "tune"]

@@ -39,7 +39,8 @@ impl NetworkBoard {
             socket.set_nonblocking(true)?;
             Ok(socket)
         };
-        let socket = connect().map_err(|error: io::Error| format!("udp:{address}: cannot be reached ({error})"))?;
+        let socket =
+            connect().map_err(|error: io::Error| format!("udp:{address}: the address cannot be reached ({error})"))?;
         Ok(NetworkBoard { socket: Socket::Udp(socket), deadline: None })
     }
 
@@ -55,7 +56,8 @@ impl NetworkBoard {
             stream.set_write_timeout(Some(PATIENCE))?;
             Ok(stream)
         };
-        let stream = connect().map_err(|error: io::Error| format!("tcp:{address}: cannot be reached ({error})"))?;
+        let stream =
+            connect().map_err(|error: io::Error| format!("tcp:{address}: the address cannot be reached ({error})"))?;
         Ok(NetworkBoard { socket: Socket::Tcp(stream), deadline: None })
     }
 }
@@ -121,7 +123,7 @@ impl Autopilot for NetworkBoard {
 
 fn failed(error: io::Error) -> Error {
     let reason = if error.kind() == io::ErrorKind::ConnectionRefused {
-        "nobody listens at this port".into()
+        "no program listens at this port".into()
     } else {
         format!("the connection failed ({error})")
     };

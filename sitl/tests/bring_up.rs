@@ -29,7 +29,7 @@ fn a_served_vehicle_is_asked_everything() {
     assert!(matches!(output.status.code(), Some(0 | 1)), "{error}");
     let log = fs::read_to_string(folder.join("log.md")).unwrap();
     for wanted in [
-        "| board, as it was said | served |",
+        "| board, as given by the user | served |",
         concat!("| firmware | ", env!("CARGO_PKG_VERSION"), " |"),
         "| parameters | passed |",
         "| gyroscope | well |",
@@ -41,7 +41,7 @@ fn a_served_vehicle_is_asked_everything() {
     }
     // A second log does not replace the first.
     let error = refused(&sitl(&folder, &asked));
-    assert!(error.contains("log.md: exists already"), "{error}");
+    assert!(error.contains("log.md: the file exists already"), "{error}");
 }
 
 #[test]
@@ -62,8 +62,8 @@ fn what_is_no_board_is_refused_in_one_line() {
     for (connection, wanted) in [
         ("serial:/dev/no-such-board", "the serial port cannot be opened"),
         (silent.as_str(), "the board sends nothing"),
-        (closed.as_str(), "nobody listens at this port"),
-        (babbled.as_str(), "bytes and no MAVLink heartbeat"),
+        (closed.as_str(), "no program listens at this port"),
+        (babbled.as_str(), "bytes but no MAVLink heartbeat"),
         ("udp:nowhere", "nowhere: no such address"),
     ] {
         let output = sitl(&folder, &["bring-up", "--yes", "--connect", connection, "--out", "none.md"]);

@@ -45,7 +45,7 @@ const BAD: [(&str, &str, &str); 22] = [
     ("\"circle\"]", "\"hover\"]", ":7: trajectories: \"hover\" is listed twice"),
     ("[\"hover\", \"circle\"]", "[]", ":7: trajectories: the list is empty"),
     ("mass_ratio", "mas_ratio", ":10: spread.mas_ratio: unknown key; did you mean mass_ratio?"),
-    ("[0.7, 1.3]", "[1.3, 0.7]", ":10: spread.mass_ratio: 1.3 is above 0.7; write the smaller end first"),
+    ("[0.7, 1.3]", "[1.3, 0.7]", ":10: spread.mass_ratio: 1.3 is above 0.7; write the smaller number first"),
     ("[0.7, 1.3]", "[0.7, 130]", ":10: spread.mass_ratio: 130 is out of range: it must lie within 0.01 to 100"),
     ("rotor_efficiency = [0.0, 1.0]\n", "", "spread.fault_rotor: it has no effect without rotor_efficiency"),
     ("[1, 4]", "[1.5, 4]", "spread.fault_rotor: only whole numbers are drawn"),
@@ -69,13 +69,13 @@ fn a_bad_file_gets_one_line() {
         (&["campaign", "robust"][..], "robust: no such campaign; "),
         (&["campaign", "small.toml", "--flight", "150"], "the campaign has flights 0 to 149"),
         (&["campaign", "small.toml", "--flight", "1", "--contender", "me"], "it has: afbc, backstepping"),
-        (&["campaign", "small.toml", "--shard", "3/2"], "it must be I/N"),
-        (&["campaign", "small.toml", "--shard", "1/151"], "there are only 150 flights"),
+        (&["campaign", "small.toml", "--shard", "3/2"], "a shard must be I/N"),
+        (&["campaign", "small.toml", "--shard", "1/151"], "the campaign has only 150 flights"),
         (&["campaign", "small.toml", "--threads", "0"], "--threads <N>': it must be a whole number from 1 on"),
         (&["campaign", "small.toml", "--threads", "two"], "--threads <N>': it must be a whole number from 1 on"),
         (&["campaign", "small.toml", "--threads", "1.5"], "--threads <N>': it must be a whole number from 1 on"),
         (&["campaign", "small.toml", "--threads=-1"], "--threads <N>': it must be a whole number from 1 on"),
-        (&["merge", "nowhere", "-o", "merged"], "nowhere: no finished results"),
+        (&["merge", "nowhere", "-o", "merged"], "nowhere: the folder holds no finished results"),
     ] {
         fs::write(folder.join("small.toml"), SMALL).unwrap();
         let output = sitl(&folder, arguments);
@@ -123,7 +123,7 @@ fn a_signal_stops_it_at_any_time() {
         let output = child.wait_with_output().unwrap();
         let error = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(130), "{error}");
-        assert!(error.contains("the same command resumes"), "{error}");
+        assert!(error.contains("run the same command to resume"), "{error}");
         assert!(!out.join("results.parquet").exists());
     }
 }

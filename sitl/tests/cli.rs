@@ -50,7 +50,7 @@ const BAD_TABLES: [(&str, &str); 70] = [
     ),
     (
         "[vehicle]\nmass_kg = \"0.5\"",
-        ":5: vehicle.mass_kg: it is a string and must be a number (kilograms); write digits without quotes",
+        ":5: vehicle.mass_kg: the value is a string and must be a number (kilograms); write digits without quotes",
     ),
     (
         "[vehicle]\nmass_kg = nan",
@@ -60,10 +60,10 @@ const BAD_TABLES: [(&str, &str); 70] = [
         "[vehicle]\narm_m = -inf",
         ":5: vehicle.arm_m: -inf is not a finite number: it must lie within 0.01 to 10 (metres)",
     ),
-    ("[vehicle]\ninertia_kg_m2 = [1, 2]", ":5: vehicle.inertia_kg_m2: 2 values; it must hold three: [x, y, z]"),
+    ("[vehicle]\ninertia_kg_m2 = [1, 2]", ":5: vehicle.inertia_kg_m2: 2 values; write three, as in [x, y, z]"),
     (
         "[vehicle]\ninertia_kg_m2 = 1",
-        ":5: vehicle.inertia_kg_m2: it is a number and must be three numbers; write [x, y, z]",
+        ":5: vehicle.inertia_kg_m2: the value is a number and must be three numbers; write [x, y, z]",
     ),
     (
         "[vehicle]\ninertia_kg_m2 = [\n  1,\n  -1,\n  1]",
@@ -71,11 +71,12 @@ const BAD_TABLES: [(&str, &str); 70] = [
     ),
     ("[truth]\nmass = 0.5", ":5: truth.mass: unknown key; did you mean mass_kg (kilograms)?"),
     ("[gains.rol]\neta = 1", ":4: gains.rol: unknown key; did you mean roll?"),
-    ("[gains]\nroll = 1", ":5: gains.roll: it is a number and must be a table; write one table: [gains.roll]"),
+    ("[gains]\nroll = 1", ":5: gains.roll: the value is a number and must be a table; write one table: [gains.roll]"),
     ("[gains.z]\neta = -1", ":5: gains.z.eta: -1 is out of range: it must lie within 0 to 10000 (input per m or rad)"),
     (
         "[gains.x]\neta = 1\nwidth = 0.1",
-        ":4: gains.x.centre: centre / width = 100, out of range: it must lie within 0.1 to 6; change one of the two",
+        ":4: gains.x.centre: centre / width = 100, out of range: it must lie within 0.1 to 6; change the centre or the \
+         width",
     ),
     ("[settings]\ndt_s = 1", ":5: settings.dt_s: 1 is out of range: it must lie within 0.0001 to 0.02 (seconds)"),
     (
@@ -106,7 +107,8 @@ const BAD_TABLES: [(&str, &str); 70] = [
     ),
     (
         "[[gust]]\naxis = \"yaw\"\nmoment_n_m = 1\nangular_acceleration_rad_s2 = 1\nstart_s = 1",
-        ":6: gust.moment_n_m: a second size; axis \"yaw\" takes angular_acceleration_rad_s2 or moment_n_m, not both",
+        ":6: gust.moment_n_m: the gust has two sizes; axis \"yaw\" takes angular_acceleration_rad_s2 or moment_n_m, \
+         not both",
     ),
     (
         "[[gust]]\naxis = \"phi\"\nforce_n = 1\nstart_s = 1",
@@ -117,7 +119,10 @@ const BAD_TABLES: [(&str, &str); 70] = [
         "[[gust]]\naxis = \"x\"\nforce_n = 1\nstart_s = 1\nduration_s = -1",
         ":8: gust.duration_s: -1 is out of range: it must lie within 0.001 to 36000 (seconds)",
     ),
-    ("[gust]\naxis = \"x\"", ":4: gust: it is a table and must be a list of tables; write [[gust]], once for each"),
+    (
+        "[gust]\naxis = \"x\"",
+        ":4: gust: the value is a table and must be a list of tables; write [[gust]], once for each",
+    ),
     (
         "[[change]]\nparameter = \"weight\"\nfactor = 2\nstart_s = 1",
         ":5: change.parameter: \"weight\" is unknown; \
@@ -127,18 +132,19 @@ const BAD_TABLES: [(&str, &str); 70] = [
     ("[[change]]\nparameter = \"mass\"\nstart_s = 1", ":4: change.factor: missing; add it"),
     (
         "[[change]]\nparameter = \"mass\"\nstart_s = 1\nfactor = 0.01",
-        ":7: change.factor: it makes mass_kg = 0.00486, out of range: it must lie within 0.01 to 500; \
-         change the factor",
+        ":7: change.factor: the factor causes mass_kg = 0.00486, out of range: it must lie within 0.01 to 500; change \
+         the factor",
     ),
     (
         "[[change]]\nparameter = \"mass\"\nstart_s = 1\nfactor = 100\n\
          [[change]]\nparameter = \"mass\"\nstart_s = 2\nfactor = 100",
-        ":11: change.factor: it makes mass_kg = 4860, out of range: it must lie within 0.01 to 500; change the factor",
+        ":11: change.factor: the factor causes mass_kg = 4860, out of range: it must lie within 0.01 to 500; change \
+         the factor",
     ),
     ("[trajectory]\nkind = \"paper\"", ":4: syntax: duplicate key near `trajectory`; COMPARE"),
     ("[weather]\nx = 1", ":4: weather: unknown key; known here: ALL"),
     ("[wind]\nx = 1", ":5: wind.x: unknown key; known here: steady_m_s, turbulence, gust"),
-    ("[wind]\nsteady_m_s = [1, 0, 0]", ":4: wind: wind acts through drag, and there is none; add [drag]"),
+    ("[wind]\nsteady_m_s = [1, 0, 0]", ":4: wind: wind only acts through drag, and the vehicle has none; add [drag]"),
     (
         "[drag]\n[wind]\nturbulence = \"strong\"",
         ":6: wind.turbulence: \"strong\" is unknown; it must be \"light\", \"moderate\" or \"severe\"",
@@ -150,14 +156,14 @@ const BAD_TABLES: [(&str, &str); 70] = [
         ":5: drag.blade_n_s2_m: blade_n_s2_m = 0.5, out of range: it must lie within 0 to 0.0012034782790026014; \
          change it",
     ),
-    ("[drag]\narea_m2 = 1", ":5: drag.area_m2: it is a number and must be three numbers; write [x, y, z]"),
+    ("[drag]\narea_m2 = 1", ":5: drag.area_m2: the value is a number and must be three numbers; write [x, y, z]"),
     (
         "[rotors]\nmax_rad_s = 300\nforce_max_n = 3",
-        ":6: rotors.force_max_n: a second limit; write it or max_rad_s, not both",
+        ":6: rotors.force_max_n: the rotors have two limits; write force_max_n or max_rad_s, not both",
     ),
     (
         "[rotors]\nforce_max_n = 9999",
-        ":5: rotors.force_max_n: it makes max_rad_s = 18305.385, out of range: it must lie within 1 to 10000; \
+        ":5: rotors.force_max_n: the force causes max_rad_s = 18305.385, out of range: it must lie within 1 to 10000; \
          change the force",
     ),
     (
@@ -174,7 +180,7 @@ const BAD_TABLES: [(&str, &str); 70] = [
     ),
     (
         "[[rotor_fault]]\nrotor = 1.5\nefficiency = 1\nstart_s = 0",
-        ":5: rotor_fault.rotor: 1.5 is no rotor; it must be a whole number, 1 to 4",
+        ":5: rotor_fault.rotor: there is no rotor 1.5; write a whole number, 1 to 4",
     ),
     (
         "[battery]\nfull_v = 9",
@@ -182,11 +188,11 @@ const BAD_TABLES: [(&str, &str); 70] = [
     ),
     (
         "[ground]\nground_effect = 1",
-        ":5: ground.ground_effect: it is a number and must be true or false; write true or false without quotes",
+        ":5: ground.ground_effect: the value is a number and must be true or false; write true or false without quotes",
     ),
     (
         "[[payload]]\nmass_kg = 499.9\nstart_s = 1",
-        ":5: payload.mass_kg: it makes mass_kg = 500.386, out of range: it must lie within 0.01 to 500; \
+        ":5: payload.mass_kg: the payload causes mass_kg = 500.386, out of range: it must lie within 0.01 to 500; \
          change the payload",
     ),
     ("[sensors]\nnoise = 2", ":5: sensors.noise: 2 is out of range: it must lie within 0 to 1"),
@@ -198,10 +204,13 @@ const BAD_TABLES: [(&str, &str); 70] = [
     ),
     ("[gains.z]\nsigma = 11", ":5: gains.z.sigma: 11 is out of range: it must lie within 0 to 10 (1/s)"),
     ("[gains.z]\nepsilom = 1", ":5: gains.z.epsilom: unknown key; did you mean epsilon (m/s or rad/s)?"),
-    ("[[contender]]\ncontroller = \"afbc\"", ":4: contender.name: missing; give it one, such as \"gentle\""),
+    (
+        "[[contender]]\ncontroller = \"afbc\"",
+        ":4: contender.name: missing; give the contender a name, such as \"gentle\"",
+    ),
     (
         "[[contender]]\nname = \"a\\nb\"\ncontroller = \"pid\"",
-        ":5: contender.name: it cannot be a name; make it one plain line of 1 to 32 characters",
+        ":5: contender.name: this cannot be a name; write one plain line of 1 to 32 characters",
     ),
     (
         "[[contender]]\nname = \"a\"\ncontroller = \"pid\"\n[[contender]]\nname = \"a\"\ncontroller = \"pid\"",
@@ -214,7 +223,7 @@ const BAD_TABLES: [(&str, &str); 70] = [
     ),
     (
         "[[contender]]\nname = \"a\"\ncontroller = \"afbc\"\nsettings = { dt_s = 0.002 }",
-        ":7: contender.settings.dt_s: one step serves all contenders; set it in the file's own [settings]",
+        ":7: contender.settings.dt_s: all contenders share one time step; set it in the file's own [settings]",
     ),
     (
         "[[contender]]\nname = \"a\"\ncontroller = \"backstepping\"\n[contender.gains.x]\ngamma = 1",
@@ -232,7 +241,8 @@ const BAD_TABLES: [(&str, &str); 70] = [
     ("yaw_deg = 90", ":4: trajectory.yaw_deg: unknown key; did you mean yaw_rad (radians)?"),
     (
         "yaw_rad = true",
-        ":4: trajectory.yaw_rad: it is true or false and must be a number (radians); write digits without quotes",
+        ":4: trajectory.yaw_rad: the value is true or false and must be a number (radians); write digits without \
+         quotes",
     ),
     ("yaw_rad = 1e999", ":4: trajectory.yaw_rad: inf is not a finite number: it must lie within -100 to 100 (radians)"),
     ("yaw_rad = 0xffff", ":4: trajectory.yaw_rad: 65535 is out of range: it must lie within -100 to 100 (radians)"),
@@ -246,19 +256,19 @@ const BAD_TABLES: [(&str, &str); 70] = [
 const BAD_FILES: [(&str, &str); 28] = [
     (
         "flight_core = true\n[trajectory]\nkind = \"paper\"\n[settings]\ndt_s = 0.002",
-        ":1: flight_core: it cannot fly with dt_s = 0.002, out of range: it must lie within 0.001 to 0.001; \
-         change that, or leave flight_core out",
+        ":1: flight_core: the vehicle cannot fly with dt_s = 0.002, out of range: it must lie within 0.001 to 0.001; \
+         change that parameter, or leave flight_core out",
     ),
     (
         "flight_core = true\n[trajectory]\nkind = \"paper\"\n[initial]\nattitude_rad = [1, 0, 0]",
-        ":1: flight_core: it cannot fly with attitude_rad = 1, out of range: it must lie within -0.8 to 0.8; \
-         change that, or leave flight_core out",
+        ":1: flight_core: the vehicle cannot fly with attitude_rad = 1, out of range: it must lie within -0.8 to 0.8; \
+         change that parameter, or leave flight_core out",
     ),
     ("", ":1: trajectory: missing; add [trajectory] with kind = \"hover\" and position_m = [0, 0, 1]"),
     ("[trajectry]\nkind = \"paper\"", ":1: trajectry: unknown key; did you mean trajectory?"),
     (
         "[[trajectory]]\n[[trajectory]]",
-        ":1: trajectory: it is a list and must be a table; write one table: [trajectory]",
+        ":1: trajectory: the value is a list and must be a table; write one table: [trajectory]",
     ),
     (
         "[trajectory]\nkind = \"spiral\"",
@@ -277,8 +287,8 @@ const BAD_FILES: [(&str, &str); 28] = [
     ),
     (
         "[trajectory]\nkind = \"circle\"\ncentre_m = [0, 0, 1]\nradius_m = 100\nperiod_s = 0.5",
-        ":5: trajectory.period_s: it asks for 1.257e3 m/s, 1.579e4 m/s2, 1.984e5 m/s3 and 2.494e6 m/s4, \
-         more than a controller accepts (1e3, 1e3, 1e5 and 1e7 of these); allow more time",
+        ":5: trajectory.period_s: it asks for 1.257e3 m/s, 1.579e4 m/s2, 1.984e5 m/s3 and 2.494e6 m/s4, more than a \
+         controller accepts (1e3, 1e3, 1e5 and 1e7 of these units); allow more time",
     ),
     (
         "[trajectory]\nkind = \"waypoints\"",
@@ -288,29 +298,28 @@ const BAD_FILES: [(&str, &str); 28] = [
         "[trajectory]\nkind = \"waypoints\"\n\
          [[trajectory.waypoint]]\ntime_s = 3\nposition_m = [0, 0, 1]\n\
          [[trajectory.waypoint]]\ntime_s = 2\nposition_m = [0, 0, 2]",
-        ":7: trajectory.waypoint.time_s: 2 is not after the 3 of the waypoint before; make times rise",
+        ":7: trajectory.waypoint.time_s: 2 is not later than the 3 of the waypoint before; make the times increase",
     ),
     ("duration_s = -3", ":1: duration_s: -3 is out of range: it must lie within 0.1 to 36000 (seconds)"),
     ("duration = 3", ":1: trajectory: missing; add [trajectory] with kind = \"hover\" and position_m = [0, 0, 1]"),
     ("duration = 3\n[trajectory]\nkind = \"paper\"", ":1: duration: unknown key; did you mean duration_s (seconds)?"),
     (
         "duration_s = 1979-05-27",
-        ":1: duration_s: it is a date or time and must be a number (seconds); write digits without quotes",
+        ":1: duration_s: the value is a date or time and must be a number (seconds); write digits without quotes",
     ),
     ("name = \"../up\"", ":1: name: \"../up\" cannot be a name; NAME"),
     ("name = \"\"", ":1: name: \"\" cannot be a name; NAME"),
-    ("description = \"a\\nb\"", ":1: description: it has line breaks or control characters; make it one plain line"),
-    ("plant = \"real\"", ":1: plant: \"real\" is unknown; it must be \"simplified\" or \"rigid-body\""),
     (
-        "controllers = []",
-        ":1: controllers: the list is empty; \
-         it must hold LAWS",
+        "description = \"a\\nb\"",
+        ":1: description: the text has line breaks or control characters; make it one plain line",
     ),
+    ("plant = \"real\"", ":1: plant: \"real\" is unknown; it must be \"simplified\" or \"rigid-body\""),
+    ("controllers = []", ":1: controllers: the list is empty; add LAWS"),
     ("seed = 1.5", ":1: seed: 1.5 is not a whole number; leave out its decimals"),
     ("seed = 1000000001", ":1: seed: 1000000001 is out of range: it must lie within 0 to 1e9"),
     ("seed = 1000000000.5", ":1: seed: 1000000000.5 is not a whole number; leave out its decimals"),
     ("seed = -1", ":1: seed: -1 is out of range: it must lie within 0 to 1e9"),
-    ("monitor = 1", ":1: monitor: it is a number and must be true or false; write true or false without quotes"),
+    ("monitor = 1", ":1: monitor: the value is a number and must be true or false; write true or false without quotes"),
     ("controllers = [\"afbc\", \"afbc\"]", ":1: controllers: \"afbc\" is listed twice; once is enough"),
     ("profile = \"best\"", ":1: profile: \"best\" is unknown; it must be \"paper\" or \"flight\""),
 ];
@@ -321,7 +330,7 @@ fn expand(message: &str) -> String {
     message
         .replace("LAWS", &format!("{} or {last}", laws.join(", ")))
         .replace("COMPARE", "`sitl scenarios hover` prints a file to compare with")
-        .replace("NAME", "it must be 1 to 64 letters, digits, '-' or '_', since file names come from it")
+        .replace("NAME", "a name must be 1 to 64 letters, digits, '-' or '_', since file names are made from it")
         .replace(
             "ALL",
             "name, description, duration_s, seed, plant, vehicle, truth, controllers, profile, gains, settings, \
@@ -369,12 +378,17 @@ fn files_that_cannot_be_read_get_one_line() {
     let lists = "`sitl scenarios` lists the built-in ones";
     for (name, message) in [
         ("none.toml", format!("none.toml: no such file; {lists}")),
-        ("dir.toml", "dir.toml: it is a folder; name a scenario file in it".into()),
-        ("latin.toml", "latin.toml: it is not UTF-8 text; save it as UTF-8".into()),
-        ("large.toml", "large.toml: it is larger than 1 MiB, too large for a scenario; name another file".into()),
+        ("dir.toml", "dir.toml: this is a folder; name a scenario file in it".into()),
+        ("latin.toml", "latin.toml: the file is not UTF-8 text; save it as UTF-8".into()),
+        ("large.toml", "large.toml: the file is larger than 1 MiB, too large for a scenario; name another file".into()),
         ("my flight.toml", expand("my flight.toml:1: name: \"my flight\" cannot be a name; NAME")),
         ("hovr", "hovr: no such scenario; did you mean hover?".into()),
-        ("xyz", format!("xyz: no such scenario; {lists}; a file needs its path, as in ./my.toml")),
+        (
+            "xyz",
+            "xyz: no such scenario; `sitl scenarios` lists what is built in; for a file, write its path, as in \
+             ./my.toml"
+                .into(),
+        ),
     ] {
         let output = sitl(&folder, &["fly", name]);
         assert_eq!((stderr(&output), code(&output)), (format!("{message}\n"), 2));

@@ -250,7 +250,10 @@ fn a_manifest_of_others_writes_nothing_but_its_results() {
             continue;
         }
         let line = refused(&sitl(&folder, &["again", "theirs"]));
-        assert!(line.starts_with("theirs: its command ") && line.lines().count() == 1, "{command:?}: {line}");
+        assert!(
+            line.starts_with("theirs: the manifest's command ") && line.lines().count() == 1,
+            "{command:?}: {line}"
+        );
         let mut names: Vec<_> = fs::read_dir(&folder).unwrap().map(|it| it.unwrap().file_name()).collect();
         names.sort();
         assert_eq!(names, ["mine", "page.md", "soft.toml", "theirs"], "{command:?}");
@@ -286,7 +289,7 @@ fn campaigns_are_made_again() {
         let said = succeeds(&sitl(&folder, &["again", &format!("out/{name}")]));
         assert!(said.starts_with("the same bytes: ") && said.contains(&format!("out/{name}-again")), "{said}");
         let line = refused(&sitl(&folder, &["again", &format!("out/{name}/manifest.json")]));
-        assert!(line.starts_with(&format!("out/{name}-again: exists already; ")), "{line}");
+        assert!(line.starts_with(&format!("out/{name}-again: the folder exists already; ")), "{line}");
     }
     let commands =
         ["few", "whole"].map(|name| json(&folder.join(format!("out/{name}/manifest.json")))["command"].clone());
@@ -295,7 +298,7 @@ fn campaigns_are_made_again() {
     let output = sitl(&folder, &["again", "out/few", "--out", "other"]);
     let said = String::from_utf8(output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains("results.parquet: differs\n") && said.contains("what was flown is not the same"), "{said}");
+    assert!(said.contains("results.parquet: differs\n") && said.contains("the inputs differ"), "{said}");
 }
 
 /// Repeating a manifest gives the same bytes; differences are reported.
@@ -326,12 +329,15 @@ fn a_manifest_makes_the_same_results_again() {
     let output = sitl(&folder, &["again", "mine/round", "--out", "other"]);
     let said = String::from_utf8(output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains("round-soft.csv: differs\n") && said.contains("what was flown is not the same"), "{said}");
+    assert!(said.contains("round-soft.csv: differs\n") && said.contains("the inputs differ"), "{said}");
     // A modified manifest, and a missing one.
     let path = folder.join("mine/round/manifest.json");
     fs::write(&path, fs::read_to_string(&path).unwrap().replace("\"soft.toml\"", "\"hover\"")).unwrap();
     let line = refused(&sitl(&folder, &["again", "mine/round"]));
-    assert!(line.starts_with("mine/round/manifest.json: damaged or no manifest (its checksum is wrong)"), "{line}");
+    assert!(
+        line.starts_with("mine/round/manifest.json: the file is damaged or no manifest (the file's checksum is wrong)"),
+        "{line}"
+    );
     let line = refused(&sitl(&folder, &["again", "nowhere.json"]));
     assert!(line.starts_with("nowhere.json: cannot be read") && line.lines().count() == 1, "{line}");
 }
@@ -393,7 +399,7 @@ fn compare_refuses_what_it_cannot_fly() {
     let line = refused(&sitl(&folder, &["compare", "hardwear"]));
     assert_eq!(line, "hardwear: no such scenario; did you mean hardware?\n");
     let line = refused(&sitl(&folder, &["compare", "hover", "--controllers", "pid,pid"]));
-    assert_eq!(line, "controllers pid: named twice; once is enough\n");
+    assert_eq!(line, "controllers pid: the controller is named twice; name it once\n");
     refused(&sitl(&folder, &["compare", "hover", "--seeds", "0"]));
     assert!(!folder.join("out").exists());
 }
@@ -472,7 +478,10 @@ fn a_suites_table_is_written_between_its_markers() {
 
     fs::write(folder.join("page.md"), "no markers").unwrap();
     let line = refused(&sitl(&folder, &write));
-    assert!(line.starts_with("page.md: no place for the table; add the lines <!-- suite two: begin -->"), "{line}");
+    assert!(
+        line.starts_with("page.md: the page has no place for the table; add the lines <!-- suite two: begin -->"),
+        "{line}"
+    );
 }
 
 #[test]
@@ -538,7 +547,7 @@ fn random_flights_are_alike_on_any_number_of_threads() {
 #[test]
 fn random_flights_that_cannot_be_drawn_are_refused_in_one_line() {
     let folder = folder("random-refused");
-    let own = "drawn from a seed, not a file; fly it with `sitl compare --suite random --seed N`";
+    let own = "this suite is drawn from a seed, so it has no file; fly it with `sitl compare --suite random --seed N`";
     for (arguments, expected) in [
         (&["suites", "random"][..], &*format!("random: {own}")),
         (&["compare", "--suite", "random", "--vehicle", "raser"], "vehicle: \"raser\" is no built-in vehicle"),
@@ -583,13 +592,25 @@ fn rough_flights_are_alike_on_any_number_of_threads() {
     assert!(succeeds(&sitl(&folder, &["suites"])).contains("rough-estimate  150 flights  drawn from --seed"));
     let rough = ["compare", "--suite", "rough-estimate"];
     for (arguments, expected) in [
-        (&["suites", "rough-estimate"][..], "rough-estimate: drawn from a seed, not a file; fly it with"),
-        (&[&rough[..], &["--on-estimate"]].concat(), "--on-estimate: only --suite random takes it; leave it out"),
-        (&[&rough[..], &["--against", "afbc-monitored"]].concat(), "--against: --suite rough-estimate compares nobody"),
-        (&[&rough[..], &["--controllers", "afbc,pid"]].concat(), "--controllers: the estimate of one law at a time"),
+        (
+            &["suites", "rough-estimate"][..],
+            "rough-estimate: this suite is drawn from a seed, so it has no file; fly it with",
+        ),
+        (
+            &[&rough[..], &["--on-estimate"]].concat(),
+            "--on-estimate: only --suite random has this option; leave --on-estimate out",
+        ),
+        (
+            &[&rough[..], &["--against", "afbc-monitored"]].concat(),
+            "--against: --suite rough-estimate compares no contenders",
+        ),
+        (
+            &[&rough[..], &["--controllers", "afbc,pid"]].concat(),
+            "--controllers: this suite judges the estimate with one law",
+        ),
         (
             &["compare", "--suite", "random", "--duration", "9"],
-            "--duration: only --suite rough-estimate takes it; leave it out",
+            "--duration: only --suite rough-estimate has this option; leave --duration out",
         ),
     ] {
         let line = refused(&sitl(&folder, arguments));
@@ -651,7 +672,10 @@ fn tune_refuses_what_it_cannot_do() {
     let line = refused(&sitl(&folder, &["tune", "hard", "--scenario", "soft.toml"]));
     assert!(line.ends_with("; the scenario's contenders backstepping, soft\n"), "{line}");
     let line = refused(&sitl(&folder, &["tune", "pid", "--out", "nowhere/pid.toml"]));
-    assert!(line.starts_with("nowhere/pid.toml: cannot be written (there is no folder nowhere); "), "{line}");
+    assert!(
+        line.starts_with("nowhere/pid.toml: the file cannot be written (the folder nowhere does not exist); "),
+        "{line}"
+    );
     refused(&sitl(&folder, &["tune", "pid", "--budget", "0"]));
 }
 

@@ -68,7 +68,7 @@ fn a_difference_ends_with_1() {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.starts_with("flight.log: byte ") && said.contains("tick ") && said.lines().count() == 1, "{said}");
-    assert!(String::from_utf8_lossy(&output.stdout).contains("give the same again"));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("give the same results again"));
 }
 
 #[test]

@@ -148,7 +148,7 @@ fn a_part_is_not_merged_into_itself() {
         let output = sitl(&folder, &[&["merge", "part-1", "part-2"], more].concat());
         let error = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(2), "{error}");
-        assert!(error.starts_with("part-1: one of the parts; "), "{error}");
+        assert!(error.starts_with("part-1: the folder is one of the parts; "), "{error}");
         assert_eq!(contents(&folder.join("part-1")), before);
     }
 }

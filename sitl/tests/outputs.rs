@@ -67,7 +67,10 @@ fn nothing_that_is_there_is_replaced_unasked() {
             let error = refused(&sitl(&folder, &[command, &[FILE]].concat()));
             assert_eq!(error.lines().count(), 1, "{command:?}: {error}");
             let cure = if forcible { "--force" } else { "remove that one" };
-            assert!(error.starts_with(&format!("{FILE}: exists already; ")) && error.contains(cure), "{error}");
+            assert!(
+                error.starts_with(&format!("{FILE}: the file exists already; ")) && error.contains(cure),
+                "{error}"
+            );
             assert_eq!((fs::symlink_metadata(&path).unwrap().file_type(), fs::read(&path).ok()), before, "{command:?}");
             assert!(!folder.join("nowhere").exists() && !folder.join("out").exists(), "{command:?}");
             fs::remove_file(&path).unwrap();
@@ -117,7 +120,7 @@ fn pages_of_the_manual_are_replaced_by_force_alone() {
     let folder = folder("manual");
     fs::write(folder.join("sitl-fly.1"), "mine").unwrap();
     let error = refused(&sitl(&folder, &["man", "."]));
-    assert!(error.contains("sitl-fly.1: exists already") && error.contains("--force"), "{error}");
+    assert!(error.contains("sitl-fly.1: the file exists already") && error.contains("--force"), "{error}");
     assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
     succeeds(&sitl(&folder, &["man", ".", "--force"]));
     assert_ne!(fs::read(folder.join("sitl-fly.1")).unwrap(), b"mine");
@@ -160,7 +163,7 @@ fn results_of_another_command_line_are_kept() {
         // A modified file is kept, even for the same command.
         fs::write(out.join("report.html"), "mine").unwrap();
         let error = refused(&sitl(&folder, same));
-        assert!(error.contains("report.html: changed since"), "{error}");
+        assert!(error.contains("report.html: the file was changed after"), "{error}");
         assert_eq!(fs::read(out.join("report.html")).unwrap(), b"mine");
         succeeds(&sitl(&folder, &[same, &["--force"]].concat()));
     }

@@ -74,9 +74,12 @@ fn a_bad_line_gets_one_line_and_changes_nothing() {
     fs::write(folder.join("short.store"), "no store").unwrap();
     for (arguments, expected) in [
         (&["params", "export", "--store", "none.store"][..], "none.store: No such file"),
-        (&["params", "export", "--store", "short.store"], "short.store: no store of parameters: 8 bytes, not 32768"),
+        (
+            &["params", "export", "--store", "short.store"],
+            "short.store: the file is no parameter store: it has 8 bytes instead of 32768",
+        ),
         (&["params", "import", "none.params", "--store", "a.store"], "none.params: cannot be read"),
-        (&["params", "import", "none.params"], "--store: missing"),
+        (&["params", "import", "none.params"], "--store is missing"),
         (&["params", "export", "--vehicle", "racr"], "vehicle: \"racr\" is no built-in vehicle"),
     ] {
         let error = refused(&sitl(&folder, arguments));
@@ -95,9 +98,9 @@ fn a_store_that_does_not_fit_is_reported() {
         (succeeds(&output), String::from_utf8(output.stderr).unwrap())
     };
     assert_eq!(diff("paper", "a.store"), ("MOT_IDLE         0.05 -> 0.07\n".into(), String::new()));
-    let reported = "a.store: parameters: stored for another vehicle, not used\n";
+    let reported = "a.store: parameters: stored for another vehicle, ignored\n";
     assert_eq!(diff("iris", "a.store"), (String::new(), reported.into()));
     fs::write(folder.join("b.store"), vec![0x5A; 32 * 1024]).unwrap();
-    let reported = "b.store: parameters: store unreadable, all at defaults\n";
+    let reported = "b.store: parameters: store unreadable, using defaults\n";
     assert_eq!(diff("paper", "b.store"), (String::new(), reported.into()));
 }

@@ -57,7 +57,7 @@ fn flights_are_lines_and_seeds_of_one_law_a_band() {
         let said = run(&folder, &command);
         assert_eq!(said, format!("{file}: 60.0 mm wide, 1 panels\n"));
         let line = refused(&sitl(&folder, &command));
-        assert!(line.starts_with(&format!("{file}: exists already; ")), "{line}");
+        assert!(line.starts_with(&format!("{file}: the file exists already; ")), "{line}");
     }
 }
 
@@ -75,7 +75,7 @@ fn a_campaign_is_drawn_over_what_it_draws() {
     assert_eq!((lines(&svg).len(), bands(&svg)), (2, 4));
     assert!(svg.contains(">indi</text>") && svg.contains(">mass ratio</text>"), "{svg}");
     let line = refused(&sitl(&folder, &[&plot[..5], &["other.svg"]].concat()));
-    assert!(line.starts_with("few/results.parquet: no column of time beside rmse_position_m"), "{line}");
+    assert!(line.starts_with("few/results.parquet: the log has no time column for rmse_position_m"), "{line}");
 }
 
 /// The same flight as ULog and as MCAP gives the same figure.
@@ -104,10 +104,10 @@ fn what_cannot_be_drawn_is_refused_in_one_line() {
     fs::write(folder.join("log.csv"), "time_s,x_m\n0,1\n1,2\n").unwrap();
     for (arguments, expected) in [
         (&["log.csv", "--y", "xm"][..], "log.csv: no column xm; did you mean x_m?"),
-        (&["nothing.csv", "--y", "x_m"], "nothing.csv: cannot be read"),
-        (&["log.csv", "--y", "x_m", "--out", "figure.jpg"], "--out figure.jpg: the end of the name says the format"),
+        (&["nothing.csv", "--y", "x_m"], "nothing.csv: the log cannot be read"),
+        (&["log.csv", "--y", "x_m", "--out", "figure.jpg"], "--out figure.jpg: the name's ending selects the format"),
         (&["log.csv", "--y", "x_m", "--from", "5", "--to", "9"], "--out figure.pdf: x [m]: no numbers to draw"),
-        (&["log.csv", "--y", "x_m", "--width", "9mm"], "--out figure.pdf: 9 mm leave no room"),
+        (&["log.csv", "--y", "x_m", "--width", "9mm"], "--out figure.pdf: a width of 9 mm leaves no room"),
     ] {
         let line = refused(&sitl(&folder, &[&["plot"], arguments].concat()));
         assert!(line.starts_with(expected) && line.lines().count() == 1, "{line}");

@@ -18,7 +18,7 @@ fn says_how_far_the_estimates_are_apart() {
     let folder = folder("apart");
     log_at_rest(&folder, 15);
     let said = succeeds(&sitl(&folder, &["replay", "rest.csv"]));
-    assert!(said.contains("attitude") && said.contains("Started at rest") && !said.contains("Missing"), "{said}");
+    assert!(said.contains("attitude") && said.contains("started at rest") && !said.contains("Missing"), "{said}");
     let out = folder.join("out/replay-rest");
     let found = summary(&folder, "replay-rest");
     let number = |key: &str| found[key].as_f64().unwrap();
@@ -125,16 +125,16 @@ fn what_is_no_log_is_refused_in_one_line() {
         ("bare.ulg", b"ULog\x01\x12\x35\x01\0\0\0\0\0\0\0\0", "sensor_combined"),
         ("text.csv", b"hello\nworld\n", "not a log"),
         ("picture.png", b"\x89PNG\r\n\x1a\n\0\0\0", "not a log"),
-        ("nan.csv", b"1000,imu,nan,nan,nan,nan,nan,nan\n", "no usable line of kind imu"),
-        ("gps.csv", b"1000,gps,488000,85456073,473977508,0,0,0\n", "no line of kind imu"),
+        ("nan.csv", b"1000,imu,nan,nan,nan,nan,nan,nan\n", "the log has no usable line of kind imu"),
+        ("gps.csv", b"1000,gps,488000,85456073,473977508,0,0,0\n", "the log has no line of kind imu"),
     ] {
         fs::write(folder.join(name), bytes).unwrap();
         let said = refused(&sitl(&folder, &["replay", name]));
         assert!(said.starts_with(&format!("{name}: ")) && said.contains(words) && said.contains(';'), "{said}");
         assert_eq!(said.lines().count(), 1, "{said}");
     }
-    assert!(refused(&sitl(&folder, &["replay", "nothing.ulg"])).starts_with("nothing.ulg: cannot be read"));
-    assert!(refused(&sitl(&folder, &["replay", "."])).starts_with(".: cannot be read"));
+    assert!(refused(&sitl(&folder, &["replay", "nothing.ulg"])).starts_with("nothing.ulg: the log cannot be read"));
+    assert!(refused(&sitl(&folder, &["replay", "."])).starts_with(".: the log cannot be read"));
     fs::remove_file(folder.join("rest_ekf2.csv")).unwrap();
     let said = refused(&sitl(&folder, &["replay", "rest.csv"]));
     assert!(said.starts_with("rest.csv: the estimator never started (at rest, but not yet for long enough)"), "{said}");

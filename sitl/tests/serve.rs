@@ -63,14 +63,14 @@ fn what_cannot_be_served_is_refused_in_one_line() {
     let folder = folder("refused");
     for (arguments, wanted) in [
         (&["serve", "--port", port.as_str()] as &[&str], "is taken, perhaps by another sitl serve"),
-        (&["serve", "--port", "0", "--do", "wind 5"], "--do 'wind 5': wind X Y Z: it needs three numbers"),
-        (&["serve", "--port", "0", "--do", "quit"], "--do 'quit': it has no effect before the start"),
+        (&["serve", "--port", "0", "--do", "wind 5"], "--do 'wind 5': wind X Y Z: three numbers are needed"),
+        (&["serve", "--port", "0", "--do", "quit"], "--do 'quit': this command has no effect before the start"),
         (&["serve", "--port", "0", "--station", "nobody"], "--station nobody: no such address"),
         (&["serve", "--port", "0", "--scenario", "outdor"], "no such scenario; did you mean outdoor?"),
-        (&["serve", "--port", "0", "--scenario", "hover"], "the vehicle has no sensors to fly on"),
+        (&["serve", "--port", "0", "--scenario", "hover"], "the vehicle has no sensors to fly with"),
         (&["serve", "--port", "0", "--bind", "192.0.2.1"], "192.0.2.1 is no address of this machine"),
         (&["serve", "--port", "0", "--parameters", "no/such"], "no/such: its folder does not exist; make it first"),
-        (&["serve", "--port", "65535", "--vehicles", "2"], "ports from 65535 on are not enough for 2 vehicles"),
+        (&["serve", "--port", "65535", "--vehicles", "2"], "the ports from 65535 on do not suffice for 2 vehicles"),
     ] {
         let error = refused(&sitl(&folder, arguments));
         assert!(error.contains(wanted) && error.lines().count() == 1, "{arguments:?}: {error}");

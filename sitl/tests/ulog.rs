@@ -55,7 +55,7 @@ fn served_vehicles_have_a_log_each() {
     assert!(is_log(&folder.join("two.7.ulg")) && is_log(&folder.join("two.8.ulg")) && !folder.join("two.ulg").exists());
     let again = [&SERVE[..], &["--ulog", "one.ulg", "--do", "at 2 quit"]].concat();
     let said = refused(&sitl(&folder, &again));
-    assert!(said.starts_with("one.ulg: exists already") && said.lines().count() == 1, "{said}");
+    assert!(said.starts_with("one.ulg: the file exists already") && said.lines().count() == 1, "{said}");
 }
 
 /// In a folder, each start writes the next file; with several vehicles, each has a folder of its own.
@@ -83,7 +83,7 @@ fn a_full_disc_costs_the_log_alone() {
     let script = format!("trap '' XFSZ; ulimit -f 400; exec {sitl} {serve}");
     let output = std::process::Command::new("sh").current_dir(&folder).args(["-c", &script]).output().unwrap();
     let said = succeeds(&output);
-    let told: Vec<_> = said.lines().filter(|line| line.contains("full.ulg: the log has ended early")).collect();
+    let told: Vec<_> = said.lines().filter(|line| line.contains("full.ulg: the log ended early")).collect();
     assert!(told.len() == 1 && said.contains("6.000 ok at 6 quit"), "{said}");
     assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(is_log(&folder.join("full.ulg")));

@@ -217,7 +217,7 @@ fn a_bit_of_the_file_is_named_by_its_frame() {
 #[test]
 fn what_is_no_log_is_refused_in_one_line() {
     assert!(line("empty", &[]).contains("empty"));
-    assert!(line("foreign", b"#!/bin/sh\necho hello\n").contains("nothing in it is an exact log"));
+    assert!(line("foreign", b"#!/bin/sh\necho hello\n").contains("the file is not an exact log"));
     assert!(line("zeros", &[0; 1_000]).contains("nothing in it"));
     assert!(line("ulog", b"ULog\x01\x12\x35\x01\0\0\0\0\0\0\0\0").contains("without --exact"));
     let mut random = Xoshiro256PlusPlus::seed_from_u64(14);
@@ -236,7 +236,7 @@ fn what_is_no_log_is_refused_in_one_line() {
     assert!(line("version", &renamed(|start| start.version = 1)).contains("version 1"));
     assert!(line("vehicle", &renamed(|start| start.vehicle = "mine".try_into().unwrap())).contains("--vehicle"));
     assert!(line("law", &renamed(|start| start.law = "magic".try_into().unwrap())).contains("law 'magic'"));
-    assert!(line("digest", &renamed(|start| start.digest ^= 1)).contains("is not what it was"));
+    assert!(line("digest", &renamed(|start| start.digest ^= 1)).contains("differs from the one that flew"));
     assert!(line("rotors", &renamed(|start| start.rotors = 6)).contains("6 rotors"));
     let missing = replay(Path::new("no/such.log"), None, &[], |_| {}).unwrap_err().to_string();
     assert!(missing.contains("no/such.log") && missing.contains("cannot be read"), "{missing}");

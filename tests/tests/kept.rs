@@ -65,7 +65,7 @@ fn a_store_in_a_file_is_whole_and_belongs_to_one_program() {
     let mut store = Store::open(FlashFile::open(&path).unwrap(), 0, 1).unwrap();
     store.make_room().unwrap();
     store.set(RecordName::new("A").unwrap(), 0, Some(7)).unwrap();
-    assert_eq!(FlashFile::open_existing(&path).unwrap_err().to_string(), "in use by another program");
+    assert_eq!(FlashFile::open_existing(&path).unwrap_err().to_string(), "another program uses the file");
     drop(store);
     // The write was cut in the middle: the second half of the record is missing.
     let mut bytes = fs::read(&path).unwrap();

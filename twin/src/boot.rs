@@ -158,12 +158,12 @@ pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
     });
     println!("{} bytes on the link: {messages} messages, {heartbeats} of them heartbeats", bytes.len());
     for pair in feeds.windows(2).filter(|pair| (pair[1] - pair[0]).abs_diff(TICK) > M::JITTER) {
-        println!("at {} us: {} us without a tick", pair[0] / 1000, (pair[1] - pair[0]) / 1000);
+        println!("at {} us: no tick for {} us", pair[0] / 1000, (pair[1] - pair[0]) / 1000);
     }
     let periods: Vec<u64> = feeds.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let (least, most) = (periods.iter().min().ok_or("the watchdog is not fed")?, periods.iter().max().ok_or("")?);
     let first = feeds[0] / TICK;
-    println!("{} ticks from {first} ms on, {least} to {most} ns apart, each feeds the watchdog", feeds.len());
+    println!("{} ticks from {first} ms on, {least} to {most} ns apart; each feeds the watchdog", feeds.len());
     check(feeds.len() as u64 + first >= END / TICK - 1, "no tick is missing")?;
     check(least.abs_diff(TICK) <= M::JITTER && most.abs_diff(TICK) <= M::JITTER, "1 kHz")?;
 
@@ -172,11 +172,11 @@ pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
         Signal::Dshot600(_) => looks * LOOK_EVERY / TICK * BITS * BIT_NS / LOOK_EVERY,
         Signal::Pwm400 => *looks,
     };
-    println!("pulses at {pulses:?} of {looks} looks at the motors' pins; stopped motors have {carried}");
+    println!("pulses seen in {pulses:?} of {looks} samples of the motors' pins; stopped motors have {carried}");
     check(wrong.is_empty(), &format!("{:?}: {wrong:?}", M::SIGNAL))?;
     check(pulses.iter().all(|pulses| pulses.abs_diff(carried) * 10 <= carried), "every motor has its pulses")?;
 
-    check(floating.is_empty(), &format!("pins that float on a board: {floating:?}"))?;
+    check(floating.is_empty(), &format!("pins that would float on a real board: {floating:?}"))?;
     check(!M::STORES || *store & 0xFFFF_FFFF != 0xFFFF_FFFF, "the parameters' store has a header")?;
     check(heartbeats >= 2, "a heartbeat every second")?;
     println!("battery: {battery_mv:?} mV");
@@ -185,7 +185,7 @@ pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
     let unmapped: Vec<_> = finished.session.unmapped().iter().map(|access| access.address).collect();
     let refused = finished.session.refused().len();
     println!("unmapped accesses: {unmapped:x?}, refused: {refused}");
-    check(unmapped.iter().all(|address| M::UNMAPPED.contains(address)), "no unmapped accesses but those known")?;
+    check(unmapped.iter().all(|address| M::UNMAPPED.contains(address)), "no unmapped accesses except the known ones")?;
     check(refused == 0, "no refused accesses")?;
     check(finished.session.resets().is_empty(), "no reset")
 }

@@ -55,7 +55,8 @@ impl StickPilot for TelemetryCheck {
                 let off_rad_s = (least - told_rad_s).max(told_rad_s - most).max(0.0);
                 self.most_rad_s = self.most_rad_s.max(off_rad_s);
                 if off_rad_s > COARSE_RAD_S + 0.1 {
-                    return Err(format!("rotor {rotor}: {told_rad_s:.1} rad/s told of {least:.1} to {most:.1}"));
+                    return Err(format!("rotor {rotor}: telemetry reports {told_rad_s:.1} rad/s, the rotor turned at \
+                         {least:.1} to {most:.1} rad/s"));
                 }
                 let expected_v = f32::from(voltage_cv(rotor)) * 0.01;
                 // Bidirectional DSHOT reports speeds only.
@@ -90,7 +91,7 @@ impl StickPilot for RotorStopTest {
         if let Some((_, text)) = vehicle.pilot.heard().iter().find(|(_, text)| text.starts_with("rotor"))
             && (now_ms < stops_ms || !is_said(text))
         {
-            return Err(format!("it says \"{text}\" in place of \"{says}\""));
+            return Err(format!("the vehicle says \"{text}\" instead of \"{says}\""));
         }
         if now_ms == stops_ms {
             vehicle.pilot.stop_rotor(self.rotor);
@@ -108,7 +109,7 @@ pub fn fly<M: Machine>(image: &Path, scenario: &Path, on_lines: bool) -> Result<
     let stick_pilot = TelemetryCheck { on_lines, ..TelemetryCheck::default() };
     let TelemetryCheck { messages, most_rad_s, .. } = hover.resume(FRAME_NS, 0, stick_pilot)?.stick_pilot;
     println!(
-        "{messages} messages ESC_STATUS, at most {most_rad_s:.1} rad/s beside the rotors' speeds of the last 60 ms"
+        "{messages} messages ESC_STATUS, off by at most {most_rad_s:.1} rad/s from the rotors' speeds of the last 60 ms"
     );
     check(messages >= MESSAGES, "the motor controllers are heard")?;
     let mut all_ms = Vec::new();
@@ -116,10 +117,10 @@ pub fn fly<M: Machine>(image: &Path, scenario: &Path, on_lines: bool) -> Result<
         for late_ms in (0..STOPS).map(|nth| nth * APART_MS) {
             let stick_pilot = RotorStopTest { on_lines, rotor, late_ms, began_ms: None, told_ms: None };
             let told_ms = hover.resume(FRAME_NS, 0, stick_pilot)?.stick_pilot.told_ms;
-            all_ms.push(told_ms.ok_or_else(|| format!("rotor {rotor}: its stop is not told"))?);
+            all_ms.push(told_ms.ok_or_else(|| format!("rotor {rotor}: telemetry does not report the stop"))?);
         }
     }
     let (least_ms, most_ms) = (all_ms.iter().min().ok_or("no rotor")?, all_ms.iter().max().ok_or("no rotor")?);
-    println!("{} stopped rotors are told {least_ms} to {most_ms} ms after they stop being driven", all_ms.len());
-    check(*most_ms <= TOLD_MS, "a stopped rotor is told within 100 ms")
+    println!("{} stopped rotors are reported {least_ms} to {most_ms} ms after their drive ends", all_ms.len());
+    check(*most_ms <= TOLD_MS, "a stopped rotor is reported within 100 ms")
 }

@@ -184,7 +184,7 @@ pub fn fly_all<M: Machine>(
     let (rows, left_out): (Vec<&'static PinFault>, Vec<_>) =
         ROWS.iter().filter(is_wanted).partition(|row| row.imus <= M::IMUS.len());
     for row in left_out {
-        println!("left out {}, {}: the board has no such part", row.name, row.what);
+        println!("skipped {}, {}: the board has no such part", row.name, row.what);
     }
     for seed in seeds {
         let turn = (seed as usize).checked_rem(rows.len()).unwrap_or_default();
@@ -196,6 +196,6 @@ pub fn fly_all<M: Machine>(
         }
     }
     println!("{flown} flights with a fault");
-    check(flown > 0, "a fault of this name")?;
+    check(flown > 0, "there is a fault of this name")?;
     check(failed.is_empty(), &failed.join(", "))
 }

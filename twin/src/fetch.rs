@@ -148,11 +148,11 @@ impl Fetch {
     pub fn compare(&self, logs: &[Vec<u8>]) -> Result<(), Box<dyn Error>> {
         let sizes: Vec<_> = self.entries.iter().map(|entry| entry.size as usize).collect();
         println!("listed {sizes:?} bytes; {END} bytes each in {:?} ms", self.took_ms);
-        check(sizes == logs.iter().map(Vec::len).collect::<Vec<_>>(), "the list is that of the card")?;
+        check(sizes == logs.iter().map(Vec::len).collect::<Vec<_>>(), "the list equals the card's files")?;
         let first = logs.first().ok_or("there is a log")?;
         for (part, held) in self.parts.iter().enumerate() {
             let [offset, length] = self.span(part).map(|number| number as usize);
-            check(first[offset..offset + length] == held[..], "what is downloaded is what is on the card")?;
+            check(first[offset..offset + length] == held[..], "the download equals the file on the card")?;
         }
         Ok(())
     }

@@ -154,14 +154,14 @@ pub fn fly<M: Machine>(image: &Path, order: &FlightOptions<'_>) -> Result<(), Bo
         println!("{} blocks or pages written", storage.written());
         for log in &logs {
             println!(
-                "{}: {} bytes, of them {} no record; {} ms missing",
+                "{}: {} bytes, {} of them outside records; {} ms missing",
                 log.name, log.bytes, log.rest, log.missing_ms
             );
         }
         let is_sound = card_faults != CardFaults::default()
             || full_kb.is_some()
             || logs.iter().all(|log| log.rest == 0 && log.missing_ms <= DROPOUTS_MS);
-        check(!logs.is_empty() && is_sound, "a whole log of the flight is kept")?;
+        check(!logs.is_empty() && is_sound, "a log covers the whole flight")?;
     }
     same?;
     verdict?;
@@ -190,7 +190,8 @@ impl TwinFlight {
         let (Some(cuts), Some(storage)) = (&self.cuts, session.board_mut().log_storage()) else { return };
         if cuts.at_ms.contains(&now_ms) {
             match card_logs::save(storage, &cuts.folder.join(format!("cut-{now_ms}"))) {
-                Ok(logs) => println!("{:8.3} s  cut here, there are {logs:?}", now_ms as f64 * 1e-3),
+                Ok(logs) => println!("{:8.3} s  content saved as if the power was cut; logs: \
+                     {logs:?}", now_ms as f64 * 1e-3),
                 Err(error) => println!("{:8.3} s  cut here: {error}", now_ms as f64 * 1e-3),
             }
         }

@@ -132,7 +132,7 @@ impl<M: Machine> HoverSnapshot<M> {
             if hover.snapshot.restore(&mut session, &firmware, &mut hover.past).is_ok() {
                 return Ok(hover);
             }
-            return Err(format!("{}: of another image or program; remove it", kept.display()).into());
+            return Err(format!("{}: the file comes from another image or program; remove it", kept.display()).into());
         }
         let link = LinkEnds::default();
         let climb = ClimbDriver {
@@ -146,7 +146,7 @@ impl<M: Machine> HoverSnapshot<M> {
         let ClimbDriver { flight, taken, past, .. } = run(session, &Start::new(&images), climb)?.driver;
         let Some(taken) = taken else {
             flight.pilot.verdict()?;
-            return Err("it does not hover".into());
+            return Err("the vehicle does not hover".into());
         };
         std::fs::write(kept, taken?)?;
         Ok(HoverSnapshot { images, scenario, snapshot: Snapshot::read(kept)?, past, machine: PhantomData })
@@ -162,7 +162,7 @@ impl<M: Machine> HoverSnapshot<M> {
         for (ms, (throttles, bytes)) in (1..).zip(&self.past.0) {
             flight.pilot.command(throttles.iter().copied().map(Some));
             link.pilot.exchange(bytes);
-            check(flight.pilot.advance(ms).is_some(), "the plant's past is as it was")?;
+            check(flight.pilot.advance(ms).is_some(), "the plant's history is restored")?;
         }
         let mut session = Session::new(board::<M>(&link)?, 0, VirtualNanos(0))?;
         let firmware = digest(&self.images, None);

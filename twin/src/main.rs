@@ -86,29 +86,50 @@ fn mission_argument() -> Arg {
 
 /// Declares the command line.
 fn command() -> Command {
-    let phases = whole("phases", "40", "Times within a control period at which the kill switch's frames come");
-    let rate = whole("rate", "250", "Frames per second at which the kill switch is tried; may be given again")
+    let phases = whole("\
+         phases", "\
+         40", "Number of instants within a control period at which the kill switch's frames \
+         arrive");
+    let rate = whole("rate", "250", "Frames per second with which the kill switch is tested; may be repeated")
         .value_parser(value_parser!(u64).range(1..=1000))
         .action(ArgAction::Append);
-    let kept = file_argument("hover", "Where the hover is kept, from which further runs begin");
-    let only = option("only", "NAME", "Those whose names begin so; may be given again").action(ArgAction::Append);
-    let seeds = [whole("seeds", "1", "Flights of each fault"), whole("first", "1", "The first one's seed")];
+    let kept = file_argument("hover", "File that keeps the hover, from which further runs begin");
+    let only = option("\
+         only", "\
+         NAME", "Only faults whose names begin with this text; may be \
+         repeated").action(ArgAction::Append);
+    let seeds = [whole("\
+         seeds", "\
+         1", "Number of flights for each \
+         fault"), whole("\
+         first", "\
+         1", "Seed of the first \
+         flight")];
     let in_turn = Arg::new("in-turn").long("in-turn").action(ArgAction::SetTrue);
-    let in_turn = in_turn.help("Fly one fault with each seed, the next with the next, instead of all");
+    let in_turn = in_turn.help("Fly only one fault with each seed, the faults in turn, instead of all faults");
     let cuts =
-        [whole("cuts", "100", "Cuts in a write, and in an erase, about"), whole("seed", "1", "Of the random numbers")];
-    let escs = Command::new("escs").about("Fly with motor controllers that answer, and stop rotors");
+        [whole("\
+             cuts", "\
+             100", "Approximate number of cuts in a write, and in an \
+             erase"), whole("\
+             seed", "\
+             1", "Seed of \
+             the random numbers")];
+    let escs = Command::new("escs").about("Fly with motor controllers that send telemetry, and stop rotors");
     let lines = Arg::new("lines").long("lines").action(ArgAction::SetTrue);
-    let lines = lines.help("They answer on the motors' lines (bidirectional DSHOT), not over their telemetry's");
+    let lines = lines.help("The motor controllers answer on the motors' lines (bidirectional DSHOT), not over the \
+         telemetry line");
     Command::new("twin")
-        .about("Runs the flight image of a board, as it is flashed, on register-level models of the board")
+        .about("Runs a board's flight image, exactly as flashed, on register-level models of the board")
         .subcommand_required(true)
         .arg_required_else_help(true)
         .subcommand(
-            Command::new("boot").about("Boot, and look at bus and pins").args([machine_argument(), image_argument()]),
+            Command::new("\
+                 boot").about("Boot the image, and check buses and \
+                 pins").args([machine_argument(), image_argument()]),
         )
         .subcommand(fly_command())
-        .subcommand(Command::new("radio").about("Fly by radio, and stop the motors by the kill switch").args([
+        .subcommand(Command::new("radio").about("Fly by radio control, and stop the motors by the kill switch").args([
             machine_argument(),
             image_argument(),
             scenario_argument(),
@@ -116,17 +137,17 @@ fn command() -> Command {
             phases,
         ]))
         .subcommand(escs.args([machine_argument(), image_argument(), scenario_argument(), lines]))
-        .subcommand(Command::new("replay").about("Fly an exact log again").arg(file_argument("log", "The log")))
+        .subcommand(Command::new("replay").about("Replay an exact log").arg(file_argument("log", "The log")))
         .subcommand(
             Command::new("faults")
-                .about("Faults at a board's pins, in a hover that is kept in a file")
+                .about("Inject faults at a board's pins, starting from a hover that a file keeps")
                 .args([machine_argument(), image_argument(), scenario_argument(), kept, only])
                 .args(seeds)
                 .arg(in_turn),
         )
         .subcommand(
             Command::new("cuts")
-                .about("Power cut while the Matek H743 writes and erases its parameters")
+                .about("Cut the power while the Matek H743 writes and erases its parameters")
                 .arg(image_argument())
                 .args(cuts),
         )
@@ -143,15 +164,16 @@ fn fly_command() -> Command {
         .long("receiver")
         .value_parser(PossibleValuesParser::new(RECEIVERS.map(|(name, _)| name)))
         .default_value("nmea")
-        .help("GNSS receiver: the board's own model, or a new u-blox");
-    let hover = whole("hover", "30", "Seconds of hover, of which three do not count; with --fetch six at most")
+        .help("GNSS receiver: the board's usual model, or an unconfigured u-blox");
+    let hover = whole("hover", "30", "Seconds of hover, of which three do not count; at most six with --fetch")
         .value_parser(value_parser!(u64).range(4..=3600));
     let log =
-        option("log", "FILE", "Keep the exact log here, and fly it again on this machine: the same to the last bit");
+        option("log", "FILE", "Write the exact log to this file, and replay it on this machine: the results must be \
+             the same to the last bit");
     let card = option(
         "card",
         "FOLDER",
-        "Keep the logs of the memory card, or flash chip, here; a log of the whole flight must be among them",
+        "Copy the logs of the memory card or flash chip to this folder; one of them must cover the whole flight",
     );
     let from_until = |name, help| {
         Arg::new(name).long(name).num_args(2).value_names(["MS", "MS"]).value_parser(value_parser!(u64)).help(help)
@@ -159,7 +181,7 @@ fn fly_command() -> Command {
     let cut = option(
         "card-cut",
         "MS",
-        "Keep what the card holds at this time, as if the power was cut then; may be given again",
+        "Save the card's content at this time, as if the power was cut then; may be repeated",
     );
     let fetch = Arg::new("fetch").long("fetch").action(ArgAction::SetTrue).requires("card");
     Command::new("fly").about("Take off, hover and land, in lockstep with the plant").args([
@@ -171,11 +193,11 @@ fn fly_command() -> Command {
         hover,
         mission_argument(),
         card.value_parser(value_parser!(PathBuf)),
-        from_until("card-stall", "The card stalls: when, and for how long"),
-        from_until("card-out", "The card is out: from when, and until when"),
-        option("card-full", "KB", "Room on the card").value_parser(value_parser!(u64)),
+        from_until("card-stall", "Time at which the card stalls, and for how long"),
+        from_until("card-out", "Times from which and until which the card is removed"),
+        option("card-full", "KB", "Free space on the card").value_parser(value_parser!(u64)),
         cut.action(ArgAction::Append).value_parser(value_parser!(u64)),
-        fetch.help("After the flight, list the logs over the link, download parts of one, and erase all"),
+        fetch.help("After the flight, list the logs over the link, download parts of one log, and erase all logs"),
     ])
 }
 

@@ -128,7 +128,7 @@ impl MissionProgress {
             let off = off_m.map_or(String::new(), |off_m| format!(", off by {off_m:.2} m"));
             println!("{:7.3} s: item {number} of {} reached{off}", *at_ms as f64 * 1e-3, LEGS.len());
         }
-        format!("{} items of {} reached, off by {furthest_m:.2} m at most", self.reached.len(), LEGS.len())
+        format!("{} of {} mission items reached, at most {furthest_m:.2} m off", self.reached.len(), LEGS.len())
     }
 
     /// Fails if an item was not reached, reached out of order, or too far from its place.
@@ -137,6 +137,6 @@ impl MissionProgress {
         let numbers = self.reached.iter().map(|(number, ..)| *number);
         check(numbers.eq(0..LEGS.len() as u16), "every item is reached, one after another")?;
         let are_near = self.reached.iter().all(|(_, _, off_m)| off_m.is_none_or(|off_m| off_m < OFF_M));
-        check(are_near, &format!("places are reached within {OFF_M} m"))
+        check(are_near, &format!("waypoints are reached within {OFF_M} m"))
     }
 }

@@ -276,7 +276,7 @@ impl GroundPilot {
         let off_m = sum / count.max(1) as f64;
         let how = match &mission {
             Some(mission) => mission.summary(),
-            None => format!("hover off by {off_m:.2} m on average"),
+            None => format!("{off_m:.2} m off in hover, on average"),
         };
         println!("{:.1} s; {how}, largest tilt {tilt_rad:.2} rad", now_ms as f64 * 1e-3);
         if let Some(error) = error {
@@ -349,7 +349,7 @@ impl GroundPilot {
             if self.world.readings().is_some() {
                 let ([east, north, up], height_m) = (self.transducers.fix_m(), self.transducers.height_m());
                 let fix = format!("{:.2} {:.2} {:.2} m", east - x, north - y, up - z);
-                errors = format!("; fix off by {fix}, height by {:.2} m", height_m - z);
+                errors = format!("; position fix off by {fix}, height by {:.2} m", height_m - z);
             }
             println!("{:7.3} s: {:?}, {x:.2} {y:.2} {z:.2} m{errors}", self.now_ms as f64 * 1e-3, self.phase);
         }

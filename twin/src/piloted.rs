@@ -149,7 +149,7 @@ impl<M: Machine> PilotedHover<M> {
         let PilotedFlight { vehicle, taken, .. } = flown(finished)?;
         // Snapshots can only be read from files.
         let path = std::env::temp_dir().join(format!("twin-hover-{}", std::process::id()));
-        std::fs::write(&path, taken.ok_or("it does not hover")??)?;
+        std::fs::write(&path, taken.ok_or("the vehicle does not hover")??)?;
         let snapshot = Snapshot::read(&path);
         std::fs::remove_file(&path)?;
         Ok(PilotedHover { images, snapshot: snapshot?, vehicle, machine: PhantomData })

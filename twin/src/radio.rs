@@ -52,8 +52,9 @@ fn kill<M: Machine>(hover: &PilotedHover<M>, rate: u64, phases: u64) -> Result<u
     let mean_ms = took_ns.iter().map(|(took_ns, _)| ms(*took_ns)).sum::<f64>() / phases as f64;
     let (least, most) = (took_ns.iter().min().ok_or("no phase")?, took_ns.iter().max().ok_or("no phase")?);
     println!(
-        "kill, {rate} frames per second: the motors are told to stop {:.2} to {:.2} ms after the last byte of the \
-         first frame, {mean_ms:.2} ms on average of {phases} phases; the latest {:.3} ms after a millisecond",
+        "kill switch, {rate} frames per second: the motors get the stop command {:.2} to {:.2} ms after the last byte \
+         of the first frame, {mean_ms:.2} ms on average over {phases} phases; the latest frame came {:.3} ms after a \
+         millisecond",
         ms(least.0),
         ms(most.0),
         ms(most.1)

@@ -20,7 +20,7 @@ pub fn check_log(log: &[u8]) -> Result<(), Box<dyn Error>> {
             ReplayStep::Differs(difference, _) => return Err(format!("after {ticks} ticks: {difference:?}").into()),
         }
     }
-    println!("{ticks} ticks, {flown} of them armed, the same again to the last bit");
+    println!("{ticks} ticks, {flown} of them armed, give the same results again to the last bit");
     check(frames.damaged() == 0, &format!("{} damaged frames of the log", frames.damaged()))?;
     // An empty log would pass as well.
     check(ticks > 1_000, "a log")

@@ -42,7 +42,7 @@ fn hovers(vehicle: &PilotedVehicle, start_m: [f64; 3]) -> Result<f64, String> {
         return Ok(off_m);
     }
     let armed = if vehicle.pilot.armed() { "armed" } else { "disarmed" };
-    Err(format!("it does not hover: {armed}, {off_m:.2} m off, tilted by {tilt_rad:.2} rad"))
+    Err(format!("the vehicle does not hover: {armed}, {off_m:.2} m off, tilted by {tilt_rad:.2} rad"))
 }
 
 /// Pilot that arms by the switch, climbs by the throttle and hovers.
@@ -67,7 +67,7 @@ impl StickPilot for ClimbPilot {
                 self.armed_ms = Some(now_ms);
                 println!("{:7.3} s: armed by the switch", now_ms as f64 * 1e-3);
             }
-            return if now_ms > PATIENCE_MS { Err("it does not arm".to_owned()) } else { Ok(PilotDecision::GoesOn) };
+            return if now_ms > PATIENCE_MS { Err("the vehicle does not arm".to_owned()) } else { Ok(PilotDecision::GoesOn) };
         };
         let place_m = place_m(vehicle);
         let Some((up_ms, start_m)) = self.up else {
@@ -76,7 +76,7 @@ impl StickPilot for ClimbPilot {
                 self.up = Some((now_ms, place_m));
             }
             let is_late = now_ms > armed_ms + CLIMB_MS;
-            return if is_late { Err("it does not climb".to_owned()) } else { Ok(PilotDecision::GoesOn) };
+            return if is_late { Err("the vehicle does not climb".to_owned()) } else { Ok(PilotDecision::GoesOn) };
         };
         let off_m = hovers(vehicle, start_m)?;
         if now_ms < up_ms + HOVER_MS {
@@ -153,10 +153,10 @@ impl StickPilot for ReceiverLossPilot {
                     self.lost_ms = Some(passed_ms);
                 }
                 if is_lost && passed_ms < HELD_MS {
-                    return Err(format!("lost after {passed_ms} ms already"));
+                    return Err(format!("the link counts as lost after only {passed_ms} ms"));
                 }
                 if passed_ms > LOST_MS && !(is_lost && says("hold")) {
-                    return Err(format!("it does not hold: {:?}", vehicle.pilot.heard()));
+                    return Err(format!("the vehicle does not hold: {:?}", vehicle.pilot.heard()));
                 }
                 self.off_m = self.off_m.max(hovers(vehicle, self.start_m)?);
                 vehicle.transmitter.is_heard = passed_ms >= SILENT_MS;
@@ -164,7 +164,7 @@ impl StickPilot for ReceiverLossPilot {
             }
             LossPhase::Back => {
                 if passed_ms > 500 && !says("radio: heard") {
-                    return Err("it does not hear the receiver again".to_owned());
+                    return Err("the vehicle does not hear the receiver again".to_owned());
                 }
                 self.off_m = self.off_m.max(hovers(vehicle, self.start_m)?);
                 (passed_ms >= BACK_MS).then_some(LossPhase::Forward)
@@ -178,7 +178,7 @@ impl StickPilot for ReceiverLossPilot {
             }
             LossPhase::Lands => {
                 if self.way_m < WAY_M {
-                    return Err(format!("the stick moves it by {:.2} m", self.way_m));
+                    return Err(format!("the stick moves the vehicle by {:.2} m", self.way_m));
                 }
                 let us = &mut vehicle.transmitter.channels.us;
                 (us[PITCH], us[THROTTLE]) = (1500, 1000);
@@ -190,7 +190,7 @@ impl StickPilot for ReceiverLossPilot {
                     return if is_well { Ok(PilotDecision::Ends) } else { Err(format!("disarmed at {now_m:.2?} m")) };
                 }
                 if passed_ms > LANDS_MS {
-                    return Err(format!("it does not land: {now_m:.2?} m"));
+                    return Err(format!("the vehicle does not land: {now_m:.2?} m"));
                 }
                 None
             }
@@ -207,7 +207,8 @@ impl ReceiverLossPilot {
     pub fn summary(&self) -> String {
         let ReceiverLossPilot { lost_ms, off_m, way_m, .. } = self;
         format!(
-            "loss: noticed after {} ms, {off_m:.2} m off until the stick is moved, then {way_m:.1} m forward; landed",
+            "radio lost: noticed after {} ms; at most {off_m:.2} m off until the stick moves, then {way_m:.1} m \
+             forward; landed",
             lost_ms.unwrap_or_default()
         )
     }

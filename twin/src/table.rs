@@ -71,29 +71,29 @@ use FaultOutcome::{FliesOn, Lands, Lost};
 /// All faults.
 pub const ROWS: &[PinFault] = &[
     row("none", "nothing", FliesOn, 3_000, |_| ()).of_any(),
-    row("imu-1-silent", "the first IMU answers no more", FliesOn, 3_000, |t| t.impairments.imus[FIRST].silent = true)
+    row("imu-1-silent", "the first IMU stops answering", FliesOn, 3_000, |t| t.impairments.imus[FIRST].silent = true)
         .with_one(Lost),
-    row("imu-2-silent", "the second IMU answers no more", FliesOn, 3_000, |t| t.impairments.imus[SECOND].silent = true)
+    row("imu-2-silent", "the second IMU stops answering", FliesOn, 3_000, |t| t.impairments.imus[SECOND].silent = true)
         .of_two(),
-    row("imu-1-stuck", "the first IMU repeats itself", FliesOn, 3_000, |t| {
+    row("imu-1-stuck", "the first IMU repeats its last sample", FliesOn, 3_000, |t| {
         (t.impairments.imus[FIRST].rate.stuck, t.impairments.imus[FIRST].force.stuck) = (true, true);
     })
     .with_one(Lost),
-    row("imu-1-rate-stuck", "the first IMU's gyroscope alone repeats itself", FliesOn, 3_000, |t| {
+    row("imu-1-rate-stuck", "the first IMU's gyroscope alone repeats its last sample", FliesOn, 3_000, |t| {
         t.impairments.imus[FIRST].rate.stuck = true;
     })
     .with_one(Lost),
-    row("imu-1-force-stuck", "the first IMU's accelerometer alone repeats itself", FliesOn, 3_000, |t| {
+    row("imu-1-force-stuck", "the first IMU's accelerometer alone repeats its last sample", FliesOn, 3_000, |t| {
         t.impairments.imus[FIRST].force.stuck = true;
     })
     .with_one(Lost),
-    row("imu-2-stuck", "the second IMU repeats itself", FliesOn, 3_000, |t| {
+    row("imu-2-stuck", "the second IMU repeats its last sample", FliesOn, 3_000, |t| {
         (t.impairments.imus[SECOND].rate.stuck, t.impairments.imus[SECOND].force.stuck) = (true, true);
     })
     .of_two(),
     row("imu-1-garbled", "every byte of the first IMU is random", FliesOn, 3_000, |t| t.garble(FIRST)).with_one(Lost),
     row("imu-2-garbled", "every byte of the second IMU is random", FliesOn, 3_000, |t| t.garble(SECOND)).of_two(),
-    row("imu-1-garbled-0-3-s", "the same of the first for 0.3 s", FliesOn, 3_000, |t| {
+    row("imu-1-garbled-0-3-s", "every byte of the first IMU is random for 0.3 s", FliesOn, 3_000, |t| {
         if t.since_ns < 300 * MS {
             t.garble(FIRST);
         }
@@ -121,11 +121,11 @@ pub const ROWS: &[PinFault] = &[
         t.impairments.imus[FIRST].rate.noise = [20_000; 3];
         t.impairments.imus[FIRST].force.noise = [300_000; 3];
     }),
-    row("imu-1-rate-biased", "10 deg/s on the first gyroscope", FliesOn, 3_000, |t| {
+    row("imu-1-rate-biased", "offset of 10 deg/s on the first gyroscope", FliesOn, 3_000, |t| {
         t.impairments.imus[FIRST].rate.bias = [10_000, -10_000, 10_000];
     })
     .with_one(Lost),
-    row("imu-1-force-biased", "0.2 g on the first accelerometer", FliesOn, 3_000, |t| {
+    row("imu-1-force-biased", "offset of 0.2 g on the first accelerometer", FliesOn, 3_000, |t| {
         t.impairments.imus[FIRST].force.bias = [200_000, -200_000, 200_000];
     })
     .with_one(Lost),
@@ -144,14 +144,14 @@ pub const ROWS: &[PinFault] = &[
         (t.impairments.imus[FIRST].silent, t.impairments.imus[SECOND].silent) = (true, true);
     })
     .of_two(),
-    row("barometer-silent", "the barometer answers no more", FliesOn, 4_000, |t| t.impairments.barometer.silent = true),
-    row("barometer-stuck", "the barometer repeats itself", FliesOn, 4_000, |t| {
+    row("barometer-silent", "the barometer stops answering", FliesOn, 4_000, |t| t.impairments.barometer.silent = true),
+    row("barometer-stuck", "the barometer repeats its last sample", FliesOn, 4_000, |t| {
         t.impairments.barometer.pressure.stuck = true;
     }),
     row("barometer-wild", "noise of 500 Pa (40 m) on the barometer", FliesOn, 4_000, |t| {
         t.impairments.barometer.pressure.noise = [500];
     }),
-    row("barometer-jumps", "300 Pa (25 m) on the barometer", FliesOn, 4_000, |t| {
+    row("barometer-jumps", "offset of 300 Pa (25 m) on the barometer", FliesOn, 4_000, |t| {
         t.impairments.barometer.pressure.bias = [300];
     }),
     row("barometer-intermittent", "the barometer comes and goes every 3 ms", FliesOn, 4_000, |t| {
@@ -159,8 +159,8 @@ pub const ROWS: &[PinFault] = &[
             t.impairments.barometer.silent = t.random.next() % 2 == 0;
         }
     }),
-    row("compass-silent", "the compass answers no more", FliesOn, 4_000, |t| t.impairments.compass.silent = true),
-    row("compass-stuck", "the compass repeats itself", FliesOn, 4_000, |t| {
+    row("compass-silent", "the compass stops answering", FliesOn, 4_000, |t| t.impairments.compass.silent = true),
+    row("compass-stuck", "the compass repeats its last sample", FliesOn, 4_000, |t| {
         t.impairments.compass.field.stuck = true;
     }),
     row("compass-wild", "noise of 50 uT on the compass", FliesOn, 4_000, |t| {
@@ -195,8 +195,10 @@ pub const ROWS: &[PinFault] = &[
         t.storm(TELEMETRY);
     })
     .of_any(),
-    row("uart-storm-gnss", "the same of the GNSS receiver's UART", FliesOn, 3_000, |t| t.storm(GNSS)),
-    row("reset", "a reset, as of the watchdog", Lost, 3_000, |t| {
+    row("\
+         uart-storm-gnss", "an interrupt of the GNSS receiver's UART every 5 us for 2 \
+         s", FliesOn, 3_000, |t| t.storm(GNSS)),
+    row("reset", "a reset, as by the watchdog", Lost, 3_000, |t| {
         if t.looks == 0 {
             t.target.reset(t.at, t.instructions, t.host);
         }

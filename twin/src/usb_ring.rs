@@ -29,7 +29,7 @@ impl UsbRing {
         let is_ring = |name: &str| name.contains(NAME);
         let ring = file.symbols().find(|symbol| symbol.name().is_ok_and(is_ring)).ok_or("the image has no USB")?;
         if ring.size() != 4 * WORDS + LENGTH {
-            return Err("the ring of USB is not as it was".into());
+            return Err("the image's USB ring has another layout than expected".into());
         }
         Ok(UsbRing { address: ring.address(), bytes: Vec::new() })
     }

@@ -56,7 +56,7 @@ parameters! {
         /// alpha_2 (21).
         #[parameter(ALPHA2, "input per m/s or rad/s", 0.0..=1000.0, tuned)]
         pub alpha2: f32 = 2.0,
-        /// c: weight of e_1 in V = c e_1^2/2 + e_2^2/2g, and so of e_1 in (16). The paper's is 1.
+        /// c: weight of e_1 in V = c e_1^2/2 + e_2^2/2g, and therefore in (16). The paper uses 1.
         #[parameter(STIFF, "1/s2", 0.0..=10000.0, tuned)]
         pub stiffness: f32 = 1.0,
     }

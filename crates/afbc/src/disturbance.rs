@@ -48,13 +48,13 @@ parameters! {
         /// w of the observer of moments about z; 0 for none.
         #[parameter(DIST_YAW, "rad/s", 0.0..=500.0, tuned)]
         pub disturbance_yaw_rad_s: f32 = 0.0,
-        /// gamma: rate at which the memory learns what the disturbance observer finds; 0 for none.
+        /// gamma: rate at which the memory learns the disturbance observer's estimate; 0 for no memory.
         #[parameter(MEM_RATE, "1/s", 0.0..=10.0)]
         pub memory_1_s: f32 = 0.0,
-        /// Speed of the outer rules of the memory.
+        /// Speed at the centre of the memory's outer fuzzy rules.
         #[parameter(MEM_SPEED, "m/s", 0.1..=50.0)]
         pub memory_speed_m_s: f32 = 4.0,
-        /// Lag of the rotors that both observers reckon with.
+        /// Rotor lag that both observers model.
         #[parameter(DIST_LAG, "s", 0.0..=0.5)]
         pub disturbance_lag_s: f32 = 0.02,
     }

@@ -5,8 +5,7 @@ use afbc_control::command_filter::RATE_MAX;
 use afbc_types::parameters;
 
 parameters! {
-    /// Limits on the demands of position control. The default is no limit but that of (40) itself, a tilt below 90
-    /// degrees.
+    /// Limits on the demands of position control. By default only (40) limits the tilt, to below 90 degrees.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct PositionControlLimits {
@@ -19,10 +18,11 @@ parameters! {
         /// Largest norm of (u5, u6), the horizontal acceleration.
         #[parameter(ACCEL, "m/s2", 0.1..=1e6)]
         pub acceleration_max_m_s2: f32 = 1e6,
-        /// Largest speed along x and along y demanded by a position error, alpha_1 e_1, in addition to the reference's.
+        /// Largest speed along x and along y that a position error demands, alpha_1 e_1; the reference's speed comes on
+        /// top.
         #[parameter(SPEED, "m/s", 0.1..=1e6)]
         pub speed_max_m_s: f32 = 1e6,
-        /// Largest speed along z demanded by a height error, alpha_1 e_1, in addition to the reference's.
+        /// Largest speed along z that a height error demands, alpha_1 e_1; the reference's speed comes on top.
         #[parameter(CLIMB, "m/s", 0.1..=1e6)]
         pub climb_max_m_s: f32 = 1e6,
     }

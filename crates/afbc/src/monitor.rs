@@ -37,8 +37,8 @@ pub const TRIM_SHARE: PerAxis<f32> = PerAxis { roll: 0.75, pitch: 0.75, yaw: 2.2
 const THETA_SHARE: f32 = 0.95;
 
 parameters! {
-    /// Bounds of the monitor. The defaults are those that do not depend on gains and vehicle; [`MonitorBounds::new`]
-    /// computes the others.
+    /// Bounds of the monitor. The defaults suit every vehicle; [`MonitorBounds::new`] the bounds that depend on gains
+    /// computes and vehicle.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct MonitorBounds {
         /// Bound on |Theta_hat|, in the subsystem's input.
@@ -53,7 +53,7 @@ parameters! {
         /// Largest share of steps with a rotor at a limit.
         #[parameter(SAT_SHARE, "1", 0.01..=1.0)]
         pub saturation_share: f32 = 0.9,
-        /// Smallest reversal of an input that is counted.
+        /// Smallest reversal of an input that counts as one.
         #[parameter(SWING, "N", 1e-3..=1e4)]
         pub swing_n: f32 = 1e4,
         /// Largest number of reversals of one input per second.

@@ -40,7 +40,7 @@ parameters! {
         /// a_max of yaw.
         #[parameter(REF_TURN, "rad/s2", 0.1..=1e3, tuned)]
         pub reference_turn_rad_s2: f32 = 1e3,
-        /// v_max of yaw. That of x, y and z is the cascade's limit on the speed.
+        /// v_max of yaw. For x, y and z, v_max is the cascade's speed limit.
         #[parameter(REF_YAWRATE, "rad/s", 0.1..=1e3)]
         pub reference_yaw_rate_rad_s: f32 = 1e3,
     }

@@ -18,39 +18,41 @@ parameters! {
         /// Bandwidth of the filter on phi_d and theta_d.
         #[parameter(FILTER, "rad/s", BANDWIDTH.min..=BANDWIDTH.max, tuned)]
         pub command_filter_rad_s: f32 = 40.0,
-        /// Bandwidth of the pulse with which roll and pitch are fed forward behind a jump of the setpoint's jerk: what
-        /// rotors can follow.
+        /// Bandwidth of the pulse that feeds roll and pitch forward after a jump of the setpoint's jerk; choose one
+        /// that the rotors can follow.
         #[parameter(FORWARD, "rad/s", BANDWIDTH.min..=BANDWIDTH.max, tuned)]
         pub forward_rad_s: f32 = 40.0,
         /// Limits on the demands of position control.
         #[group("limits")]
         pub limits: PositionControlLimits = PositionControlLimits::NONE,
-        /// Whether the desired attitude is computed with the commanded thrust, instead of the hover thrust (39).
+        /// Whether the desired attitude is computed with the commanded thrust instead of the hover thrust (39).
         #[switch(TILT_THRUST)]
         pub tilt_by_thrust: bool = false,
         /// Whether an estimate stops growing in the direction in which rotors, tilt or acceleration are at a limit.
         #[switch(ANTI_WINDUP)]
         pub anti_windup: bool = false,
-        /// Whether adaptation stops, and rotors give thrust only, while the vehicle stands on the ground.
+        /// Whether, on the ground, adaptation stops and the rotors give thrust but no moments.
         #[switch(FREEZE)]
         pub freeze_on_ground: bool = false,
-        /// Whether estimates start with the weight, and the command filter at the attitude, so that a vehicle in flight
-        /// is taken over without a jump. The paper starts with zero estimates and at its first command.
+        /// Whether the thrust estimate starts at the weight and the command filter at the present attitude, so that the
+        /// law takes over a vehicle in flight without a jump. In the paper, the estimates start at zero and the filter
+        /// at its first command.
         #[switch(BUMPLESS)]
         pub bumpless: bool = false,
-        /// Whether the law is given the known part of (16) by the nominal model, so that only the rest is learnt, and
-        /// roll and pitch the derivatives that follow from jerk and snap of the setpoint, instead of the command
-        /// filter's second derivative, which is mostly noise.
+        /// Whether the nominal model supplies the known part of (16), so that the law only learns the rest. Roll and
+        /// pitch then use derivatives computed from the setpoint's jerk and snap instead of the command filter's second
+        /// derivative, which is mostly noise.
         #[switch(FEED_FORWARD)]
         pub feed_forward: bool = false,
-        /// Whether errors of the attitude are those of the rotation to the desired one, tilt before yaw, and rates
-        /// those of the body, instead of differences and derivatives of Euler angles.
+        /// Whether attitude errors are taken from the rotation to the desired attitude, tilt before yaw, and rates from
+        /// the body rates. Otherwise, errors are differences of Euler angles and rates their derivatives.
         #[switch(ROTATION)]
         pub by_rotation: bool = false,
-        /// Observer of the horizontal acceleration that the model does not know, for a law that is given what is known.
+        /// Observer of the horizontal acceleration that the nominal model does not explain; needs the known part of
+        /// (16).
         #[group("")]
         pub disturbance: DisturbanceObserver = DisturbanceObserver::DEFAULT,
-        /// Reference model between setpoint and law.
+        /// Reference model between the setpoint and the law.
         #[group("")]
         pub reference: ReferenceModel = ReferenceModel::DEFAULT,
         /// Low-pass filters on U1..U4.

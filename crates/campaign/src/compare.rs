@@ -46,7 +46,7 @@ pub fn choose(own: &[Contender], names: &[String]) -> Result<Vec<Contender>, Fil
             return Err(unchosen(name, format!("no such controller; {cure}")));
         };
         if chosen.iter().any(|other| other.name == contender.name) {
-            return Err(unchosen(name, "named twice; once is enough".into()));
+            return Err(unchosen(name, "the controller is named twice; name it once".into()));
         }
         chosen.push(contender);
     }

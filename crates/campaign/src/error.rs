@@ -56,34 +56,35 @@ impl fmt::Display for Error {
                 write!(f, "flight {flight} cannot be flown: {error}; narrow the spread that causes this")
             }
             Error::Unreadable { path, source } => {
-                write!(f, "{}: cannot be read ({source}); make it readable, and start again", path.display())
+                write!(f, "{}: the file cannot be read ({source}); make it readable, and start again", path.display())
             }
             Error::Damaged { path, problem } => {
                 write!(
                     f,
-                    "{}: damaged ({problem}); delete it and fly that campaign into its folder again",
+                    "{}: the file is damaged ({problem}); delete it, and fly the campaign into its folder again",
                     path.display()
                 )
             }
             Error::Changed(path) => write!(
                 f,
-                "{}: holds results of a campaign, vehicle, shard or program that is not this one; choose another \
-                 folder with --out, or replace them with --force",
+                "{}: the folder holds results of another campaign, vehicle, shard or program; choose another folder \
+                 with --out, or replace the results with --force",
                 path.display()
             ),
             Error::Unfinished(path) => write!(
                 f,
-                "{}: no finished results in it; fly that shard to its end with `sitl campaign --shard` first",
+                "{}: the folder holds no finished results; fly the shard to its end with `sitl campaign --shard` first",
                 path.display()
             ),
             Error::Strangers([a, b]) => write!(
                 f,
-                "{} and {}: parts of different campaigns; merge those of one and the same file, vehicle and program",
+                "{} and {}: the folders are parts of different campaigns; merge parts of the same campaign file, \
+                 vehicle and program",
                 a.display(),
                 b.display()
             ),
             Error::Twice(shard, [a, b]) => {
-                write!(f, "{} and {}: both hold shard {shard}; name one of them", a.display(), b.display())
+                write!(f, "{} and {}: both folders hold shard {shard}; name only one of them", a.display(), b.display())
             }
             Error::Missing(shards) => {
                 let names: Vec<_> = shards.iter().take(8).map(Shard::to_string).collect();
@@ -95,7 +96,11 @@ impl fmt::Display for Error {
                 write!(f, "shard {}{more} missing; fly it, or name its folder too", names.join(", "))
             }
             Error::IntoPart(path) => {
-                write!(f, "{}: one of the parts; choose another folder for the whole with --out", path.display())
+                write!(
+                    f,
+                    "{}: the folder is one of the parts; choose another folder for the merged results with --out",
+                    path.display()
+                )
             }
             Error::Output(error) => error.fmt(f),
             Error::Stopped => f.write_str("stopped"),

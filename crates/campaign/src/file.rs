@@ -28,7 +28,7 @@ const SEED: Range = Range::new("seed", 0.0, 9_007_199_254_740_991.0);
 pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campaign, FileError> {
     afbc_files::read::document(file, text, SAMPLE, |mut root| {
         let [name, description] = afbc_files::read::title(&mut root, name)?;
-        let flights = root.whole(&FLIGHTS)?.ok_or_else(|| root.missing(FLIGHTS.name, "say how many to fly"))?;
+        let flights = root.whole(&FLIGHTS)?.ok_or_else(|| root.missing(FLIGHTS.name, "add the number of flights"))?;
         let seed = root.whole(&SEED)?.unwrap_or(1);
         let duration_s = root.number(&DURATION)?;
         let trajectories = trajectories(&mut root, folder)?;
@@ -47,7 +47,7 @@ pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campai
         let campaign = Campaign { name, description, flights, seed, scenario, trajectories, spreads };
         root.finish()?;
         if let Err(error) = campaign.check() {
-            root.clash("spread", &[], format!("it causes {}; narrow it", out_of_range(&error)))?;
+            root.clash("spread", &[], format!("the spread causes {}; narrow the spread", out_of_range(&error)))?;
         }
         Ok(campaign)
     })
@@ -90,7 +90,7 @@ fn trajectories(root: &mut Table<'_>, folder: &Path) -> Result<Vec<NamedTrajecto
         return Err(wrong);
     }
     if trajectories.is_empty() {
-        return Err(root.fault_at("trajectories", "the list is empty; name a scenario in it, or leave it out"));
+        return Err(root.fault_at("trajectories", "the list is empty; name a scenario, or leave the list out"));
     }
     Ok(trajectories)
 }
@@ -101,7 +101,7 @@ pub(crate) fn named(root: &Table<'_>, key: &str, name: &str, folder: &Path) -> R
         let built_in = built_in(name).ok_or_else(|| {
             let cure = match similar_built_in(name) {
                 Some(known) => format!("did you mean \"{}\"?", known.name),
-                None => "`sitl scenarios` lists the built-in ones; a file ends in .toml".into(),
+                None => "`sitl scenarios` lists the built-in scenarios; the name of a file ends in .toml".into(),
             };
             root.fault_at(key, format!("\"{name}\" is no built-in scenario; {cure}"))
         })?;
@@ -118,10 +118,10 @@ fn spreads(mut table: Table<'_>, scenario: &Scenario) -> Result<Vec<Spread>, Fil
         let Quantity { range, whole, needs, .. } = quantity;
         let Some(ends) = table.interval(range)? else { continue };
         if *whole && ends.iter().any(|end| end.fract() != 0.0) {
-            return Err(table.fault_at(range.name, "only whole numbers are drawn; write whole ends"));
+            return Err(table.fault_at(range.name, "only whole numbers can be drawn; make both ends whole numbers"));
         }
         if let Some(needed) = needs.filter(|needed| !wanted.contains(needed)) {
-            table.clash(range.name, &[], format!("it has no effect without {needed}; add that"))?;
+            table.clash(range.name, &[], format!("the spread has no effect without {needed}; add {needed}"))?;
         }
         if let Some(problem) = idle(range.name, scenario) {
             table.clash(range.name, &["scenario"], problem)?;
@@ -148,7 +148,7 @@ fn idle(name: &str, scenario: &Scenario) -> Option<&'static str> {
             lacks(magnetometer.is_some(), "the scenario has no magnetometer; add one to its [instruments]")
         }
         "aiding" if tracker.is_none() || gnss.is_none() => {
-            Some("the scenario has nothing to choose from; add tracker and gnss to its [instruments]")
+            Some("the scenario does not have both sources; add tracker and gnss to its [instruments]")
         }
         name if name.starts_with("tracker_") => {
             lacks(tracker.is_some(), "the scenario has no tracker; add one to its [instruments]")
@@ -156,9 +156,10 @@ fn idle(name: &str, scenario: &Scenario) -> Option<&'static str> {
         name if name.starts_with("gnss_") => {
             lacks(gnss.is_some(), "the scenario has no GNSS receiver; add gnss to its [instruments]")
         }
-        "sensor_delay_s" | "dropout_rate_hz" if imu.is_some() => {
-            Some("it has no effect on a vehicle that estimates its state; draw tracker_delay_s and the like")
-        }
+        "sensor_delay_s" | "dropout_rate_hz" if imu.is_some() => Some(
+            "the spread has no effect on a vehicle that estimates its own state; draw the instruments instead, such as \
+             tracker_delay_s",
+        ),
         "wind_m_s" | "wind_20ft_m_s" if scenario.realism.drag.is_none() => {
             Some("wind has no effect on a vehicle without drag; add [drag] to the scenario")
         }

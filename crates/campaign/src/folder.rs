@@ -156,7 +156,7 @@ impl CampaignFolder {
         seal::verify(&mut io::Cursor::new(&bytes)).map_err(|error| unread(&path, error))?;
         let reader = RowReader::new(Bytes::from(bytes)).map_err(|error| damaged(&path, error))?;
         if !self.manifest.is_same(reader.manifest()) {
-            return Err(damaged(&path, "it belongs to another campaign"));
+            return Err(damaged(&path, "the file belongs to another campaign"));
         }
         let rows = reader.collect::<Result<Vec<ResultRow>, _>>().map_err(|error| damaged(&path, error))?;
         let contenders = &self.manifest.contenders;
@@ -164,7 +164,7 @@ impl CampaignFolder {
         if wanted.eq(rows.iter().map(|row| (row.flight, &row.contender))) {
             Ok(rows)
         } else {
-            Err(damaged(&path, "it holds other flights"))
+            Err(damaged(&path, "the file holds other flights"))
         }
     }
 

@@ -41,7 +41,7 @@ impl FromStr for Shard {
         let parts = text.split_once('/').and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
         match parts {
             Some((index, of)) if 1 <= index && index <= of && of <= 100_000 => Ok(Shard { index, of }),
-            _ => Err("it must be I/N with I from 1 to N, such as 3/16"),
+            _ => Err("a shard must be I/N with I from 1 to N, such as 3/16"),
         }
     }
 }

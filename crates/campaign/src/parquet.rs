@@ -25,13 +25,13 @@ const GROUP_ROWS: [usize; 2] = [1 << 10, 1 << 16];
 const MANIFEST: &str = "campaign";
 /// Names and meanings of the columns before the numbers.
 const LABELS: [(&str, &str); 7] = [
-    ("flight", "index of the flight, from 0 on; `sitl campaign FILE --flight` flies it again"),
+    ("flight", "number of the flight, counted from 0; `sitl campaign FILE --flight NUMBER` repeats the flight"),
     ("seed", "seed of the flight's noise and weather"),
     ("contender", "the controller"),
-    ("trajectory", "name of the scenario that the reference is from"),
+    ("trajectory", "name of the scenario whose trajectory the flight follows"),
     ("lost", "whether the vehicle was lost"),
     ("lost_reason", "why"),
-    ("trip_reason", "why the contender's monitor switched to the fallback law, if it did"),
+    ("trip_reason", "reason why the contender's monitor switched to the fallback law; empty if it did not"),
 ];
 
 fn schema(manifest: &Manifest) -> Result<Arc<Type>> {
@@ -177,7 +177,7 @@ impl<R: ChunkReader + 'static> RowReader<R> {
         let manifest = metadata.and_then(|all| all.iter().find(|pair| pair.key == MANIFEST)?.value.as_deref());
         let manifest: Manifest = manifest
             .and_then(|text| serde_json::from_str(text).ok())
-            .ok_or_else(|| ParquetError::General("it is not a campaign's".into()))?;
+            .ok_or_else(|| ParquetError::General("the file does not come from a campaign".into()))?;
         // Reading a column as another type would panic.
         if file.metadata().file_metadata().schema() != schema(&manifest)?.as_ref() {
             return Err(shape());
@@ -255,5 +255,5 @@ where
 }
 
 fn shape() -> ParquetError {
-    ParquetError::General("its columns are not those of a campaign".into())
+    ParquetError::General("the file's columns are not those of a campaign".into())
 }

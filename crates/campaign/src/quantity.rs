@@ -73,12 +73,14 @@ const fn whole(quantity: Quantity) -> Quantity {
 /// All quantities. A flight draws one number for each, used or not, in this order, so that adding a quantity to a
 /// campaign does not change the others. New quantities are appended.
 pub static QUANTITIES: [Quantity; 35] = [
-    quantity("mass_ratio", 0.01, 100.0, "true mass over the scenario's", |f, x| f.truth.mass_kg *= x),
-    quantity("inertia_ratio", 0.01, 100.0, "true Ix, Iy, Iz over the scenario's", |f, x| f.truth.inertia_kg_m2 *= x),
-    quantity("thrust_factor_ratio", 0.01, 100.0, "true thrust factor over the scenario's", |f, x| {
+    quantity("mass_ratio", 0.01, 100.0, "true mass divided by the scenario's", |f, x| f.truth.mass_kg *= x),
+    quantity("inertia_ratio", 0.01, 100.0, "true Ix, Iy, Iz divided by the scenario's", |f, x| {
+        f.truth.inertia_kg_m2 *= x
+    }),
+    quantity("thrust_factor_ratio", 0.01, 100.0, "true thrust factor divided by the scenario's", |f, x| {
         f.truth.thrust_factor_n_s2 *= x;
     }),
-    quantity("drag_factor_ratio", 0.01, 100.0, "true rotor drag factor over the scenario's", |f, x| {
+    quantity("drag_factor_ratio", 0.01, 100.0, "true rotor drag factor divided by the scenario's", |f, x| {
         f.truth.drag_factor_n_m_s2 *= x;
     }),
     quantity("rotor_time_constant_s", 0.0, 1.0, "lag of the rotors", |f, x| {
@@ -121,7 +123,7 @@ pub static QUANTITIES: [Quantity; 35] = [
     ),
     needing(
         "payload_kg",
-        quantity("payload_start_s", 0.0, 36_000.0, "time at which the payload is taken up; by default 0", |f, x| {
+        quantity("payload_start_s", 0.0, 36_000.0, "time at which the payload is picked up; by default 0", |f, x| {
             f.payload.iter_mut().for_each(|payload| payload.start_s = x);
         }),
     ),
@@ -134,7 +136,7 @@ pub static QUANTITIES: [Quantity; 35] = [
             "wind_direction_rad",
             -TAU,
             TAU,
-            "direction the wind blows to, from +x to +y; by default +x",
+            "direction in which the wind blows, from +x toward +y; by default +x",
             |f, x| {
                 let wind = &mut f.scenario.realism.wind.steady_m_s;
                 let (sin, cos) = libm::sincos(x);
@@ -143,16 +145,22 @@ pub static QUANTITIES: [Quantity; 35] = [
             },
         ),
     ),
-    quantity("wind_20ft_m_s", 0.0, 50.0, "wind at 20 ft, which sets the intensity of the turbulence", |f, x| {
+    quantity("wind_20ft_m_s", 0.0, 50.0, "wind speed at 20 ft, which sets the intensity of the turbulence", |f, x| {
         let turbulence = &mut f.scenario.realism.wind.turbulence;
         *turbulence = Some(Turbulence { wind_20ft_m_s: x, ..turbulence.unwrap_or(Turbulence::MODERATE) });
     }),
-    quantity("noise_ratio", 0.0, 100.0, "measurement noise over the scenario's", |f, x| {
+    quantity("noise_ratio", 0.0, 100.0, "measurement noise divided by the scenario's", |f, x| {
         scale(&mut f.scenario.sensing.noise, x);
     }),
-    quantity("bias_ratio", 0.0, 100.0, "standard deviation of the measurement bias over the scenario's", |f, x| {
-        scale(&mut f.scenario.sensing.bias, x);
-    }),
+    quantity(
+        "bias_ratio",
+        0.0,
+        100.0,
+        "standard deviation of the measurement bias divided by the scenario's",
+        |f, x| {
+            scale(&mut f.scenario.sensing.bias, x);
+        },
+    ),
     quantity("sensor_delay_s", 0.0, 0.5, "delay from motion to measurement", |f, x| f.scenario.sensing.delay_s = x),
     quantity("dropout_rate_hz", 0.0, 1000.0, "rate of measurement dropouts", |f, rate_hz| {
         let dropouts = &mut f.scenario.sensing.dropouts;
@@ -188,7 +196,7 @@ pub static QUANTITIES: [Quantity; 35] = [
             (imu.gyro, imu.accel) = (gyro, accel);
         });
     })),
-    quantity("vibration_ratio", 0.0, 100.0, "vibration of the inertial sensor over the scenario's", |f, x| {
+    quantity("vibration_ratio", 0.0, 100.0, "vibration of the inertial sensor divided by the scenario's", |f, x| {
         f.scenario.instruments.imu.iter_mut().for_each(|imu| {
             imu.gyro.vibration_rad_s *= x;
             imu.accel.vibration_m_s2 *= x;
@@ -233,7 +241,7 @@ pub static QUANTITIES: [Quantity; 35] = [
         "aiding",
         1.0,
         2.0,
-        "what aids the inertial sensor: 1 the tracker alone, 2 all others alone",
+        "instruments that aid the inertial sensor: 1 for the tracker only, 2 for all others without the tracker",
         |f, x| {
             let suite = &mut f.scenario.instruments;
             *suite = if x < 1.5 {

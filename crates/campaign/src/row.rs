@@ -76,8 +76,10 @@ const fn figure(name: &'static str, meaning: &'static str, value: fn(&FlightSums
 /// All figures of merit, in the order of the columns. Errors are evaluated from
 /// [`SETTLED_S`](afbc_sim::metrics::SETTLED_S) on.
 pub static FIGURES: [FigureOfMerit; 21] = [
-    figure("lost_at_s", "when the vehicle was lost", |o| o.lost.map(|lost| lost.time_s)),
-    figure("tripped_at_s", "when the monitor switched to the fallback law", |o| o.tripped.map(|(time_s, _)| time_s)),
+    figure("lost_at_s", "time at which the vehicle was lost", |o| o.lost.map(|lost| lost.time_s)),
+    figure("tripped_at_s", "time at which the monitor switched to the fallback law", |o| {
+        o.tripped.map(|(time_s, _)| time_s)
+    }),
     figure("rmse_x_m", "root mean square error along x", |o| o.measured(o.metrics.rmse.x)),
     figure("rmse_y_m", "root mean square error along y", |o| o.measured(o.metrics.rmse.y)),
     figure("rmse_z_m", "root mean square error along z", |o| o.measured(o.metrics.rmse.z)),
@@ -94,21 +96,23 @@ pub static FIGURES: [FigureOfMerit; 21] = [
     figure("mean_abs_du2_n", "mean |change of U2| per step", |o| o.changed(o.metrics.mean_abs_delta_u.y)),
     figure("mean_abs_du3_n", "mean |change of U3| per step", |o| o.changed(o.metrics.mean_abs_delta_u.z)),
     figure("mean_abs_du4_n", "mean |change of U4| per step", |o| o.changed(o.metrics.mean_abs_delta_u.w)),
-    figure("saturated_ratio", "share of all steps with a rotor at its limit", |o| {
+    figure("saturated_ratio", "share of the steps with a rotor at its limit", |o| {
         Some(o.saturated as f64 / o.steps as f64)
     }),
-    figure("estimate_position_rms_m", "root mean square error of the vehicle's own position", |o| {
+    figure("estimate_position_rms_m", "root mean square error of the vehicle's estimated position", |o| {
         o.metrics.estimate.map(|estimate| estimate.position_m.norm())
     }),
-    figure("estimate_velocity_rms_m_s", "root mean square error of its velocity", |o| {
+    figure("estimate_velocity_rms_m_s", "root mean square error of the vehicle's estimated velocity", |o| {
         o.metrics.estimate.map(|estimate| estimate.velocity_m_s.norm())
     }),
-    figure("estimate_attitude_rms_rad", "root mean square error of its attitude", |o| {
+    figure("estimate_attitude_rms_rad", "root mean square error of the vehicle's estimated attitude", |o| {
         o.metrics.estimate.map(|estimate| estimate.attitude_rad.norm())
     }),
-    figure("estimate_nees", "mean normalised estimation error squared of these nine", |o| {
-        o.metrics.estimate.map(|estimate| estimate.nees)
-    }),
+    figure(
+        "estimate_nees",
+        "mean normalised estimation error squared of position, velocity and attitude together",
+        |o| o.metrics.estimate.map(|estimate| estimate.nees),
+    ),
 ];
 
 impl Campaign {

@@ -104,7 +104,7 @@ impl SubjectKind {
         let kind = self.name();
         let cure = match self.similar(name) {
             Some(known) => format!("did you mean {known}?"),
-            None => format!("`sitl {kind}s` lists the built-in ones; a file needs its path, as in ./my.toml"),
+            None => format!("`sitl {kind}s` lists what is built in; for a file, write its path, as in ./my.toml"),
         };
         FileError::whole(name, format!("no such {kind}; {cure}"))
     }

@@ -103,7 +103,7 @@ pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Suite,
             flights.push(flight(table, &sources, &flights, folder)?);
         }
         if flights.is_empty() {
-            return Err(root.missing("flight", "add [[flight]], once for each, with a name and a scenario"));
+            return Err(root.missing("flight", "add a [[flight]] with a name and a scenario for each flight"));
         }
         root.finish()?;
         Ok(Suite { name, description, sources, flights })
@@ -114,7 +114,7 @@ pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Suite,
 pub fn unknown(name: &str) -> FileError {
     let cure = match BuiltIn::similar(&SUITES, name) {
         Some(known) => format!("did you mean {}?", known.name),
-        None => "`sitl suites` lists the built-in ones; a file needs its path, as in ./my.toml".into(),
+        None => "`sitl suites` lists the built-in suites; for a file, write its path, as in ./my.toml".into(),
     };
     FileError::whole(name, format!("no such suite; {cure}"))
 }
@@ -144,9 +144,9 @@ fn read(file: &str, text: &str, name: &str) -> Result<Suite, FileError> {
 
 fn source(mut table: Table<'_>) -> Result<Citation, FileError> {
     let mut text = |key, cure| table.need_text(key, cure).map(str::to_owned);
-    let name = text("name", "give it one, to which published figures refer")?;
+    let name = text("name", "give the source a name, to which published figures refer")?;
     let citation = text("citation", "say who published what, and where")?;
-    let differs = text("differs", "say how those flights differ from these")?;
+    let differs = text("differs", "say how the published flights differ from this suite's")?;
     table.finish()?;
     Ok(Citation { name, citation, differs })
 }
@@ -158,18 +158,21 @@ fn flight(
     folder: &Path,
 ) -> Result<SuiteFlight, FileError> {
     let names = || earlier.iter().map(|flight| flight.scenario.name.as_str());
-    let name = table.need_text("name", "give the flight one")?;
+    let name = table.need_text("name", "give the flight a name")?;
     if names().any(|other| other == name) {
         return Err(table.fault_at("name", format!("\"{name}\" is the name of another flight; choose another")));
     }
     if let Some(like) = table.text(LIKE)?.filter(|like| names().all(|other| other != *like)) {
-        return Err(table.fault_at(LIKE, format!("no flight above is called \"{like}\"; name one of those")));
+        return Err(table.fault_at(
+            LIKE,
+            format!("no flight above is called \"{like}\"; name a flight that stands above this one"),
+        ));
     }
     let published = table.few_tables("published")?.into_iter().map(|table| figure(table, sources));
     let published = published.collect::<Result<_, _>>()?;
     let tilt_max_rad = table.number(&TILT_MAX)?;
     for key in ["controllers", "contender", "profile", "monitor"] {
-        table.forbid(key, "a suite is flown by those who are compared; leave it out")?;
+        table.forbid(key, "a suite is flown by the contenders of `sitl compare`; leave this key out")?;
     }
     let scenario = match table.text("scenario")? {
         Some(file) => {
@@ -188,7 +191,7 @@ fn flight(
 fn figure(mut table: Table<'_>, sources: &[Citation]) -> Result<PublishedFigure, FileError> {
     let law = table.need_text("law", "say who flew")?.to_owned();
     let rms_m = table.need_number(&RMS)?;
-    let name = table.need_text("source", "name one of the [[source]]")?;
+    let name = table.need_text("source", "name a [[source]] that this file declares")?;
     let source = sources.iter().position(|source| source.name == name);
     let source =
         source.ok_or_else(|| table.fault_at("source", format!("\"{name}\" is no [[source]] of this file; add it")))?;

@@ -140,7 +140,7 @@ fn shards_come_together_to_what_one_machine_gives() {
     let copy = folder.join("copy");
     fs::create_dir_all(&copy).unwrap();
     fs::copy(parts[1].join("results.parquet"), copy.join("results.parquet")).unwrap();
-    assert!(refused(&[&parts[..], &[copy]].concat()).contains("both hold shard 2/4"));
+    assert!(refused(&[&parts[..], &[copy]].concat()).contains("both folders hold shard 2/4"));
     assert!(refused(&[&parts[..3], &[part(2, 3)]].concat()).contains("parts of different campaigns"));
     let other = parse(&SMALL.replace("0.7, 1.3", "0.7, 1.4"));
     let path = folder.join("other");
@@ -160,13 +160,13 @@ fn a_folder_belongs_to_one_campaign_and_one_program() {
     };
     {
         let _held = CampaignFolder::open(&folder, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
-        assert!(refused(&campaign, Shard::WHOLE).contains("another program is writing into it"));
+        assert!(refused(&campaign, Shard::WHOLE).contains("another program is writing into this folder"));
     }
     for (from, to) in [("seed = 7", "seed = 8"), ("\"circle\"", "\"step\""), ("0.02", "0.03"), ("= 150", "= 151")] {
         let error = refused(&parse(&SMALL.replace(from, to)), Shard::WHOLE);
-        assert!(error.contains("not this one") && error.contains("--out"), "{to}: {error}");
+        assert!(error.contains("results of another campaign") && error.contains("--out"), "{to}: {error}");
     }
-    assert!(refused(&campaign, Shard { index: 1, of: 2 }).contains("not this one"));
+    assert!(refused(&campaign, Shard { index: 1, of: 2 }).contains("results of another campaign"));
     // Names, descriptions and the file's path do not matter.
     let renamed = campaign::parse("/elsewhere/small.toml", SMALL, "small", Path::new("")).unwrap();
     CampaignFolder::open(&folder, Manifest::new(&renamed, Shard::WHOLE), false).unwrap();
@@ -190,7 +190,10 @@ fn a_folder_belongs_to_one_vehicle() {
     fly(&a, &folder.join("a"), one, 1);
     let refused =
         CampaignFolder::open(&folder.join("a"), Manifest::new(&b, one), false).map(|_| ()).unwrap_err().to_string();
-    assert!(refused.contains("not this one") && refused.contains("--out") && !refused.contains('\n'), "{refused}");
+    assert!(
+        refused.contains("results of another campaign") && refused.contains("--out") && !refused.contains('\n'),
+        "{refused}"
+    );
     fly(&b, &folder.join("b"), Shard { index: 2, of: 2 }, 1);
     let parts = ["a", "b"].map(|part| folder.join(part));
     let refused = campaign::merge(&parts, &folder.join("merged"), false).map(|_| ()).unwrap_err().to_string();
@@ -340,7 +343,7 @@ fn damaged_files_are_refused() {
     assert_eq!(kept(), 4);
     let refused = |file: &Path, error: Result<(), campaign::Error>| {
         let error = error.unwrap_err().to_string();
-        assert!(error.starts_with(&format!("{}: damaged (", file.display())), "{error}");
+        assert!(error.starts_with(&format!("{}: the file is damaged (", file.display())), "{error}");
         assert!(error.contains("delete it") && !error.contains('\n'), "{error}");
     };
     each_damage(&whole.join("results.parquet"), 3, |file| refused(file, again()));
@@ -399,7 +402,7 @@ fn a_damaged_folder_is_mended_by_what_its_error_says() {
             campaign::fly(&campaign, &place, &AtomicBool::new(false), &|_| ())
         };
         let error = fly_on(false).map(|_| ()).unwrap_err().to_string();
-        assert!(error.contains(file) && error.contains("damaged (its checksum is wrong); delete it"), "{error}");
+        assert!(error.contains(file) && error.contains("damaged (the file's checksum is wrong); delete it"), "{error}");
         if !cure_by_force {
             fs::remove_file(path.join(file)).unwrap();
         }
@@ -446,7 +449,7 @@ fn what_cannot_be_read_is_not_called_damaged() {
         let place = CampaignFolder::open(&path, Manifest::new(&campaign, Shard::WHOLE), false);
         let flown = place.and_then(|place| campaign::fly(&campaign, &place, &AtomicBool::new(false), &|_| ()));
         let error = flown.map(|_| ()).unwrap_err().to_string();
-        assert!(error.starts_with(&format!("{}: cannot be read (", path.join(file).display())), "{error}");
+        assert!(error.starts_with(&format!("{}: the file cannot be read (", path.join(file).display())), "{error}");
     }
 }
 

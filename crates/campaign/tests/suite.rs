@@ -87,7 +87,7 @@ fn mistakes_are_refused_line_by_line() {
     let line = |text: &str| suite(text).unwrap_err().to_string();
     let cases = [
         (String::new(), "flight: missing; add [[flight]]"),
-        (FIRST.replace("name = \"first\"", ""), "flight.name: missing; give the flight one"),
+        (FIRST.replace("name = \"first\"", ""), "flight.name: missing; give the flight a name"),
         (second("").replace("\"second\"", "\"first\""), "flight.name: \"first\" is the name of another flight"),
         (
             second("").replace("like = \"first\"", "like = \"frist\""),

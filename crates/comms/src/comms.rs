@@ -54,12 +54,12 @@ const SAMPLE_MAX: usize = FRAME + 62;
 const REPLIES_PER_TICK: usize = 2;
 
 /// Warning to a station whose SETUP_SIGNING is refused.
-const KEY_OVER_WIRE: &str = "signing key refused: over a wire or signed only";
+const KEY_OVER_WIRE: &str = "signing key refused: use a wire, or sign the message";
 
 /// Text to the pilot when the clock has failed.
-pub const CLOCK_FAILED: &str = "clock failed, using the internal one: land";
+pub const CLOCK_FAILED: &str = "crystal failed, on internal clock: land now";
 /// Text to the pilot when the control tick's rate or timing is wrong.
-pub const TICK_OFF: &str = "control tick rate is wrong: land";
+pub const TICK_OFF: &str = "control loop rate is wrong: land now";
 
 /// Period of the heartbeat \[ticks\], and the tick of the first one.
 const HEARTBEAT: (u64, u64) = (1000, 3);

@@ -12,7 +12,7 @@ const DESCENDING: Notice = (MavSeverity::MAV_SEVERITY_CRITICAL, "no state for 0.
 const STATE_LOST: Notice = (MavSeverity::MAV_SEVERITY_EMERGENCY, "no state for 2.25 s: motors stopped");
 const TUMBLED: Notice = (MavSeverity::MAV_SEVERITY_EMERGENCY, "tumbled: motors stopped");
 const SHAKEN: Notice = (MavSeverity::MAV_SEVERITY_WARNING, "vibration above 4.9 m/s2: check rotors and mounts");
-const OBSERVED: Notice = (MavSeverity::MAV_SEVERITY_CRITICAL, "inertial sensor failed: flying on tracker's poses");
+const OBSERVED: Notice = (MavSeverity::MAV_SEVERITY_CRITICAL, "IMU failed: flying on the tracker's poses alone");
 
 /// Failsafes that were active in the last tick.
 #[derive(Default)]

@@ -7,7 +7,7 @@ use afbc_mavlink::{Address, LogMessage, LogRequest, ServiceRequest, Uplink};
 use core::task::Poll;
 
 /// Text to a station that wants to erase logs while the vehicle is armed.
-const WHILE_ARMED: &str = "logs are erased while disarmed only";
+const WHILE_ARMED: &str = "logs not erased: disarm the vehicle first";
 /// Longest LOG_DATA frame \[bytes\].
 pub(crate) const LOG_FRAME: usize = 12 + 97;
 

@@ -130,7 +130,7 @@ impl Service {
         let name = before.name;
         // The answer is queued in any case, with the value that counts when it is sent.
         self.dropped += count(self.set.push_back(name));
-        let Some(value) = value else { return Heard::refused(Reason::on(name, "value or type not understood")) };
+        let Some(value) = value else { return Heard::refused(Reason::on(name, "value has the wrong type")) };
         if !disarmed {
             let is_news = before.value != value;
             return if is_news { Heard::refused(Reason::on(name, "not while armed")) } else { Heard::default() };

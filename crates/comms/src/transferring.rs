@@ -35,7 +35,7 @@ pub(crate) trait Transferring {
 }
 
 /// A message or a text to send.
-#[allow(clippy::large_enum_variant, reason = "one at a time, on the stack of whoever sends it")]
+#[allow(clippy::large_enum_variant, reason = "only one exists at a time, on the sender's stack")]
 pub(crate) enum Outcome<M> {
     Send(M),
     /// Text for all stations; true for a warning.

@@ -124,7 +124,7 @@ impl<F: Copy> Transfers<F> {
         }
         Some(match self.stream.next(store, now_us)? {
             StreamEvent::Part(part) => Outcome::Send(Transfer::LogPart(part)),
-            StreamEvent::Unheard => Outcome::Say("log stream ended: not acknowledged", true),
+            StreamEvent::Unheard => Outcome::Say("log stream ended: station does not acknowledge", true),
         })
     }
 }
@@ -139,7 +139,7 @@ impl<F: Copy> Transfers<F> {
             }
             OtherRequest::Stream(to, true) => {
                 let starts = self.stream.start(to, store);
-                (!starts).then_some(Outcome::Say("there is no log to stream", true))
+                (!starts).then_some(Outcome::Say("no log to stream", true))
             }
             OtherRequest::Stream(_, false) => {
                 self.stream.stop(store);

@@ -110,7 +110,7 @@ fn other_states_are_reported_once_each_time() {
     let cases: [(Set, Texts, bool); 3] = [
         (
             |report, on| report.health.observed = on,
-            &[(CRITICAL, "inertial sensor failed: flying on tracker's poses")],
+            &[(CRITICAL, "IMU failed: flying on the tracker's poses alone")],
             true,
         ),
         (|report, on| report.shaken = on, &[(WARNING, "vibration above 4.9 m/s2: check rotors and mounts")], false),

@@ -114,7 +114,7 @@ fn logs_are_erased() {
     let mut vehicle = Vehicle::new();
     vehicle.report.mode = Mode::Flying;
     vehicle.pass(1);
-    assert_eq!(texts(&vehicle.ask(LogRequest::Erase)), ["logs are erased while disarmed only"]);
+    assert_eq!(texts(&vehicle.ask(LogRequest::Erase)), ["logs not erased: disarm the vehicle first"]);
     assert_eq!(vehicle.store.logs.len(), 2);
     vehicle.report.mode = Mode::Disarmed;
     vehicle.pass(1);

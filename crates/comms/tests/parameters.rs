@@ -344,7 +344,7 @@ fn every_set_is_answered_and_an_armed_vehicle_refuses() {
         assert_eq!(as_integer(set(ask([0; 4], kind), true)), (off, None, 0));
         assert_eq!(as_integer(set(ask(on, kind), true)), (change("C_BUMPLESS", None), None, 1));
     }
-    let odd = refused("C_BUMPLESS: value or type not understood");
+    let odd = refused("C_BUMPLESS: value has the wrong type");
     assert_eq!(as_integer(set(ask([1, 0, 0, 0], 8), true)), (None, odd, 1));
     let heard = service.hear(real("NOTHING", 1.0), &mut table, true);
     assert_eq!(heard.refused.unwrap().as_str(), "NOTHING: no such parameter");
@@ -450,7 +450,7 @@ proptest! {
         store.make_room().unwrap();
         let (mut found, mut notices) = (table(), Vec::new());
         Kept::NOW.load(&mut found, &mut store, |notice| notices.push(notice.to_string())).unwrap();
-        prop_assert_eq!(notices, ["parameters: store unreadable, all at defaults"]);
+        prop_assert_eq!(notices, ["parameters: store unreadable, using defaults"]);
         prop_assert_eq!(bits(&found), bits(&table()));
         prop_assert_eq!(restarted(store, &Kept::NOW).2, Vec::<String>::new());
     }
@@ -485,8 +485,11 @@ fn a_later_image_reads_what_an_earlier_one_wrote() {
         assert_eq!(found.get(name(text)), image.get(name(text)), "{text}");
     }
     let reasons: BTreeSet<&str> = notices.iter().map(String::as_str).collect();
-    let expected =
-        ["GONE: no such parameter", "MOT_IDLE: has changed, set it again", "C_LIMITS_CLIMB: must be 0.1 to 1e6"];
+    let expected = [
+        "GONE: no such parameter",
+        "MOT_IDLE: its meaning changed, set it again",
+        "C_LIMITS_CLIMB: must be 0.1 to 1e6",
+    ];
     assert_eq!(reasons, BTreeSet::from(expected));
     // The new name takes over. Resetting it does not bring the old name's value back.
     found.set(name("ARM_TILT_MAX"), 0.2).unwrap();

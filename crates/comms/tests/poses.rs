@@ -257,12 +257,12 @@ fn a_tracker_stands_in_for_a_dead_sensor() {
         let flies = matches!(left, States | Poses);
         assert_eq!(modes.last() == Some(&Mode::Flying), flies, "{left:?}: {:?}, {texts:?}", modes.last());
         assert_eq!(last.health.observed, left == Poses, "{left:?}");
-        let reported = texts.iter().filter(|text| text.contains("inertial sensor failed")).count();
+        let reported = texts.iter().filter(|text| text.contains("IMU failed")).count();
         // A frozen tracker is recognised only after a moment.
         assert_eq!(reported, usize::from(matches!(left, Poses | Frozen)), "{left:?}: {texts:?}");
         if left == Poses {
             // The vehicle is never without a state. The guidance announces the sensor fault too.
-            let others = texts.iter().filter(|text| !text.contains("inertial sensor failed"));
+            let others = texts.iter().filter(|text| !text.contains("IMU failed"));
             assert_eq!(others.collect::<Vec<_>>(), ["sensor fault"]);
             // Telemetry shows the observed state.
             let seen = last.estimate.expect("observed");

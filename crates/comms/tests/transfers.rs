@@ -318,7 +318,7 @@ fn logs_are_erased_while_disarmed_and_by_the_station_in_control() {
     vehicle.bench = Bench::flying();
     vehicle.log(STATION, LogRequest::Erase);
     let (refused, _) = vehicle.until(50, text);
-    assert_eq!((refused.as_str(), vehicle.store.logs.len()), ("logs are erased while disarmed only", 2));
+    assert_eq!((refused.as_str(), vehicle.store.logs.len()), ("logs not erased: disarm the vehicle first", 2));
     let remove = FilePacket::request(1, FileOpcode::REMOVE_FILE, 0, 0, 0).with(b"/log/a.ulg");
     vehicle.file(STATION, remove);
     let ((packet, _), _) = vehicle.until(50, file);
@@ -351,7 +351,7 @@ fn the_log_is_streamed() {
     let mut vehicle = Vehicle::on(921_600).fills_the_line();
     vehicle.hear(OTHER, &Uplink::Command(VehicleCommand::StartLogStream));
     let (said, _) = vehicle.until(100, text);
-    assert_eq!(said, "there is no log to stream");
+    assert_eq!(said, "no log to stream");
 
     // The log has definitions of 1 kB and a large amount of data.
     let mut log = vec![0; 16];

@@ -6,7 +6,7 @@ use afbc_types::{Inputs, ROTORS_MAX, RotorForces, RotorSpeeds};
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[must_use = "the motors need its rotor speeds"]
+#[must_use = "the motors need the rotor speeds"]
 #[non_exhaustive]
 pub struct Action<const N: usize = 4> {
     /// Rotor speeds omega_i, finite and never negative.

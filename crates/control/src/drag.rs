@@ -28,10 +28,11 @@ parameters! {
         /// k_r: drag of the rotors when hovering, per mass and speed; a vehicle's file states it in `[drag]`.
         #[parameter(DRAG_ROTOR, "1/s", 0.0..=10.0)]
         pub rotor_drag_1_s: f32 = 0.0,
-        /// k_b: drag of the body along x and y, per mass and speed squared; likewise.
+        /// k_b: drag of the body along x and y, per mass and speed squared; a vehicle's file states it in `[drag]`.
         #[parameter(DRAG_BODY, "1/m", 0.0..=10.0)]
         pub body_drag_1_m: f32 = 0.0,
-        /// h: height of the rotors above the centre of mass, where their drag acts; likewise.
+        /// h: height of the rotors above the centre of mass, where their drag acts; a vehicle's file states it in
+        /// `[drag]`.
         #[parameter(DRAG_HEIGHT, "m", -1.0..=1.0)]
         pub rotor_height_m: f32 = 0.0,
     }

@@ -19,7 +19,7 @@
 const STEPS: usize = 64;
 
 /// Bits of 2^(i/64), minus the bits that i itself adds to the exponent.
-#[allow(clippy::indexing_slicing, reason = "by the compiler, which checks it")]
+#[allow(clippy::indexing_slicing, reason = "the compiler evaluates it and checks the index")]
 const POWERS: [u32; STEPS] = {
     let mut powers = [0; STEPS];
     let mut i = 0;

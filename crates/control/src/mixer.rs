@@ -114,7 +114,7 @@ impl<const N: usize> YawRoom<N> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[must_use = "the forces are not applied"]
+#[must_use = "the motors need the allocated forces"]
 #[non_exhaustive]
 pub struct Allocation<const N: usize = 4> {
     /// Forces within the rotors' limits.

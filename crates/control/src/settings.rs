@@ -15,11 +15,11 @@ parameters! {
         /// Largest force of one rotor. The default is practically unlimited, as in the paper.
         #[parameter(FORCE_MAX, "N", 1e-3..=1e4)]
         pub rotor_force_max_n: f32 = 1e4,
-        /// Share of the weight to which thrust is raised, at most, to make room for roll and pitch. The default is no
-        /// limit but the rotors'.
+        /// Largest thrust, as a share of the weight, to which the mixer raises the thrust to make room for roll and
+        /// pitch. By default only the rotors limit it.
         #[parameter(RAISE_MAX, "1", 0.1..=1e6)]
         pub raised_thrust_max: f32 = 1e6,
-        /// Drag that a law may make up for.
+        /// Drag of the vehicle, which a law may compensate.
         #[group("")]
         pub drag: KnownDrag = KnownDrag::NONE,
     }

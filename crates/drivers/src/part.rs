@@ -119,13 +119,13 @@ impl fmt::Display for PartFault {
         match self {
             PartFault::Bus => f.write_str("a transfer failed: check wiring and address"),
             PartFault::Silent => f.write_str("no answer: check wiring and power"),
-            PartFault::Identity(identity) => write!(f, "another part answers, with identity {identity:#04x}"),
+            PartFault::Identity(identity) => write!(f, "a different part answers, with identity {identity:#04x}"),
             PartFault::Register(register) => write!(f, "register {register:#04x} does not keep its value"),
-            PartFault::Late => f.write_str("it does not become ready"),
-            PartFault::Stuck => f.write_str("its readings do not change"),
-            PartFault::Range => f.write_str("its readings are outside of its range"),
-            PartFault::Calibration => f.write_str("its factory calibration is damaged"),
-            PartFault::SelfTest => f.write_str("it failed its self-test"),
+            PartFault::Late => f.write_str("the part does not become ready"),
+            PartFault::Stuck => f.write_str("the part's readings do not change"),
+            PartFault::Range => f.write_str("the part's readings are out of its range"),
+            PartFault::Calibration => f.write_str("the part's factory calibration is damaged"),
+            PartFault::SelfTest => f.write_str("the part failed its self-test"),
             PartFault::Overflow => f.write_str("it lost readings"),
         }
     }

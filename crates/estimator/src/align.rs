@@ -36,7 +36,9 @@ impl fmt::Display for Unready {
             Unready::Settling => "at rest, but not yet for long enough",
             Unready::Moving => "the vehicle is moved: leave it at rest",
             Unready::Turning => "the vehicle turns, or the gyroscope's bias is too large: leave it at rest",
-            Unready::NotGravity => "the accelerometer does not show the acceleration of free fall: is it at rest?",
+            Unready::NotGravity => {
+                "the accelerometer does not show 1 g: leave the vehicle at rest, or calibrate the accelerometer"
+            }
             Unready::Tilted => "the vehicle is tilted: put it on level ground",
         })
     }

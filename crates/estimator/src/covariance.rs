@@ -324,7 +324,7 @@ impl Covariance {
         };
         let (t, v, p) = (of(&self.tt, THETA), of(&self.vv, VELOCITY), of(&self.pp, POSITION));
         let (g, a, b) = (of(&self.gg, GYRO), of(&self.aa, ACCEL), factor(self.bb, &BARO));
-        // `scale` ignores `slow` for variances: the variances of slow errors are given.
+        // Zeros for `slow`: `scale` leaves the variances of slow errors, which are fixed, as they are.
         self.scale(&ErrorVector {
             theta: t,
             velocity: v,

@@ -133,7 +133,8 @@ impl Estimator {
     ) {
         let turn = about_z(by);
         memory.turn_heading(by);
-        // Without a row (nose or field almost vertical) the heading error is up to ten times the tilt error.
+        // Without a row of the measurement, as with the nose or the field almost vertical, the heading error is taken
+        // to be up to ten times the tilt error.
         let tilt = memory.covariance.variances().theta.xy().max();
         let row = horizon.turned(&turn).row(&part.target, VectorComponent::Z, &self.expected(memory));
         let (row, variance) = match row {

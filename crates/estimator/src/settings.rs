@@ -12,12 +12,12 @@ parameters! {
         /// Acceleration of free fall.
         #[parameter(GRAVITY, "m/s2", 9.7..=9.9)]
         pub gravity_m_s2: f32 = 9.81,
-        /// Noise density of the gyroscope, vibration and all that the model leaves out included. The default is for
-        /// flight on any vehicle; the part alone has 5e-5 (ICM-42688-P).
+        /// Noise density of the gyroscope, including vibration and model errors. The default suits any vehicle in
+        /// flight; an ICM-42688-P alone has 5e-5.
         #[parameter(GYR_NOISE, "rad/s/rtHz", 1e-6..=0.1)]
         pub gyro_noise_rad_s_rthz: f32 = 1e-3,
-        /// Noise density of the accelerometer, vibration and all that the model leaves out included. The default is for
-        /// flight on any vehicle; the part alone has 7e-4 (ICM-42688-P).
+        /// Noise density of the accelerometer, including vibration and model errors. The default suits any vehicle in
+        /// flight; an ICM-42688-P alone has 7e-4.
         #[parameter(ACC_NOISE, "m/s2/rtHz", 1e-5..=1.0)]
         pub accel_noise_m_s2_rthz: f32 = 2e-2,
         /// Random walk of the gyroscope's bias, per root of a second.
@@ -26,7 +26,8 @@ parameters! {
         /// Random walk of the accelerometer's bias, per root of a second.
         #[parameter(ACC_WALK, "m/s2/rts", 1e-7..=0.1)]
         pub accel_walk_m_s2_rts: f32 = 3e-4,
-        /// Standard deviation of the accelerometer's bias at the start, which levelling cannot distinguish from a tilt.
+        /// Standard deviation of the accelerometer's bias at the start. Levelling cannot distinguish this bias from a
+        /// tilt.
         #[parameter(ACC_BIAS, "m/s2", 1e-3..=1.0)]
         pub accel_bias_m_s2: f32 = 0.1,
         /// Largest bias of the gyroscope; alignment refuses a larger rate.
@@ -39,30 +40,29 @@ parameters! {
         #[parameter(BARO_WALK, "m/rts", 1e-4..=1.0)]
         pub baro_walk_m_rts: f32 = 0.02,
 
-        /// Noise of a GNSS receiver's position from fix to fix, standard deviation per coordinate. The rest of the
-        /// standard deviation that it reports is an error that changes slowly, which is not averaged.
+        /// Noise of a GNSS receiver's position from fix to fix, standard deviation per coordinate. The estimator takes
+        /// the rest of the reported standard deviation as a slow error, which averaging does not reduce.
         #[parameter(GNSS_NOISE, "m", 0.01..=1000.0)]
         pub gnss_noise_m: f32 = 0.5,
-        /// Correlation time of that slow error.
+        /// Correlation time of the GNSS position's slow error.
         #[parameter(GNSS_SLOW, "s", 1.0..=1e5)]
         pub gnss_slow_s: f32 = 120.0,
-        /// Heading error by what iron, magnets and currents of the vehicle add to the field, standard deviation along
-        /// each of body x and y. It stays, and is not averaged; the standard deviation that comes with its measurements
-        /// is its noise alone. The default is for any that was calibrated once: 0.04 gauss, of 0.2 gauss. From
-        /// 0.5 rad on it gives no heading.
+        /// Heading error caused by the vehicle's iron, magnets and currents, standard deviation along each of body x
+        /// and y. This error is constant, so averaging does not reduce it; the standard deviation of a measurement only
+        /// describes the noise. The default suits a compass that was calibrated once: 0.04 gauss of error in a field of
+        /// 0.2 gauss. From 0.5 rad on, the estimator takes no heading from the compass.
         #[parameter(MAG_SLOW, "rad", 0.0..=1.0)]
         pub mag_slow_rad: f32 = 0.2,
-        /// Time of identical poses or positions after which a tracker counts as frozen, and is not believed; 0 for
-        /// never.
+        /// Time of identical poses or positions after which a tracker counts as frozen and is ignored; 0 for never.
         #[parameter(FROZEN, "s", 0.0..=10.0)]
         pub frozen_s: f32 = 0.2,
 
         /// Largest accepted innovation, in standard deviations.
         #[parameter(GATE, "1", 2.0..=20.0)]
         pub gate_sigmas: f32 = 5.0,
-        /// Time since an aid was last fused after which it is followed although it contradicts the state, as in PX4's
-        /// EKF2. Where nothing else holds the state it is followed earlier, after three fifths of `coast_s` at the
-        /// latest: later the state would not be valid any more.
+        /// Time without fusing an aid after which the estimator resets to the aid although it contradicts the state, as
+        /// in PX4's EKF2. If no other aid holds the state, the reset comes earlier, after three fifths of `coast_s` at
+        /// the latest, while the state is still valid.
         #[parameter(REACQUIRE, "s", 0.05..=60.0)]
         pub reacquire_s: f32 = 7.0,
         /// Time without any aid after which velocity and position are invalid.
@@ -87,15 +87,15 @@ parameters! {
         /// Largest standard deviation of the gyroscope at rest, per axis.
         #[parameter(STILL_RATE, "rad/s", 1e-3..=1.0)]
         pub still_rate_rad_s: f32 = 0.015,
-        /// Largest standard deviation of the accelerometer at rest, per axis; twice it is the largest deviation of the
-        /// mean from free fall.
+        /// Largest standard deviation of the accelerometer at rest, per axis. The mean may deviate from free fall by
+        /// twice this value.
         #[parameter(STILL_ACC, "m/s2", 0.01..=5.0)]
         pub still_accel_m_s2: f32 = 0.3,
         /// Largest tilt at which alignment is allowed.
         #[parameter(ALIGN_TILT, "rad", 0.05..=1.5)]
         pub align_tilt_rad: f32 = 0.8,
 
-        /// Declination: direction of magnetic north from true north, positive to the east.
+        /// Magnetic declination: direction of magnetic north from true north, positive to the east.
         #[parameter(DECLINATION, "rad", -3.2..=3.2)]
         pub declination_rad: f32 = 0.0,
         /// Largest deviation of the magnetic field's strength from that at the start, as a share of it.

@@ -71,7 +71,7 @@ fn a_moved_tracker_is_believed_after_a_while() {
         },
     );
     let reset_ms = reset_ms.unwrap();
-    // After three fifths of `coast_s`.
+    // The reset comes after three fifths of `coast_s`.
     assert!((8950..9150).contains(&reset_ms), "{reset_ms} ms");
 }
 

@@ -99,7 +99,7 @@ impl BackgroundWriter {
 /// Queues all bytes at once or fails; never waits.
 impl Write for BackgroundWriter {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let too_slow = || io::Error::other("the disk is too slow");
+        let too_slow = || io::Error::other("the disk is too slow for the log");
         if self.offer(bytes) { Ok(bytes.len()) } else { Err(self.failure().unwrap_or_else(too_slow)) }
     }
 

@@ -58,33 +58,38 @@ impl fmt::Display for Error {
                         "free some space, or choose another disk"
                     }
                     io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory | io::ErrorKind::IsADirectory => {
-                        "something else has that name: move it, or choose another folder"
+                        "the name is taken by something else: move that, or choose another folder"
                     }
-                    _ => "choose a folder that you may write to",
+                    _ => "choose a folder in which you may write",
                 };
                 write!(f, "cannot write {}: {source}; {cure} with --out", path.display())
             }
             Error::Foreign { path, whose } => write!(
                 f,
-                "{}: {whose}; choose another folder with --out, or replace what is in the way with --force",
+                "{}: {whose}; choose another folder with --out, or replace its content with --force",
                 path.display()
             ),
             Error::Busy(path) => write!(
                 f,
-                "{}: another program is writing into it; wait until it has ended, or choose another folder with --out",
+                "{}: another program is writing into this folder; wait until the program ends, or choose another \
+                 folder with --out",
                 path.display()
             ),
             Error::Exists { path, option, forcible } => {
                 let cure = if *forcible { "replace it with --force" } else { "remove that one" };
-                write!(f, "{}: exists already; choose another file for {option}, or {cure}", path.display())
+                write!(f, "{}: the file exists already; choose another file for {option}, or {cure}", path.display())
             }
             Error::File { path, option, problem } => {
-                write!(f, "{}: cannot be written ({problem}); choose another file for {option}", path.display())
+                write!(
+                    f,
+                    "{}: the file cannot be written ({problem}); choose another file for {option}",
+                    path.display()
+                )
             }
             Error::Damaged { path, problem } => write!(
                 f,
-                "{}: damaged ({problem}), so the owner of the folder is unknown; choose another folder with --out, or \
-                 replace what is in the way with --force",
+                "{}: the file is damaged ({problem}), so the owner of the folder is unknown; choose another folder \
+                 with --out, or replace its content with --force",
                 path.display()
             ),
         }

@@ -87,7 +87,11 @@ impl FlashWriter {
         let mut failure = self.failure.lock();
         // A write was lost; later writes would be of no use, so writing stops for good.
         failure.has_failed |= !matches!(sent, Some(Ok(())));
-        if failure.has_failed { Err(io::Error::other("the disk is too slow, or has failed")) } else { Ok(()) }
+        if failure.has_failed {
+            Err(io::Error::other("the disk is too slow for the log, or has failed"))
+        } else {
+            Ok(())
+        }
     }
 }
 
@@ -150,12 +154,13 @@ impl FlashFile {
     pub fn open_existing(path: &Path) -> io::Result<Self> {
         let mut file = OpenOptions::new().read(true).write(true).open(path)?;
         file.try_lock().map_err(|error| match error {
-            TryLockError::WouldBlock => io::Error::new(io::ErrorKind::WouldBlock, "in use by another program"),
+            TryLockError::WouldBlock => io::Error::new(io::ErrorKind::WouldBlock, "another program uses the file"),
             TryLockError::Error(error) => error,
         })?;
         let length = file.metadata()?.len();
         if length != (SECTORS * SECTOR) as u64 {
-            let problem = format!("no store of parameters: {length} bytes, not {}", SECTORS * SECTOR);
+            let problem =
+                format!("the file is no parameter store: it has {length} bytes instead of {}", SECTORS * SECTOR);
             return Err(io::Error::new(io::ErrorKind::InvalidData, problem));
         }
         let mut bytes = vec![0; SECTORS * SECTOR];

@@ -90,7 +90,7 @@ impl Folder {
         match own.hashes.keys().find(|name| !force && folder.is_changed(&own, name)) {
             Some(name) => Err(Error::Foreign {
                 path: path.join(name),
-                whose: format!("changed since `sitl {}` wrote it", folder.command),
+                whose: format!("the file was changed after `sitl {}` wrote it", folder.command),
             }),
             None => Ok(folder),
         }
@@ -118,9 +118,12 @@ impl Folder {
             // A folder of an interrupted command that has written nothing is free.
             Ok(_) if self.is_empty()? => Ok(OwnFiles::default()),
             Ok(Some(Marker { command, name, .. })) => {
-                Err(self.foreign(format!("holds what `sitl {command}` made of {name}")))
+                Err(self.foreign(format!("the folder holds the results of `sitl {command}` for {name}")))
             }
-            Ok(None) => Err(self.foreign(format!("not empty, and not from `sitl {}`", self.command))),
+            Ok(None) => {
+                Err(self
+                    .foreign(format!("the folder is not empty, and its content is not from `sitl {}`", self.command)))
+            }
             Err(error) => Err(Error::Damaged { path: self.path.join(MARKER), problem: error.to_string() }),
         }
     }
@@ -170,7 +173,7 @@ impl Folder {
                 let path = self.path.join(name);
                 // Checks the link itself, since a dangling link is also somebody's file.
                 if own.files.insert(name.into()) && !self.force && fs::symlink_metadata(&path).is_ok() {
-                    let whose = format!("in the way, and not from `sitl {}`", self.command);
+                    let whose = format!("a file that is not from `sitl {}` is in the way", self.command);
                     return Err(Error::Foreign { path, whose });
                 }
             }

@@ -37,7 +37,7 @@ impl OutputFile {
     fn checked(self) -> Result<Self, Error> {
         let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty());
         if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-            return Err(self.failed(&format!("there is no folder {}", folder.display())));
+            return Err(self.failed(&format!("the folder {} does not exist", folder.display())));
         }
         if self.path.is_dir() || self.path.file_name().is_none() {
             return Err(self.failed("it is a folder"));

@@ -41,7 +41,7 @@ impl<W: Write> SealingWriter<W> {
         self.hash.write(&self.held);
         let sum = format!("{:016x}", self.hash.finish());
         let place = digits(&self.held).and_then(|at| self.held.get_mut(at..at + sum.len()));
-        place.ok_or_else(|| io::Error::other("no place for a checksum"))?.copy_from_slice(sum.as_bytes());
+        place.ok_or_else(|| io::Error::other("the file has no place for a checksum"))?.copy_from_slice(sum.as_bytes());
         self.out.write_all(&self.held)
     }
 }
@@ -130,7 +130,7 @@ pub fn verify(file: &mut (impl Read + Seek)) -> io::Result<()> {
     let mut tail = Vec::new();
     file.seek(SeekFrom::Start(start))?;
     file.read_to_end(&mut tail)?;
-    let at = digits(&tail).ok_or_else(|| broken("no checksum in it"))?;
+    let at = digits(&tail).ok_or_else(|| broken("the file has no checksum"))?;
     let mut hash = XxHash64::with_seed(0);
     file.seek(SeekFrom::Start(0))?;
     let (mut left, mut buffer) = (start, vec![0; 1 << 16]);
@@ -141,13 +141,17 @@ pub fn verify(file: &mut (impl Read + Seek)) -> io::Result<()> {
         hash.write(piece);
         left -= want as u64;
     }
-    let (before, rest) = tail.split_at_checked(at).ok_or_else(|| broken("no checksum in it"))?;
-    let (sum, after) = rest.split_at_checked(ZEROS.len()).ok_or_else(|| broken("no checksum in it"))?;
+    let (before, rest) = tail.split_at_checked(at).ok_or_else(|| broken("the file has no checksum"))?;
+    let (sum, after) = rest.split_at_checked(ZEROS.len()).ok_or_else(|| broken("the file has no checksum"))?;
     for piece in [before, ZEROS, after] {
         hash.write(piece);
     }
     file.seek(SeekFrom::Start(0))?;
-    if format!("{:016x}", hash.finish()).as_bytes() == sum { Ok(()) } else { Err(broken("its checksum is wrong")) }
+    if format!("{:016x}", hash.finish()).as_bytes() == sum {
+        Ok(())
+    } else {
+        Err(broken("the file's checksum is wrong"))
+    }
 }
 
 #[cfg(test)]

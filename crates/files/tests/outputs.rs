@@ -95,12 +95,12 @@ fn results_are_replaced_by_the_same_command_as_long_as_nobody_has_changed_them()
     let files = ["a.csv", "b.json", "c.html"];
     written(&path, "fly x", false, &files).unwrap();
     let refused = |command: &str| written(&path, command, false, &files).unwrap_err().to_string();
-    assert!(refused("fly x --seed 2").contains("holds what `sitl fly x` made of it"));
+    assert!(refused("fly x --seed 2").contains("the folder holds the results of `sitl fly x` for it"));
     for name in files {
         written(&path, "fly x", false, &files).unwrap();
         fs::write(path.join(name), "fly y").unwrap();
         let error = refused("fly x");
-        assert!(error.contains(&format!("{name}: changed since `sitl fly x` wrote it")), "{error}");
+        assert!(error.contains(&format!("{name}: the file was changed after `sitl fly x` wrote it")), "{error}");
         assert_eq!(fs::read(path.join(name)).unwrap(), b"fly y");
         // A file that is restored or gone does not count as changed.
         fs::write(path.join(name), "fly x").unwrap();
@@ -113,7 +113,7 @@ fn results_are_replaced_by_the_same_command_as_long_as_nobody_has_changed_them()
     written(&path, "fly z", true, &["a.csv"]).unwrap();
     assert_eq!(names(&path), ["a.csv", "b.json"]);
     assert_eq!(fs::read(path.join("b.json")).unwrap(), b"mine");
-    assert!(refused("fly x").contains("holds what `sitl fly z` made of it"));
+    assert!(refused("fly x").contains("the folder holds the results of `sitl fly z` for it"));
 }
 
 /// A folder of a command that was interrupted before it wrote anything is free for any command.

@@ -22,7 +22,7 @@
 
 /// Half of the window that determines the fastest message \[us\].
 pub const WINDOW_US: u64 = 500_000;
-/// Largest time ahead of the fastest message at which a stamp is accepted \[us\].
+/// A stamp may lie at most this long ahead of the fastest message \[us\].
 pub const AHEAD_US: u64 = 2_000;
 /// The clock counts as stepped ahead after this many messages in a row beyond [`AHEAD_US`].
 pub const AHEAD_COUNT: u8 = 5;

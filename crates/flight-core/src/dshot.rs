@@ -8,7 +8,7 @@ use crate::timer_clock::TimerClock;
 
 /// Bits per second.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "named after what they are, in kbit/s")]
+#[expect(missing_docs, reason = "each variant is named after its rate in kbit/s")]
 #[repr(u32)]
 pub enum DshotRate {
     Dshot150 = 150_000,

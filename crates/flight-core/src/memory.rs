@@ -111,8 +111,8 @@ impl<M> FlightCoreMemory<M> {
         };
         let Some(state) = inbox.state().filter(newer) else { return false };
         let armed = self.mode.armed();
-        // The vehicle's own estimator monitors its trackers itself, and may converge to them faster than its velocity
-        // says.
+        // The vehicle's own estimator monitors its trackers itself, and its position may converge to them faster than
+        // its velocity.
         let watched = armed && !inbox.is_own();
         if let Some(flight) = self.flight.as_mut().filter(|flight| watched && flight.landing.airborne()) {
             let repeated = self.state.is_some_and(|held| held.value == state.value);

@@ -25,7 +25,7 @@ parameters! {
         /// omega_max: speed at full throttle.
         #[parameter(SPEED_MAX, "rad/s", 1.0..=32_768.0)]
         pub speed_max_rad_s: f32 = 1000.0,
-        /// k: 1 if the speed is proportional to the throttle, 0 if the thrust is, or a value in between.
+        /// k: 1 if the speed is proportional to the throttle, 0 if the thrust is proportional, or a value in between.
         #[parameter(LINEARITY, "1", 0.0..=1.0)]
         pub linearity: f32 = 1.0,
         /// Smallest throttle of an armed motor, which keeps it turning.

@@ -94,18 +94,18 @@ impl Refusal {
             Refusal::TiltTooLarge => "arming refused: tilt too large",
             Refusal::SetpointMissing => "arming refused: no fresh setpoint",
             Refusal::SetpointTooFar => "arming refused: setpoint too far away",
-            Refusal::Unhealthy => "arming refused: tick rate or clock is wrong",
+            Refusal::Unhealthy => "arming refused: control rate or clock is wrong",
             Refusal::NotAtRest => "arming refused: not at rest for a second",
-            Refusal::InFlight => "disarming refused: in flight; force it to stop",
+            Refusal::InFlight => "disarming refused: in flight; force to override",
             Refusal::NotArmed => "refused: not armed",
-            Refusal::Overtaken => "refused: motors were stopped by a later request",
+            Refusal::Overtaken => "refused: a later request stopped the motors",
             Refusal::AttitudeUnknown => "arming refused: estimator has no attitude yet",
             Refusal::HeadingUnknown => "arming refused: estimator has no heading",
             Refusal::PositionUnknown => "arming refused: estimator has no position",
-            Refusal::BatteryLow => "arming refused: battery low or not known",
+            Refusal::BatteryLow => "arming refused: battery low or unknown",
             Refusal::SensorFailed => "arming refused: a sensor has failed",
             Refusal::OutsideFence => "arming refused: outside the geofence",
-            Refusal::WrongMode => "arming refused: not in this flight mode",
+            Refusal::WrongMode => "arming refused: this mode does not allow arming",
         }
     }
 }

@@ -134,7 +134,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
     /// Runs one tick. Call it every millisecond. `now_us` is the time since power-up, and never goes back. Cannot fail.
     // Always inlined: copying the outcome out of a call costs a hundred instructions.
     #[inline(always)]
-    #[must_use = "the motors need its speeds"]
+    #[must_use = "the motors need the rotor speeds"]
     pub fn tick(&self, memory: &mut FlightCoreMemory<C::Memory>, now_us: u64, inbox: &Inbox) -> TickOutcome<N> {
         let dt_s = self.controller.dt_s();
         // Takes the newest inputs.

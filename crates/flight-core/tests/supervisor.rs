@@ -272,7 +272,7 @@ fn reasons_are_a_set_in_the_order_of_arming() {
     }
 }
 
-/// Any noted reason prevents arming, even if it is not in the order.
+/// Every reason that is noted prevents arming, even a reason that the order of refusals does not list.
 #[test]
 fn any_reason_speaks_against_arming() {
     for reason in Refusal::ALL {

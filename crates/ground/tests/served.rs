@@ -76,7 +76,7 @@ fn a_turn_to_the_other_side_fails() {
     for name in ["right side down", "left side down"] {
         let (verdict, reasons) = verdict(&log, name);
         assert_eq!(verdict, Verdict::Failed, "{name}");
-        assert!(reasons.contains("the gyroscope has not shown"), "{reasons}");
+        assert!(reasons.contains("the gyroscope does not show"), "{reasons}");
     }
     assert_eq!(verdict(&log, "nose down").0, Verdict::Passed);
     assert!(!log.is_well());
@@ -134,12 +134,12 @@ fn what_is_no_board_is_named() {
     uplink.extend_from_slice(own.send(&Uplink::Heartbeat, &mut [0; FRAME_MAX]));
     for (bytes, wanted) in [
         (Vec::new(), "sends nothing"),
-        (vec![0x24, 0x4d, 0x3c, 0xfd, 0x09, 0x00], "bytes and no MAVLink heartbeat"),
+        (vec![0x24, 0x4d, 0x3c, 0xfd, 0x09, 0x00], "bytes but no MAVLink heartbeat"),
         // The station's own frames, sent back by a wire from TX to RX.
-        (uplink, "bytes and no MAVLink heartbeat"),
-        (beat(false), "not this firmware"),
+        (uplink, "bytes but no MAVLink heartbeat"),
+        (beat(false), "does not run this firmware"),
         (beat(true), "is armed"),
-        (signed, "key of signatures"),
+        (signed, "signing key"),
     ] {
         let options = BringUpOptions { rest_s: 1, is_attended: false };
         let mut exchange = |_: &[u8], hear: &mut dyn FnMut(&[u8])| {

@@ -26,52 +26,54 @@ parameters! {
         /// Largest height above home; 0 for none.
         #[parameter(GF_MAX_VER_DIST, "m", 0.0..=10000.0)]
         pub fence_height_m: f32 = 0.0,
-        /// What follows outside the geofence; to terminate is to land.
+        /// Action when the vehicle is outside the geofence; `terminate` means land.
         #[choice(GF_ACTION)]
         pub fence_action: FenceAction = FenceAction::Hold,
         /// Time after which a silent station counts as lost.
         #[parameter(COM_DL_LOSS_T, "s", 1.0..=300.0)]
         pub station_lost_s: f32 = 10.0,
-        /// What follows from a lost station.
+        /// Action when the station is lost.
         #[choice(NAV_DLL_ACT)]
         pub station_action: StationAction = StationAction::Return,
-        /// What follows from lost targets in offboard mode.
+        /// Action when the targets are lost in offboard mode.
         #[choice(COM_OBL_ACT)]
         pub targets_action: TargetsAction = TargetsAction::Hold,
-        /// What follows from lost sticks in a mode that they fly.
+        /// Action when the sticks are lost in a mode that needs them.
         #[choice(NAV_RCL_ACT)]
         pub sticks_action: SticksAction = SticksAction::Hold,
-        /// What follows from a failed sensor.
+        /// Action when a sensor fails.
         #[choice(COM_SENS_ACT)]
         pub sensors_action: SensorsAction = SensorsAction::Warn,
-        /// Volts of the battery per volt at the board's pin; 0 and below for the board's own divider.
+        /// Battery volts per volt at the board's pin; 0 or less uses the board's built-in divider.
         #[parameter(BAT1_V_DIV, "1", -1.0..=1000.0)]
         pub divider: f32 = -1.0,
-        /// Amperes of the battery per volt at the board's pin; 0 and below for the board's own amplifier.
+        /// Battery amperes per volt at the board's pin; 0 or less uses the board's built-in amplifier.
         #[parameter(BAT1_A_PER_V, "A/V", -1.0..=10000.0)]
         pub current_a_v: f32 = -1.0,
-        /// Number of the battery's cells; 0: by its monitor's charge, or as many as the voltage says while disarmed.
+        /// Number of the battery's cells; 0 uses the battery monitor's charge, or counts cells by the voltage while
+        /// disarmed.
         #[parameter(BAT1_N_CELLS, "number", 0.0..=24.0)]
         pub cells: u32 = 0,
         /// Voltage of an empty cell without load.
         #[parameter(BAT1_V_EMPTY, "V", 1.0..=10.0)]
         pub empty_v: f32 = 3.6,
-        /// Voltage of a full cell without load, more than of an empty one.
+        /// Voltage of a full cell without load, above that of an empty cell.
         #[parameter(BAT1_V_CHARGED, "V", 1.0..=10.0)]
         pub full_v: f32 = 4.05,
         /// Resistance of a cell.
         #[parameter(BAT1_R_INTERNAL, "ohm", 0.0..=1.0)]
         pub resistance_ohm: f32 = 0.005,
-        /// Charge below which the battery is low, which is announced.
+        /// Charge below which the battery is announced as low.
         #[parameter(BAT_LOW_THR, "1", 0.0..=1.0)]
         pub low: f32 = 0.15,
-        /// Charge below which it is critical, at most that of a low one.
+        /// Charge below which the battery is critical; at most the charge of a low battery.
         #[parameter(BAT_CRIT_THR, "1", 0.0..=1.0)]
         pub critical: f32 = 0.07,
-        /// Charge below which it is almost empty, at most the critical one.
+        /// Charge below which the battery is almost empty; at most the critical charge.
         #[parameter(BAT_EMERGEN_THR, "1", 0.0..=1.0)]
         pub emergency: f32 = 0.05,
-        /// What follows from a critical battery; in `return-then-land`, the vehicle lands with an almost empty one.
+        /// Action when the battery is critical; with `return-then-land`, the vehicle lands once the battery is almost
+        /// empty.
         #[choice(COM_LOW_BAT_ACT)]
         pub battery_action: BatteryAction = BatteryAction::ReturnThenLand,
     }

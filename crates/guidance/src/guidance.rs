@@ -229,7 +229,7 @@ impl Guidance {
     }
 
     /// Runs one tick. Call it every millisecond. Cannot fail.
-    #[must_use = "the vehicle flies by it"]
+    #[must_use = "the vehicle must fly the returned setpoint"]
     #[inline]
     pub fn tick(&mut self, given: &GuidanceInputs<'_>, orders: &Orders) -> GuidanceOutputs {
         self.memory.tick(&self.settings, given, orders)

@@ -239,7 +239,8 @@ impl Limiter {
         };
         let MotionLimits { yaw_rate_rad_s, yaw_acceleration_rad_s2, .. } = *limits;
         let turning = YawLimits { rate_rad_s: yaw_rate_rad_s, acceleration_rad_s2: yaw_acceleration_rad_s2 };
-        // Must come before a stream may pass: the heading is limited then, too.
+        // The heading advances before the check whether a stream may pass, since a passing stream's heading is limited,
+        // too.
         now.heading.advance(&turn, &turning, dt_s);
         if let Some(target) = &target
             && now.pass(target, jerk_m_s3, limits, interval_s, dt_s)

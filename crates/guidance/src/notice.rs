@@ -44,7 +44,7 @@ impl FailsafeCause {
     /// Returns the cause in words.
     pub const fn name(self) -> &'static str {
         match self {
-            FailsafeCause::Descent => "no state, flight core descends",
+            FailsafeCause::Descent => "state lost, descending",
             FailsafeCause::BatteryEmergency => "battery almost empty",
             FailsafeCause::BatteryCritical => "battery critical",
             FailsafeCause::BatteryLow => "battery low",
@@ -86,9 +86,9 @@ impl ModeReason {
             ModeReason::Done => "done",
             ModeReason::Mission => "by the mission",
             ModeReason::Cleared => "the mission was cleared",
-            ModeReason::NoLift => "has not left the ground",
+            ModeReason::NoLift => "take-off failed: still on the ground",
             ModeReason::Disarmed => "disarmed",
-            ModeReason::Back => "the state is back",
+            ModeReason::Back => "the state estimate is back",
             ModeReason::Failsafe(cause) => cause.name(),
         }
     }
@@ -150,7 +150,7 @@ impl GuidanceNotice {
         match self {
             GuidanceNotice::Mode(mode, reason) => [mode.name(), ": ", reason.name()],
             GuidanceNotice::Found(cause) => [cause.name(), "", ""],
-            GuidanceNotice::Over(cause) => ["no longer: ", cause.name(), ""],
+            GuidanceNotice::Over(cause) => ["cleared: ", cause.name(), ""],
             GuidanceNotice::Disarms => ["on the ground: disarming", "", ""],
             GuidanceNotice::ItemRefused => ["mission stopped: an item cannot be flown", "", ""],
         }

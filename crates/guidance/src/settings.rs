@@ -18,19 +18,20 @@ parameters! {
         /// Largest speed downwards.
         #[parameter(MPC_Z_VEL_MAX_DN, "m/s", 0.1..=10.0)]
         pub down_m_s: f32 = 1.5,
-        /// Horizontal acceleration with which a distant target is approached.
+        /// Horizontal acceleration toward a distant target.
         #[parameter(MPC_ACC_HOR, "m/s2", 0.5..=20.0)]
         pub acceleration_m_s2: f32 = 3.0,
-        /// Largest horizontal acceleration together with that of the target, at least that of the approach.
+        /// Largest horizontal acceleration including the target's own; at least the acceleration toward a distant
+        /// target.
         #[parameter(MPC_ACC_HOR_MAX, "m/s2", 0.5..=40.0)]
         pub acceleration_max_m_s2: f32 = 10.0,
         /// Largest vertical acceleration.
         #[parameter(MPC_ACC_UP_MAX, "m/s2", 0.5..=20.0)]
         pub vertical_acceleration_m_s2: f32 = 4.0,
-        /// Jerk with which a distant target is approached.
+        /// Jerk toward a distant target.
         #[parameter(MPC_JERK_AUTO, "m/s3", 0.5..=100.0)]
         pub jerk_m_s3: f32 = 8.0,
-        /// Largest jerk together with that of the target, at least that of the approach.
+        /// Largest jerk including the target's own; at least the jerk toward a distant target.
         #[parameter(MPC_JERK_MAX, "m/s3", 0.5..=500.0)]
         pub jerk_max_m_s3: f32 = 100.0,
         /// Largest rate of the heading.
@@ -59,40 +60,40 @@ parameters! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct FlightModeSettings {
-        /// Height of take-off above where the vehicle stands.
+        /// Height to which the vehicle takes off, above the place where it stands.
         #[parameter(MIS_TAKEOFF_ALT, "m", 0.3..=100.0)]
         pub takeoff_height_m: f32 = 2.5,
         /// Speed of take-off.
         #[parameter(MPC_TKO_SPEED, "m/s", 0.1..=10.0)]
         pub takeoff_m_s: f32 = 1.5,
-        /// Speed at which it lands.
+        /// Landing speed.
         #[parameter(MPC_LAND_SPEED, "m/s", 0.1..=3.0)]
         pub land_m_s: f32 = 0.7,
-        /// Height above home below which it descends at that speed.
+        /// Height above home below which the vehicle descends at the landing speed.
         #[parameter(MPC_LAND_ALT2, "m", 0.0..=100.0)]
         pub land_slow_m: f32 = 5.0,
         /// Horizontal speed on the way to a place.
         #[parameter(MPC_XY_CRUISE, "m/s", 0.1..=40.0)]
         pub cruise_m_s: f32 = 5.0,
-        /// Height above home at which it returns, at least.
+        /// Smallest height above home at which the vehicle returns.
         #[parameter(RTL_RETURN_ALT, "m", 0.0..=1000.0)]
         pub return_height_m: f32 = 15.0,
-        /// Distance from home up to which it returns without climbing.
+        /// Distance from home within which the vehicle returns without climbing.
         #[parameter(RTL_MIN_DIST, "m", 0.0..=100.0)]
         pub near_home_m: f32 = 5.0,
-        /// Distance at which a waypoint counts as reached, if it has none of its own.
+        /// Distance at which a waypoint counts as reached, unless the waypoint has a radius of its own.
         #[parameter(NAV_ACC_RAD, "m", 0.05..=200.0)]
         pub within_m: f32 = 1.0,
-        /// Largest tilt by the sticks.
+        /// Largest tilt that the sticks command.
         #[parameter(MAN_TILT_MAX, "rad", 0.05..=1.2)]
         pub stick_tilt_rad: f32 = 0.6,
-        /// Rate of roll at the end of the stick's way in mode acro.
+        /// Roll rate at full stick in acro mode.
         #[parameter(MC_ACRO_R_MAX, "deg/s", 0.0..=1800.0)]
         pub acro_roll_deg_s: f32 = 100.0,
-        /// Rate of pitch at the end of the stick's way in mode acro.
+        /// Pitch rate at full stick in acro mode.
         #[parameter(MC_ACRO_P_MAX, "deg/s", 0.0..=1800.0)]
         pub acro_pitch_deg_s: f32 = 100.0,
-        /// Rate of yaw at the end of the stick's way in mode acro.
+        /// Yaw rate at full stick in acro mode.
         #[parameter(MC_ACRO_Y_MAX, "deg/s", 0.0..=1800.0)]
         pub acro_yaw_deg_s: f32 = 100.0,
         /// Time after which the targets of a companion computer count as lost.

@@ -34,13 +34,13 @@ impl fmt::Display for Error {
         match self {
             Error::Mismatch(what) => write!(
                 f,
-                "the firmware holds the paper's vehicle and AFBC in the profile flight, but the scenario has {what}; \
-                 fly it by `sitl fly`, or change it"
+                "the firmware holds the paper's vehicle and AFBC with the profile flight, but the scenario has {what}; \
+                 fly the scenario by `sitl fly`, or change the scenario"
             ),
             Error::Unread => write!(
                 f,
-                "the readings of the scenario's [instruments] cannot reach this board; leave them out, or fly it by \
-                 `sitl pil`"
+                "the readings of the scenario's [instruments] cannot reach this board; leave out [instruments], or fly \
+                 the scenario by `sitl pil`"
             ),
             Error::Baud { given, least } => {
                 write!(f, "{given} baud is too slow for a state every 10 ms; take at least {least}")
@@ -48,8 +48,8 @@ impl fmt::Display for Error {
             Error::Silent => {
                 write!(
                     f,
-                    "the vehicle sends nothing that is understood; check its power, the port, the baud rate and the \
-                     wires; one with a key of signatures hears nobody without it"
+                    "no MAVLink comes from the vehicle; check the vehicle's power, the port, the baud rate and the \
+                     wires; a vehicle with a signing key ignores unsigned messages"
                 )
             }
             Error::NotArmed(reason) => write!(f, "the vehicle did not arm: {reason}"),

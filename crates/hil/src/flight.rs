@@ -137,7 +137,7 @@ impl<A: Autopilot> FlightSoftware for Line<'_, A> {
     }
 
     fn gave_up(&self) -> Option<&'static str> {
-        (!self.station.heard().armed).then_some("it disarmed in flight")
+        (!self.station.heard().armed).then_some("the vehicle disarmed in flight")
     }
 }
 
@@ -213,7 +213,7 @@ impl<A: Autopilot> Line<'_, A> {
             self.has_armed = true;
             return Ok(view);
         }
-        let reason = self.station.heard().refusal().unwrap_or("it does not answer");
+        let reason = self.station.heard().refusal().unwrap_or("the vehicle does not answer");
         Err(Error::NotArmed(reason.into()))
     }
 

@@ -123,7 +123,7 @@ impl Open {
     }
 
     fn failure(&self) -> Option<io::Error> {
-        let too_slow = || self.is_overrun.then(|| io::Error::other("the disk is too slow"));
+        let too_slow = || self.is_overrun.then(|| io::Error::other("the disk is too slow for the log"));
         self.out.failure().or_else(too_slow)
     }
 }

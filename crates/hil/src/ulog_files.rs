@@ -93,8 +93,8 @@ impl UlogFiles {
         }
         self.starts += 1;
         let refused = match () {
-            () if self.starts > STARTS_MAX => Some("there were too many starts"),
-            () if self.ending.len() > ENDING_MAX => Some("the logs of earlier starts are not written yet"),
+            () if self.starts > STARTS_MAX => Some("the vehicle has restarted too often"),
+            () if self.ending.len() > ENDING_MAX => Some("the logs of earlier starts are still being written"),
             () => None,
         };
         if let Some(why) = refused {
@@ -180,7 +180,7 @@ impl LogPlace {
 
 fn ended(path: &Path, problem: &str) -> String {
     let path = path.display();
-    format!("{path}: the log has ended early ({problem}); make room, or choose another file for --ulog")
+    format!("{path}: the log ended early ({problem}); free some space, or choose another file for --ulog")
 }
 
 /// Returns the path of a start's file.

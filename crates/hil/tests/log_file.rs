@@ -37,7 +37,7 @@ fn a_log_is_whole() {
     let log = LogFile::create(&OutputFile::new(&path, "--exact-log").expect("new")).expect("created");
     let mut sink = log.sink();
     let bytes: Vec<u8> = (0..30_000_000_u32).map(|it| (it / 7) as u8).collect();
-    // Written faster than any disk, and yet complete.
+    // The bytes come faster than any disk writes, but the file must be complete.
     bytes.chunks(777).for_each(&mut sink);
     log.finish().expect("written");
     assert!(fs::read(path).expect("read") == bytes && log.take_failure().is_none());
@@ -70,7 +70,7 @@ fn a_live_log_waits_for_no_disk() {
     let log = LogFile::to(File::create(&path).expect("opened")).expect("begun").live();
     let mut sink = log.sink();
     (0..40_000).for_each(|_| sink(&[0; 1000]));
-    assert_eq!(log.take_failure().as_deref(), Some("the disk is too slow"));
+    assert_eq!(log.take_failure().as_deref(), Some("the disk is too slow for the log"));
     assert_eq!(log.take_failure(), None);
 }
 

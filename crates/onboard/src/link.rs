@@ -22,20 +22,20 @@ impl Choice for LogMode {
 pub const BAUD: u32 = 460_800;
 
 parameters! {
-    /// Parameters of the link. A change counts from the next start on.
+    /// Parameters of the link. A change takes effect from the next start on.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Link {
         /// MAVLink system id, from the next start on.
         #[parameter(MAV_SYS_ID, "number", 1.0..=250.0)]
         pub system: u32 = 1,
-        /// Baud rate of the serial line, and so what telemetry may take of it, from the next start on.
+        /// Baud rate of the serial line, which also limits the rate of telemetry, from the next start on.
         #[parameter(SER_TEL1_BAUD, "number", 9600.0..=921600.0)]
         pub baud: u32 = BAUD,
-        /// Link that carries the exact log in place of MAVLink, counted from 1; 0 for none, from the next start on. The
-        /// first one never does.
+        /// Number of the link that carries the exact log in place of MAVLink, counted from 1; 0 for none, from the next
+        /// start on. Link 1 always carries MAVLink.
         #[parameter(LOG_PORT, "number", 0.0..=4.0)]
         pub log_port: u32 = 0,
-        /// When the black box is written, by boards that keep logs.
+        /// Time during which boards with storage write the black box.
         #[choice(SDLOG_MODE)]
         pub log_mode: LogMode = LogMode::Armed,
     }

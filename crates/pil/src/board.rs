@@ -170,7 +170,8 @@ fn idle(elf: &Path) -> Result<u32, Error> {
     let text = file.section_by_name(".text").ok_or_else(|| Error::Protocol("the image has no code".into()))?;
     let code = text.data().map_err(|error| Error::Protocol(error.to_string()))?;
     let offset = code.windows(4).position(|window| window == LOOP);
-    let offset = offset.ok_or_else(|| Error::Protocol("the image has no idle loop that sleeps".into()))?;
+    let offset =
+        offset.ok_or_else(|| Error::Protocol("the image has no idle loop with a wait-for-interrupt".into()))?;
     Ok(text.address() as u32 + offset as u32)
 }
 

@@ -151,7 +151,7 @@ impl ClockTree {
                 return Ok(accesses);
             }
         }
-        Err(Error::Protocol(format!("{ACCESSES_MAX} accesses to the clock tree without an end")))
+        Err(Error::Protocol(format!("the image still accesses the clock tree after {ACCESSES_MAX} accesses")))
     }
 
     /// Returns silicon's answer to a load: a clock is ready as soon as it is on.
@@ -212,7 +212,11 @@ impl RegisterAccess {
             0x5 => (first >> 9 & 7 >= 3, first & 7, 2),
             // Address: register plus offset.
             0x6..=0x8 => (first >> 11 & 1 == 1, first & 7, 2),
-            _ => return Err(Error::Protocol(format!("no load or store: {first:04x} {second:04x}"))),
+            _ => {
+                return Err(Error::Protocol(format!(
+                    "the instruction {first:04x} {second:04x} is neither a load nor a store"
+                )));
+            }
         };
         Ok(RegisterAccess { is_load, register: register.into(), length })
     }

@@ -37,16 +37,16 @@ impl Error {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Error::NoQemu => write!(f, "qemu-system-arm is missing: install it, on Debian by scripts/qemu.sh"),
+            Error::NoQemu => write!(f, "qemu-system-arm is missing: install it; on Debian, scripts/qemu.sh does"),
             Error::NoMachine => {
-                write!(f, "this qemu-system-arm is too old: take 8.2 or newer, on Debian by scripts/qemu.sh")
+                write!(f, "this qemu-system-arm is too old: install 8.2 or newer; on Debian, scripts/qemu.sh does")
             }
             Error::NoTarget => write!(
                 f,
-                "the compiler's target is missing: rustup target add thumbv7em-none-eabihf, or where rustup cannot, \
+                "the compiler's target is missing: run rustup target add thumbv7em-none-eabihf; without rustup, set \
                  FW_TOOLCHAIN=$(scripts/thumb-toolchain.sh)"
             ),
-            Error::NoImage(path) => write!(f, "{} is missing: build it by cargo fw, cargo fw-pil", path.display()),
+            Error::NoImage(path) => write!(f, "{} is missing: build it with cargo fw or cargo fw-pil", path.display()),
             Error::Build => write!(f, "the firmware does not build"),
             Error::Exited(status) => write!(f, "the emulator ended: {status}"),
             Error::Silent(time) => write!(f, "the firmware did not answer for {} s", time.as_secs()),

@@ -192,7 +192,7 @@ impl Gdb {
                 return Ok(steps);
             }
         }
-        Err(Error::Protocol(format!("no end after {STEPS_MAX} instructions")))
+        Err(Error::Protocol(format!("the code did not return within {STEPS_MAX} instructions")))
     }
 
     /// Halts a running processor.

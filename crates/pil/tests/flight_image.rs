@@ -95,7 +95,7 @@ impl Talk {
     }
 }
 
-/// Five wait states, prefetch, both caches.
+/// FLASH_ACR: five wait states, prefetch and both caches on.
 const FLASH_ON: u32 = 5 | 1 << 8 | 1 << 9 | 1 << 10;
 /// Bits of RCC_PLLCFGR: the crystal is the PLL's source, and the PLL's divider.
 const PLL_FROM_CRYSTAL: u32 = 1 << 22;

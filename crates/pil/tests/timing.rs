@@ -81,19 +81,24 @@ fn what_is_known_is_not_loosened() {
         (None, 5, Some(11), Some("byte: over its deadline")),
         (None, 5, None, Some("byte: over its deadline")),
         (Some(known(Some(12), false)), 5, Some(12), None),
-        (Some(known(Some(12), false)), 5, Some(13), Some("byte: later than is known")),
-        (Some(known(Some(12), false)), 5, None, Some("byte: later than is known")),
+        (Some(known(Some(12), false)), 5, Some(13), Some("byte: later than known.rs allows")),
+        (Some(known(Some(12), false)), 5, None, Some("byte: later than known.rs allows")),
         (Some(known(None, false)), 5, None, None),
-        (Some(known(None, false)), 11, None, Some("byte: over its deadline at best, too")),
+        (Some(known(None, false)), 11, None, Some("byte: late even in the best case")),
         (Some(known(None, true)), 11, None, None),
-        (Some(known(Some(12), false)), 5, Some(10), Some("byte: known to be late, and is in time: delete that")),
+        (
+            Some(known(Some(12), false)),
+            5,
+            Some(10),
+            Some("byte: listed as late, but in time; delete the entry in known.rs"),
+        ),
     ] {
         let listed: Vec<_> = listed.into_iter().collect();
         let found = verdicts(&listed, &[row("byte", Some(best_us))], &[row("byte", most_us)]);
         assert_eq!(found, wrong.into_iter().collect::<Vec<_>>(), "{listed:?} {best_us} {most_us:?}");
     }
     let gone = verdicts(&[known(None, false)], &[], &[]);
-    assert_eq!(gone, ["byte: known to be late, and no row"]);
+    assert_eq!(gone, ["byte: listed in known.rs as late, but there is no such task"]);
 }
 
 /// A UART of the STM32F4 keeps one byte (RM0090, 30.3.3), one of the STM32H743 sixteen (RM0433, 48.3).

@@ -25,13 +25,14 @@ parameters! {
         /// Charge at the start, as a share of the capacity.
         #[parameter(CHARGE, "1", 0.0..=1.0)]
         pub initial_charge: f64 = 1.0,
-        /// Mechanical power of the rotors over electrical power, for speed controller and motor together.
+        /// Efficiency of speed controller and motor together: mechanical power of the rotors divided by electrical
+        /// power.
         #[parameter(EFFICIENCY, "1", 0.05..=1.0)]
         pub efficiency: f64 = 0.5,
         /// Power that avionics and payload draw.
         #[parameter(AVIONICS, "W", 0.0..=10_000.0)]
         pub avionics_w: f64 = 3.0,
-        /// What a low voltage reduces: only the largest speed, or every speed.
+        /// Effect of a low voltage: reduces only the largest rotor speed, or every rotor speed.
         #[choice(EFFECT)]
         pub effect: Sag = Sag::Ceiling,
     }

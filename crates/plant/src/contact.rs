@@ -22,7 +22,7 @@ parameters! {
         /// Compression of the feet's springs by the vehicle at rest; determines k.
         #[parameter(SINK, "m", 1e-5..=0.5)]
         pub sink_m: f64 = 0.005,
-        /// Damping ratio of the vehicle on its feet, where 1 does not bounce; determines c.
+        /// Damping ratio of the vehicle on its feet; with 1, the vehicle does not bounce. Determines c.
         #[parameter(DAMPING, "1", 0.05..=5.0)]
         pub damping_ratio: f64 = 0.7,
         /// mu: coefficient of friction.

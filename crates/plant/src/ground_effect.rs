@@ -3,7 +3,7 @@
 use afbc_types::parameters;
 
 parameters! {
-    /// Thrust near the ground over thrust far from it at the same rotor speed: 1 / (1 - (R/4z)^2).
+    /// Thrust near the ground divided by thrust far from the ground, at the same rotor speed: 1 / (1 - (R/4z)^2).
     ///
     /// I. C. Cheeseman, W. E. Bennett 1955, *The effect of the ground on a helicopter rotor in forward flight*, ARC R&M
     /// 3021, in hover: one rotor of radius R at height z, its source and its image. Valid from z = R/2 up; below, the

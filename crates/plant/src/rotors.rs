@@ -28,7 +28,7 @@ parameters! {
         /// Largest speed.
         #[parameter(MAX, "rad/s", 1.0..=10_000.0)]
         pub max_rad_s: f64 = 10_000.0,
-        /// Speeds before the first command arrives: those of hover, or the smallest.
+        /// Rotor speeds before the first command arrives: hover speed, or the smallest speed.
         #[choice(START)]
         pub start: RotorStart = RotorStart::Hover,
         /// Faults that reduce a rotor's thrust.

@@ -60,11 +60,12 @@ parameters! {
         /// Delay from motion to measurement, rounded to whole steps.
         #[parameter(DELAY, "s", 0.0..=0.5)]
         pub delay_s: f64 = 0.0,
-        /// Time between measured states, rounded to whole steps; 0 measures one in every step. In between, the last one
-        /// stands.
+        /// Time between measured states, rounded to whole steps; 0 measures a state in every step. Between
+        /// measurements, the last state stays.
         #[parameter(PERIOD, "s", 0.0..=0.5)]
         pub period_s: f64 = 0.0,
-        /// Whether the angular rates arrive in every step and without delay, as from a gyroscope beside the controller.
+        /// Whether the angular rates arrive in every step and without delay, as from a gyroscope on the controller's
+        /// board.
         #[switch(GYRO)]
         pub gyro: bool = false,
         /// Dropouts of measurements.

@@ -91,7 +91,7 @@ pub(crate) fn derivative_in(x: &SimplifiedVector, load: &Load, surroundings: &Ai
     let (velocity, rates) = (Vector3::new(x[3], x[4], x[5]), Vector3::new(x[9], x[10], x[11]));
     let axes = body_axes(x);
     let (a, angular) = surroundings.accelerations(x[2], &velocity, &axes, &rates);
-    // As in `derivative`, with the known direction of the thrust.
+    // Computes the same as `derivative`, for a known direction of the thrust.
     let a = a + load.acceleration(&axes.up);
     let angular = angular + load.angular_acceleration(&rates);
     SimplifiedVector::from([

@@ -9,10 +9,10 @@ use libm::{cos, sqrt};
 use nalgebra::Vector3;
 
 parameters! {
-    /// Velocity of the air relative to the earth, the sum of three parts. Acts on the vehicle through
-    /// [`Drag`](crate::Drag).
+    /// Velocity of the air relative to the earth, the sum of steady wind, gusts and turbulence. Acts on the vehicle
+    /// through [`Drag`](crate::Drag).
     ///
-    /// Constant during a step, at its value at the start.
+    /// The wind is constant during a step, at its value at the start of the step.
     #[derive(Clone, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Wind {
@@ -21,7 +21,7 @@ parameters! {
         pub steady_m_s: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0),
         /// Discrete gusts, which may overlap.
         pub gusts: Vec<CosineGust> = Vec::new(),
-        /// Turbulence, whose longitudinal axis is in the direction of the steady wind, or along x.
+        /// Turbulence. Its longitudinal axis follows the steady wind, or x without wind.
         pub turbulence: Option<Turbulence> = None,
     }
     together(wind) {

@@ -28,7 +28,7 @@ impl LogColumns {
     pub fn read(path: &Path) -> Result<Self, FileError> {
         let file = path.display().to_string();
         let fault = |problem: String| FileError::whole(&file, problem);
-        let unread = |error: std::io::Error| fault(format!("cannot be read ({error}); give the path of a log"));
+        let unread = |error: std::io::Error| fault(format!("the log cannot be read ({error}); give the path of a log"));
         let bytes = fs::read(path).map_err(unread)?;
         let tables = match bytes.as_slice() {
             [b'P', b'A', b'R', b'1', ..] => crate::parquet::read(bytes).map_err(fault)?,
@@ -55,7 +55,8 @@ impl LogColumns {
         let (table, _) = self.find(y)?;
         let names = || table.numbers.iter().map(|(name, _)| name.as_str());
         let time = TIMES.into_iter().find(|time| names().any(|name| name == *time));
-        let none = || FileError::whole(&self.file, format!("no column of time beside {y}; name another with --x"));
+        let none =
+            || FileError::whole(&self.file, format!("the log has no time column for {y}; name a column with --x"));
         time.map(|name| table.full(name)).ok_or_else(none)
     }
 
@@ -70,7 +71,8 @@ impl LogColumns {
             Some(xs) => xs,
             None => {
                 self.find(x)?;
-                let problem = format!("{x}: of another topic than {y}, whose times differ; name one of the same topic");
+                let problem =
+                    format!("{x}: the topic has other times than that of {y}; name a column of the same topic");
                 return Err(FileError::whole(&self.file, problem));
             }
         };

@@ -9,9 +9,12 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Vec<LogTable>, String> {
     let mut reader = csv::ReaderBuilder::new().delimiter(form.separator).from_reader(bytes);
     let bad = |error: csv::Error| match error.position() {
         Some(place) => {
-            format!("line {}: not a CSV file ({error}); give CSV with a head, Parquet, ULog or MCAP", place.line())
+            format!(
+                "line {}: this is not a CSV file ({error}); give CSV with a header, Parquet, ULog or MCAP",
+                place.line()
+            )
         }
-        None => format!("not a CSV file ({error}); give CSV with a head, Parquet, ULog or MCAP"),
+        None => format!("this is not a CSV file ({error}); give CSV with a header, Parquet, ULog or MCAP"),
     };
     let heads: Vec<String> = reader.headers().map_err(bad)?.iter().map(|head| head.trim().to_owned()).collect();
     let mut fields: Vec<Vec<String>> = vec![Vec::new(); heads.len()];
@@ -30,6 +33,9 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Vec<LogTable>, String> {
     }
     match table.numbers.first() {
         Some((_, values)) if !values.is_empty() => Ok(vec![table]),
-        _ => Err("holds no rows of numbers below a head; give CSV with a head, Parquet, ULog or MCAP".into()),
+        _ => {
+            Err("the file has no rows of numbers below its header; give CSV with a header, Parquet, ULog or MCAP"
+                .into())
+        }
     }
 }

@@ -50,7 +50,10 @@ pub(crate) fn laid_out(figure: &PaperFigure) -> Result<Drawing, String> {
     let left_pt = 1.5 * font_pt + widest.fold(0.0, f64::max) + TICK_PT + 3.0;
     let right_pt = width_pt_all - 0.9 * font_pt;
     if right_pt - left_pt < 4.0 * font_pt {
-        return Err(format!("{} mm leave no room beside the numbers; choose a larger --width", figure.width_mm));
+        return Err(format!(
+            "a width of {} mm leaves no room for the chart beside the axis numbers; choose a larger --width",
+            figure.width_mm
+        ));
     }
     let mut shapes = Vec::new();
     let mut top_pt = legend(figure, left_pt, right_pt, &mut shapes);

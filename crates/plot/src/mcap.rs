@@ -49,7 +49,10 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Vec<LogTable>, String> {
     let tables: Vec<LogTable> =
         topics.into_values().flatten().map(|(layout, topic)| topic.table(layout.topic)).collect();
     if tables.iter().all(|table| table.numbers.len() < 2) {
-        return Err(format!("has no topic in ROS 2's encoding (cdr, ros2msg); it has {}", others.join(", ")));
+        return Err(format!(
+            "the file has no topic in ROS 2's encoding (cdr, ros2msg); its topics are {}",
+            others.join(", ")
+        ));
     }
     Ok(tables)
 }
@@ -73,12 +76,15 @@ pub(crate) fn check(mut bytes: &[u8]) -> Result<(), String> {
 fn refused(error: McapError) -> String {
     match error {
         McapError::UnsupportedCompression(by) => {
-            format!("is compressed by {by}; give an uncompressed one, as `mcap compress --compression none` writes it")
+            format!(
+                "the file is compressed by {by}; give an uncompressed file, as `mcap compress --compression none` \
+                 writes it"
+            )
         }
         McapError::UnexpectedEof | McapError::UnexpectedEoc | McapError::BadFooter => {
-            "is cut: it ends within a record; copy it again, or mend it with `mcap recover`".into()
+            "the file ends within a record; copy it again, or repair it with `mcap recover`".into()
         }
-        error => format!("is damaged ({error}); copy it again, or mend it with `mcap recover`"),
+        error => format!("the file is damaged ({error}); copy it again, or repair it with `mcap recover`"),
     }
 }
 

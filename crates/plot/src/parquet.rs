@@ -17,7 +17,9 @@ struct ParsedColumn {
 /// Reads the file's only table.
 pub(crate) fn read(bytes: Vec<u8>) -> Result<Vec<LogTable>, String> {
     rows(bytes).map(|table| vec![table]).map_err(|error| {
-        format!("cannot be read as Parquet ({error}); write it uncompressed or with Snappy, without nested columns")
+        format!(
+            "the file cannot be read as Parquet ({error}); write it uncompressed or with Snappy, without nested columns"
+        )
     })
 }
 

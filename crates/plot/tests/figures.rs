@@ -224,11 +224,11 @@ fn columns_are_found_by_name_or_refused_in_one_line() {
     let error = log.points("time_s", "xm").unwrap_err().to_string();
     assert!(error.ends_with("no column xm; did you mean x_m?"), "{error}");
     for (text, expected) in [
-        ("a,b\n", "holds no rows of numbers"),
+        ("a,b\n", "has no rows of numbers"),
         ("a,b\n1,2\n3\n", "line 3: not a CSV file"),
         ("PAR1nothing", "cannot be read as Parquet"),
         ("ULog\u{1}", "not"),
-        ("", "holds no rows"),
+        ("", "has no rows"),
     ] {
         fs::write(&path, text).unwrap();
         let error = LogColumns::read(&path).unwrap_err().to_string();

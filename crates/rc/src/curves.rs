@@ -17,7 +17,7 @@ parameters! {
         /// Yaw in altitude and position mode: 0 linear, 1 cubic.
         #[parameter(MPC_YAW_EXPO, "1", 0.0..=1.0)]
         pub yaw_expo: f32 = 0.6,
-        /// Share of the way of these sticks that commands nothing.
+        /// Dead zone around the centre of these sticks, as a share of full deflection.
         #[parameter(MPC_HOLD_DZ, "1", 0.0..=1.0)]
         pub dead_zone: f32 = 0.1,
         /// Roll and pitch in acro mode: 0 linear, 1 cubic.
@@ -26,10 +26,10 @@ parameters! {
         /// Yaw in acro mode: 0 linear, 1 cubic.
         #[parameter(MC_ACRO_EXPO_Y, "1", 0.0..=1.0)]
         pub acro_yaw_expo: f32 = 0.0,
-        /// How far roll and pitch in acro mode are held back before the end of their way.
+        /// Super expo of roll and pitch in acro mode: reduces the rate below full deflection.
         #[parameter(MC_ACRO_SUPEXPO, "1", 0.0..=0.95)]
         pub acro_super_expo: f32 = 0.0,
-        /// The same of the yaw.
+        /// Super expo of yaw in acro mode.
         #[parameter(MC_ACRO_SUPEXPOY, "1", 0.0..=0.95)]
         pub acro_yaw_super_expo: f32 = 0.0,
     }

@@ -63,7 +63,7 @@ impl PilotNotice {
             PilotNotice::Lost => "radio: lost",
             PilotNotice::ThrottleUp => "radio: not armed, lower the throttle",
             PilotNotice::KillSwitchOn => "radio: not armed, kill switch is on",
-            PilotNotice::JustHeard => "radio: not armed, link has just come back",
+            PilotNotice::JustHeard => "radio: not armed, link only just restored",
         }
     }
 }

@@ -12,16 +12,16 @@ parameters! {
         /// Shortest pulse.
         #[parameter(MIN, "us", 800.0..=1500.0)]
         pub min_us: f32 = 1000.0,
-        /// Pulse at the centre; of the throttle, the centre is between the two ends.
+        /// Pulse at the centre. For the throttle, the centre is halfway between the ends.
         #[parameter(TRIM, "us", 800.0..=2200.0)]
         pub trim_us: f32 = 1500.0,
         /// Longest pulse.
         #[parameter(MAX, "us", 1500.0..=2200.0)]
         pub max_us: f32 = 2000.0,
-        /// Distance from the centre up to which it counts as centred.
+        /// Distance from the centre within which the channel counts as centred.
         #[parameter(DZ, "us", 0.0..=100.0)]
         pub dead_band_us: f32 = 10.0,
-        /// Direction: below 0 it is reversed.
+        /// Direction; the channel is reversed below 0.
         #[parameter(REV, "number", -1.0..=1.0)]
         pub direction: f32 = 1.0,
     }
@@ -35,7 +35,7 @@ parameters! {
 }
 
 parameters! {
-    /// Which channel does what, counted from 1; 0: none.
+    /// Channel for each function, counted from 1; 0 for none.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct RadioFunctions {
         /// Roll.
@@ -59,37 +59,38 @@ parameters! {
         /// Switch that stops the motors, also in flight.
         #[parameter(RC_MAP_KILL_SW, "number", 0.0..=18.0)]
         pub kill: u32 = 0,
-        /// Switch that lets it return.
+        /// Switch that selects return.
         #[parameter(RC_MAP_RETURN_SW, "number", 0.0..=18.0)]
         pub return_home: u32 = 0,
-        /// Switch that lets it hold.
+        /// Switch that selects hold.
         #[parameter(RC_MAP_LOITER_SW, "number", 0.0..=18.0)]
         pub hold: u32 = 0,
-        /// Channel by which a receiver that has no other way shows that it hears nothing; 0: the throttle.
+        /// Channel by which the receiver reports a lost link, for receivers without another way; 0 for the throttle.
         #[parameter(RC_MAP_FAILSAFE, "number", 0.0..=18.0)]
         pub failsafe: u32 = 0,
-        /// Where the arming switch is on, as a share of its way; negative: below that share.
+        /// Threshold above which the arming switch is on, as a share of its range. If negative, the switch is on below
+        /// the threshold.
         #[parameter(RC_ARMSWITCH_TH, "share", -1.0..=1.0)]
         pub arm_share: f32 = 0.75,
-        /// The same of the switch that stops the motors.
+        /// Threshold of the kill switch, as for the arming switch.
         #[parameter(RC_KILLSWITCH_TH, "share", -1.0..=1.0)]
         pub kill_share: f32 = 0.75,
-        /// The same of the switch for the return.
+        /// Threshold of the return switch, as for the arming switch.
         #[parameter(RC_RETURN_TH, "share", -1.0..=1.0)]
         pub return_share: f32 = 0.75,
-        /// The same of the switch for holding.
+        /// Threshold of the hold switch, as for the arming switch.
         #[parameter(RC_LOITER_TH, "share", -1.0..=1.0)]
         pub hold_share: f32 = 0.75,
-        /// Pulse of that channel below its shortest, or above its longest, that means that the receiver hears nothing;
-        /// 0: none does.
+        /// Pulse by which the receiver reports a lost link, outside the range of the channel `failsafe_channel`; 0 for
+        /// none.
         #[parameter(RC_FAILS_THR, "us", 0.0..=2200.0)]
         pub failsafe_us: f32 = 0.0,
     }
 }
 
 parameters! {
-    /// Modes of the six positions of the mode's switch, by PX4's numbers: 0 and 8 stabilised, 1 altitude, 2 position,
-    /// 3 mission, 4 hold, 5 return, 6 acro, 7 offboard, 10 takeoff, 11 land.
+    /// Modes of the six positions of the mode switch, by PX4's numbers: 0 and 8 stabilised, 1 altitude, 2 position, 3
+    /// mission, 4 hold, 5 return, 6 acro, 7 offboard, 10 takeoff, 11 land.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SwitchModes {
         /// First position.
@@ -110,10 +111,10 @@ parameters! {
         /// Sixth position.
         #[parameter(COM_FLTMODE6, "number", 0.0..=11.0)]
         pub sixth: u32 = 4,
-        /// True if the sticks, moved, end a mode that flies by itself.
+        /// Whether moving the sticks ends an autonomous mode.
         #[switch(COM_RC_OVERRIDE)]
         pub overrides: bool = true,
-        /// How far they must move for it, of their way from the centre.
+        /// Stick movement that ends an autonomous mode, as a share of full deflection.
         #[parameter(COM_RC_STICK_OV, "share", 0.05..=0.8)]
         pub override_share: f32 = 0.3,
     }
@@ -147,16 +148,15 @@ parameters! {
     /// The receiver.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct RadioReceiver {
-        /// Link that the receiver is on in place of MAVLink, counted from 1; 0 for the board's own for it, if it has
-        /// one;
-        /// from the next start on. The first one never has it.
+        /// Number of the link that reads the receiver in place of MAVLink, counted from 1; 0 for the board's receiver
+        /// input, if any; from the next start on. Link 1 always carries MAVLink.
         #[parameter(RC_PORT, "number", 0.0..=4.0)]
         pub port: u32 = 0,
-        /// Its protocol, from the next start on.
+        /// Protocol of the receiver, from the next start on.
         #[choice(RC_PROTOCOL)]
         pub protocol: RadioProtocol = RadioProtocol::Crsf,
-        /// Whose sticks count: 0 the receiver's, 1 a station's joystick (MANUAL_CONTROL), 4 none, 5 the receiver's, and
-        /// the joystick while the receiver is silent. The receiver's switches always count.
+        /// Source of the sticks: 0 the receiver, 1 a station's joystick (MANUAL_CONTROL), 4 none, 5 the receiver, or
+        /// the joystick while the receiver is silent. The receiver's switches always work.
         #[parameter(COM_RC_IN_MODE, "number", 0.0..=5.0)]
         pub source: u32 = 5,
     }
@@ -189,7 +189,7 @@ parameters! {
         /// The receiver.
         #[group("")]
         pub receiver: RadioReceiver = RadioReceiver::DEFAULT,
-        /// Which channel does what.
+        /// Channel for each function.
         #[group("")]
         pub functions: RadioFunctions = RadioFunctions::DEFAULT,
         /// Modes.

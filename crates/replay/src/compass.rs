@@ -36,8 +36,8 @@ pub(crate) fn doubt(recording: &mut Recording, earth: Option<&EarthField>) {
     recording.mag_slow_rad = Some(error_rad.max(unseen_rad).min(most_rad));
     if error_rad > TOLD_RAD {
         recording.notes.push(format!(
-            "The magnetometer shows {level:.2} gauss level and {down:.2} down, the earth's field there has {:.2} and \
-             {:.2}: its heading means nothing; calibrate it away from iron.",
+            "The magnetometer shows {level:.2} gauss horizontally and {down:.2} down, but the earth's field at this \
+             place has {:.2} and {:.2}. The compass heading is useless; calibrate the magnetometer away from iron.",
             earth.horizontal_gauss, earth.down_gauss,
         ));
     }

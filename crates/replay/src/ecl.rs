@@ -44,8 +44,11 @@ pub(crate) fn read(bytes: &[u8], path: &Path) -> Result<Recording, String> {
     recording.imu = rising(samples, |sample| sample.at_us).0;
     let used = recording.imu.len();
     if used == 0 {
-        let what = if imu.is_empty() { "no line of kind imu" } else { "no usable line of kind imu" };
-        return Err(format!("{what}; a line is time_us,imu, accelerometer and gyroscope: six numbers"));
+        let what =
+            if imu.is_empty() { "the log has no line of kind imu" } else { "the log has no usable line of kind imu" };
+        return Err(format!(
+            "{what}; such a line is time_us,imu and six numbers, first the accelerometer, then the gyroscope"
+        ));
     }
     let skipped = imu.len() - used;
     recording.sources.push(SampleSource { sensor: Sensor::Imu, topic: "imu".into(), used, skipped });
@@ -71,7 +74,9 @@ pub(crate) fn read(bytes: &[u8], path: &Path) -> Result<Recording, String> {
         fixes
             .iter_mut()
             .for_each(|ReceiverFix { place: [latitude, longitude, _], .. }| std::mem::swap(latitude, longitude));
-        recording.notes.push("Latitude and longitude are exchanged: only so they agree with the velocity.".into());
+        recording
+            .notes
+            .push("Latitude and longitude were swapped, since only then do they agree with the velocity.".into());
     }
     let first = aids::begin(&fixes).copied();
     if let Some(ReceiverFix { place: [latitude, longitude, altitude], .. }) = first {
@@ -166,7 +171,7 @@ fn lines(bytes: &[u8]) -> Result<LinesByKind, String> {
     }
     if good == 0 {
         let excerpt: String = String::from_utf8_lossy(bytes).chars().take(EXCERPT).collect();
-        return Err(format!("not a log: it begins with \"{}\"; {WANTED}", excerpt.escape_debug()));
+        return Err(format!("the file is not a log: it begins with \"{}\"; {WANTED}", excerpt.escape_debug()));
     }
     Ok(read)
 }

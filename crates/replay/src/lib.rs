@@ -35,7 +35,8 @@ use std::path::Path;
 pub fn read(path: &Path) -> Result<Recording, FileError> {
     let shown = path.display().to_string();
     let failed = |problem: String| FileError::whole(&shown, problem);
-    let bytes = bytes(path).map_err(|error| failed(format!("cannot be read ({error}); give the path of a log")))?;
+    let bytes =
+        bytes(path).map_err(|error| failed(format!("the log cannot be read ({error}); give the path of a log")))?;
     if exact::is_exact(&bytes) {
         return Err(failed("this is an exact log; replay it with --exact".into()));
     }

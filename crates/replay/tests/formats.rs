@@ -171,7 +171,7 @@ fn what_would_take_for_ever_does_not() {
         let bytes = declared(&formats, times);
         let is_told = match converted(&format!("{name}.ulg"), &bytes) {
             Ok((found, _)) => found.damaged > 0,
-            Err(error) => error.contains("no message can be read: what is in it is damaged"),
+            Err(error) => error.contains("no message can be read: all messages are damaged"),
         };
         assert!(is_told, "{name}");
         read(&file(&format!("{name}.ulg"), &bytes)).map(|_| ()).unwrap_err();

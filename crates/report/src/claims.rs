@@ -62,7 +62,7 @@ fn weigh(afbc: &FlightResult, baseline: &FlightResult) -> [(&'static str, bool, 
         (
             "AFBC's errors go to zero under gusts and uncertainty, backstepping keeps an error",
             below(&left, &(kept * VANISHED)),
-            format!("mean |error| of the last 5 s {} against {}", outputs(&left), outputs(&kept)),
+            format!("mean |error| over the last 5 s: {} against {}", outputs(&left), outputs(&kept)),
         ),
         (
             "AFBC tracks better than backstepping",

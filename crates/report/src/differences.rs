@@ -41,9 +41,9 @@ pub(crate) fn test(test: &SignedRank, p_holm: f64) -> [String; 2] {
 pub(crate) const TEST: [&str; 2] = ["p", "effect"];
 
 /// Explanation of the columns of `test`.
-pub(crate) const TEST_LEGEND: &str = "p: Wilcoxon's signed rank test, two-sided, exact up to 100 pairs, by Holm's \
-                                      correction for as many laws. effect: matched-pairs rank-biserial correlation, \
-                                      +1 where the law is always the further one, -1 where it is always the nearer.";
+pub(crate) const TEST_LEGEND: &str = "p: Wilcoxon's signed rank test, two-sided, exact up to 100 pairs, with Holm's \
+     correction for the number of laws. effect: matched-pairs rank-biserial correlation, +1 if the law is always \
+     farther from the reference, -1 if the law is always nearer.";
 
 /// Returns a table of the distances, and of their differences to the reference contender's; `None` for a single seed.
 pub(crate) fn grid(comparison: &Comparison) -> Option<Grid> {
@@ -77,8 +77,8 @@ pub(crate) fn grid(comparison: &Comparison) -> Option<Grid> {
     let caption =
         format!("{}: root mean square distance from the reference over {seeds} seeds", comparison.scenario.name);
     let note = format!(
-        "Medians, and in brackets intervals of at least 95 %: order statistics, from six seeds on; a vehicle that was \
-         lost is infinitely far. less {baseline}'s: median of the differences over the same seeds. {TEST_LEGEND}"
+        "Medians, with intervals of at least 95 % in brackets (order statistics, from six seeds on). A lost vehicle \
+         counts as infinitely far. less {baseline}'s: median of the differences over the same seeds. {TEST_LEGEND}"
     );
     Some(Grid { caption, heads, rows, note })
 }

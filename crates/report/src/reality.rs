@@ -64,7 +64,7 @@ fn sensors(scenario: &Scenario) -> Vec<(&'static str, String)> {
     add(bias != Deviations::default(), "sensor bias", spread(bias));
     add(delay_s != 0.0, "sensor delay", format!("{delay_s} s"));
     add(period_s != 0.0, "states", format!("every {period_s} s"));
-    add(gyro, "rates", "of a gyro, in every step and without delay".into());
+    add(gyro, "rates", "as from a gyroscope, in every step and without delay".into());
     let until = |end_s: f64| if end_s.is_finite() { format!("to {end_s:.4} s") } else { "to the end".into() };
     for fault in &scenario.sensor_faults {
         let what = crate::words::sensor_fault(fault);

@@ -105,7 +105,7 @@ pub(super) fn page(groups: &[ScenarioGroup], figures: &[Vec<Picture>], claims: &
     };
     let body = html! {
         p.quiet {
-            "Flown in software: the control crate against a model of the vehicle, in lockstep."
+            "Simulated: the control software flies a model of the vehicle in lockstep."
         }
         @if groups.is_empty() { p { "Nothing was flown." } }
         @if !claims.is_empty() { (verdicts(claims)) }
@@ -313,11 +313,11 @@ fn gains(contender: &Contender) -> Markup {
         settings += &format!(", command filter {command_filter_rad_s} rad/s");
         let also = [
             (tilt_by_thrust, "tilt by thrust"),
-            (freeze_on_ground, "frozen on the ground"),
+            (freeze_on_ground, "adaptation frozen on the ground"),
             (bumpless, "bumpless"),
             (anti_windup, "anti-windup"),
             (feed_forward, "feed-forward"),
-            (by_rotation, "errors of the attitude by rotation"),
+            (by_rotation, "attitude errors by rotation"),
             (contender.monitored, "monitored"),
         ];
         settings.extend(also.into_iter().filter(|(on, _)| *on).map(|(_, word)| format!(", {word}")));

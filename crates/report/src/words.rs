@@ -151,10 +151,10 @@ pub(super) fn wind_gust(gust: &CosineGust) -> String {
 /// is the name with spaces.
 pub(super) fn drawn(name: &str) -> String {
     let words = match name {
-        "mass_ratio" => "true over nominal mass",
-        "inertia_ratio" => "true over nominal inertia",
-        "thrust_factor_ratio" => "true over nominal thrust factor",
-        "drag_factor_ratio" => "true over nominal rotor drag factor",
+        "mass_ratio" => "true mass divided by nominal",
+        "inertia_ratio" => "true inertia divided by nominal",
+        "thrust_factor_ratio" => "true thrust factor divided by nominal",
+        "drag_factor_ratio" => "true rotor drag factor divided by nominal",
         "rotor_time_constant_s" => "time constant of the rotors [s]",
         "rotor_delay_s" => "delay from command to rotors [s]",
         "rotor_efficiency" => "remaining share of a failing rotor's thrust",
@@ -162,12 +162,12 @@ pub(super) fn drawn(name: &str) -> String {
         "fault_start_s" => "time of the rotor failure [s]",
         "payload_kg" => "mass of the payload [kg]",
         "payload_below_m" => "payload below the centre of mass [m]",
-        "payload_start_s" => "time of taking up the payload [s]",
+        "payload_start_s" => "time at which the payload is picked up [s]",
         "wind_m_s" => "steady wind [m/s]",
-        "wind_direction_rad" => "direction the wind blows to, from +x to +y [rad]",
+        "wind_direction_rad" => "direction in which the wind blows, from +x toward +y [rad]",
         "wind_20ft_m_s" => "turbulence: wind at 20 ft [m/s]",
-        "noise_ratio" => "measurement noise over the scenario's",
-        "bias_ratio" => "measurement bias over the scenario's",
+        "noise_ratio" => "measurement noise divided by the scenario's",
+        "bias_ratio" => "measurement bias divided by the scenario's",
         "sensor_delay_s" => "delay from motion to measurement [s]",
         "dropout_rate_hz" => "rate of measurement dropouts [Hz]",
         "dropout_mean_s" => "mean length of a dropout [s]",
@@ -175,7 +175,7 @@ pub(super) fn drawn(name: &str) -> String {
         "start_y_m" => "offset of the start along y [m]",
         "start_z_m" => "offset of the start along z [m]",
         "imu_part" => "kind of inertial sensor",
-        "vibration_ratio" => "vibration over the scenario's",
+        "vibration_ratio" => "vibration divided by the scenario's",
         "barometer_part" => "kind of barometer",
         "magnetometer_part" => "kind of magnetometer",
         "tracker_delay_s" => "delay of the tracker [s]",
@@ -230,8 +230,8 @@ pub(super) fn estimate(estimate: &EstimateMetrics) -> String {
     let (position_m, velocity_m_s, attitude_deg) =
         (position_m.norm(), velocity_m_s.norm(), attitude_rad.norm().to_degrees());
     format!(
-        "its estimate is off by {position_m:.4} m, {velocity_m_s:.3} m/s and {attitude_deg:.2} degrees (root mean \
-         squares), NEES {nees:.1} of 9"
+        "the vehicle's estimate is off by {position_m:.4} m, {velocity_m_s:.3} m/s and {attitude_deg:.2} degrees (root \
+         mean square), NEES {nees:.1} (9 expected)"
     )
 }
 

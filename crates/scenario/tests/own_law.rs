@@ -64,7 +64,7 @@ fn what_cannot_be_registered_is_refused() {
     let law = |name| OwnLaw::new(name, |_: &OwnVehicle| Counting { inputs: HOVER, steps: 0.0 });
     let gain = |name, value| OwnGain::new(name, "1", value, [0.1, 10.0]);
     for (law, problem) in [
-        (law(""), "a name has 1 to 32 characters"),
+        (law(""), "the name must have 1 to 32 characters"),
         (law("Mine"), "a to z"),
         (law("afbc"), "a built-in law has this name"),
         (law("afbc-as-printed"), "a built-in law has this name"),

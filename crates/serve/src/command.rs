@@ -106,34 +106,47 @@ pub enum WorldChange {
 
 /// Name, arguments and meaning of each command.
 pub const COMMANDS: [[&str; 3]; 20] = [
-    ["wind", "X Y Z", "steady wind [m/s], towards north, west, up"],
-    ["turbulence", "none|light|moderate|severe", "turbulence of the wind"],
-    ["gust", "X Y Z [RISE [HOLD]]", "a gust with this peak [m/s], rising for 1 s, there for 2 s"],
-    ["push", "X Y Z [SECONDS]", "a force on the vehicle [N]"],
-    ["payload", "KG [BELOW]", "what it carries now; 0 drops it; metres below its centre of mass"],
-    ["change", "QUANTITY FACTOR [SECONDS]", "mass, inertia, thrust-factor, drag-factor, roll-moment, ..."],
+    ["wind", "X Y Z", "steady wind towards north, west, up [m/s]"],
+    ["turbulence", "none|light|moderate|severe", "strength of the turbulence"],
+    [
+        "gust",
+        "X Y Z [RISE [HOLD]]",
+        "gust with this peak [m/s], towards north, west, up; rises for RISE (1 s), stays for HOLD (2 s)",
+    ],
+    ["push", "X Y Z [SECONDS]", "force on the vehicle towards north, west, up [N]"],
+    ["payload", "KG [BELOW]", "mass of the payload, BELOW metres below the centre of mass; 0 drops it"],
+    [
+        "change",
+        "QUANTITY FACTOR [SECONDS]",
+        "multiplies a quantity: mass, inertia, thrust-factor, drag-factor, roll-moment, ...",
+    ],
     [
         "fault",
         "INSTRUMENT FAILURE [NUMBERS] [SECONDS]",
-        "gnss lost, imu dead, tracker frozen 3, gnss jumped 5 0 0, ...",
+        "failure of an instrument: gnss lost, imu dead, tracker frozen 3, gnss jumped 5 0 0, ...",
     ],
-    ["rotor", "NUMBER SHARE", "share of the thrust that a rotor has left; 1 repairs it"],
+    ["rotor", "NUMBER SHARE", "remaining share of a rotor's thrust; 1 repairs the rotor"],
     ["battery", "SHARE", "charge of the battery, 0 to 1"],
     [
         "hold",
         "SIDE [DEG_S]|none",
-        "by hand, this side down: down, up, left, right, front, back; turned so fast about the vertical",
+        "holds the vehicle by hand with this side down: down, up, left, right, front, back; turns it about the \
+         vertical",
     ],
-    ["law", "NAME", "another law from now on, also in flight: afbc (the firmware's), backstepping, pid, ..."],
-    ["clear", "", "no faults; weather and load as the scenario has them"],
-    ["status", "", "where each vehicle is and what it suffers"],
-    ["speed", "FACTOR", "times real time; 0: as fast as possible"],
+    ["law", "NAME", "changes the control law, also in flight: afbc (the firmware's), backstepping, pid, ..."],
+    ["clear", "", "ends all faults, and restores the scenario's weather and load"],
+    ["status", "", "prints each vehicle's position and its faults"],
+    ["speed", "FACTOR", "speed of time relative to real time; 0: as fast as possible"],
     ["pause", "", "time stands still"],
     ["resume", "", "and goes on"],
-    ["step", "MILLISECONDS", "go on by so much, if started with --lockstep"],
+    ["step", "MILLISECONDS", "lets this much time pass, if started with --lockstep"],
     ["help", "", "this"],
     ["quit", "", "end"],
-    ["at", "SECONDS COMMAND", "a command later, by the vehicles' clock; `vehicle N COMMAND`: for one of them"],
+    [
+        "at",
+        "SECONDS COMMAND",
+        "runs a command at this time of the vehicles' clock; `vehicle N COMMAND` is for one vehicle",
+    ],
 ];
 
 /// Accepted range of times \[s\].
@@ -272,16 +285,16 @@ fn grip(words: &mut CommandWords<'_>) -> Result<Grip, String> {
 
 /// Parses how an instrument fails, such as `gnss jumped 5 0 0`.
 fn fault(words: &mut CommandWords<'_>) -> Result<FailureKind, String> {
-    let instrument = words.word("an instrument, as in: fault gnss lost")?;
+    let instrument = words.word("name an instrument, as in: fault gnss lost")?;
     let of = |failure: &&FailureKind| failure.name().split_once('-').is_some_and(|(of, _)| of == instrument);
     let known: Vec<FailureKind> = FailureKind::ALL.iter().filter(of).copied().collect();
     if known.is_empty() {
-        let wanted = "it must be imu, tracker, gnss, barometer or magnetometer";
+        let wanted = "write imu, tracker, gnss, barometer or magnetometer";
         return Err(format!("fault: {} is no instrument; {wanted}", shown(instrument)));
     }
     let kind = |failure: FailureKind| failure.name().split_once('-').map_or("", |(_, kind)| kind);
     let kinds = known.iter().map(|failure| kind(*failure)).collect::<Vec<_>>().join(", ");
-    let how = words.word(&format!("what is wrong with the {instrument}: {kinds}"))?;
+    let how = words.word(&format!("name the failure of the {instrument}: {kinds}"))?;
     let Some(failure) = known.iter().find(|failure| kind(**failure) == how) else {
         return Err(format!("fault {instrument}: {} is none of {kinds}", shown(how)));
     };
@@ -341,7 +354,7 @@ impl<'a> CommandWords<'a> {
     fn vector(&mut self, range: &Range) -> Result<Vector3<f64>, String> {
         let mut next = || match self.optional(range)? {
             Some(number) => Ok(number),
-            None => Err(format!("{}: it needs three numbers", self.usage())),
+            None => Err(format!("{}: three numbers are needed", self.usage())),
         };
         Ok(Vector3::new(next()?, next()?, next()?))
     }

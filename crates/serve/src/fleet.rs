@@ -22,8 +22,8 @@ pub fn fleet(scenario: &Scenario, vehicles: u8) -> Result<Vec<Scenario>, FileErr
     let refused = |problem: String| FileError::whole(&scenario.name, problem);
     afbc_hil::check(scenario).map_err(|error| refused(error.to_string()))?;
     if scenario.instruments.imu.is_none() {
-        let cure = "add [instruments] with an imu, or take the scenarios outdoor or mocap";
-        return Err(refused(format!("the vehicle has no sensors to fly on; {cure}")));
+        let cure = "add [instruments] with an imu, or choose the scenario outdoor or mocap";
+        return Err(refused(format!("the vehicle has no sensors to fly with; {cure}")));
     }
     let standing = standing(scenario)?;
     let all = (0..vehicles.min(VEHICLES_MAX)).map(|number| {

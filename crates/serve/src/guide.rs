@@ -17,7 +17,7 @@ pub fn guide(addresses: &Addresses, open: &[(SocketAddr, Option<SocketAddr>)], s
     }
     if let Some(station) = addresses.stations.first() {
         let port = station.port();
-        add("QGroundControl", format!("connects by itself (UDP port {port})"));
+        add("QGroundControl", format!("connects automatically (UDP port {port})"));
         add("MAVProxy", format!("mavproxy.py --master=udpin:0.0.0.0:{port}"));
         add("pymavlink", format!("mavutil.mavlink_connection(\"udpin:0.0.0.0:{port}\")"));
     }
@@ -28,7 +28,7 @@ pub fn guide(addresses: &Addresses, open: &[(SocketAddr, Option<SocketAddr>)], s
         }
     }
     if count > 1 {
-        text += "Each further vehicle: MAVSDK's port and its own UDP port 1 higher, its TCP port 10 higher.\n";
+        text += "For each further vehicle, MAVSDK's port and the UDP port are 1 higher, the TCP port is 10 higher.\n";
     }
     text += "Lines typed here change weather and faults: wind 5 0 0, fault gnss lost, status, help, quit.\n";
     text

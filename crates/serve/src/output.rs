@@ -31,7 +31,7 @@ impl LineOutput {
     pub fn line(&mut self, line: &str) {
         let lost = match self.lost {
             0 => String::new(),
-            lost => format!("lost {lost} lines that nobody has read\n"),
+            lost => format!("lost {lost} lines, since nobody read the output\n"),
         };
         self.lost = if self.out.offer(format!("{lost}{line}\n").as_bytes()) { 0 } else { self.lost + 1 };
     }

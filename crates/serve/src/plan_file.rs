@@ -84,55 +84,55 @@ impl<'a> PlanSection<'a> {
 
     /// Checks the part's version, and that it has no unknown names.
     fn known(&self, version: Option<u64>, names: &[&str]) -> Result<(), FileError> {
-        let object = self.value.as_object().ok_or_else(|| self.wrong("it must be an object"))?;
+        let object = self.value.as_object().ok_or_else(|| self.wrong("an object is needed here"))?;
         if let Some(known) = version {
             let found = self.get("version")?;
             if found.value.as_u64() != Some(known) {
-                let cure = "save the plan again in a QGroundControl of today";
-                return Err(found.wrong(&format!("{} is not known, {known} is; {cure}", found.value)));
+                let cure = "save the plan again in a current QGroundControl";
+                return Err(found.wrong(&format!("version {} is unknown, only {known} is known; {cure}", found.value)));
             }
         }
         match object.keys().find(|name| !names.contains(&name.as_str())) {
-            Some(name) => Err(self.wrong(&format!("{name} is not known, and is not flown; remove it"))),
+            Some(name) => Err(self.wrong(&format!("{name} is unknown and cannot be flown; remove it"))),
             None => Ok(()),
         }
     }
 
     fn list(&self) -> Result<Vec<PlanSection<'a>>, FileError> {
-        let list = self.value.as_array().ok_or_else(|| self.wrong("it must be a list"))?;
+        let list = self.value.as_array().ok_or_else(|| self.wrong("a list is needed here"))?;
         let part = |(number, value)| PlanSection { file: self.file, place: format!("{} {number}", self.place), value };
         Ok(list.iter().enumerate().map(part).collect())
     }
 
     fn number(&self) -> Result<f64, FileError> {
-        self.value.as_f64().ok_or_else(|| self.wrong("it must be a number"))
+        self.value.as_f64().ok_or_else(|| self.wrong("a number is needed here"))
     }
 
     fn whole(&self, most: u16) -> Result<u16, FileError> {
         let whole = self.value.as_u64().and_then(|number| u16::try_from(number).ok()).filter(|number| *number <= most);
-        whole.ok_or_else(|| self.wrong(&format!("it must be a whole number up to {most}")))
+        whole.ok_or_else(|| self.wrong(&format!("a whole number up to {most} is needed here")))
     }
 
     fn truth(&self) -> Result<bool, FileError> {
-        self.value.as_bool().ok_or_else(|| self.wrong("it must be true or false"))
+        self.value.as_bool().ok_or_else(|| self.wrong("true or false is needed here"))
     }
 
     /// Returns latitude and longitude \[deg\], and the altitude if there is one.
     fn coordinates(&self) -> Result<([f64; 2], Option<f64>), FileError> {
         let list = self.list()?;
         let [latitude, longitude, rest @ ..] = list.as_slice() else {
-            return Err(self.wrong("it must be a list of latitude and longitude"));
+            return Err(self.wrong("a list of latitude and longitude is needed here"));
         };
         let place = [latitude.number()?, longitude.number()?];
         let [latitude, longitude] = place;
         if latitude.abs() > 90.0 || longitude.abs() > 180.0 {
-            return Err(self.wrong("there is no such place; latitude and longitude are in degrees"));
+            return Err(self.wrong("latitude or longitude is out of range; write both in degrees"));
         }
         let altitude = match rest {
             [] => None,
             [altitude] if altitude.value.is_null() => None,
             [altitude] => Some(altitude.number()?),
-            _ => return Err(self.wrong("it must be a list of latitude, longitude and altitude")),
+            _ => return Err(self.wrong("a list of latitude, longitude and altitude is needed here")),
         };
         Ok((place, altitude))
     }
@@ -141,7 +141,7 @@ impl<'a> PlanSection<'a> {
     fn flat(&self) -> Result<[f64; 2], FileError> {
         match self.coordinates()? {
             (place, None) => Ok(place),
-            _ => Err(self.wrong("an altitude is not flown; remove it")),
+            _ => Err(self.wrong("an altitude has no effect here; remove it")),
         }
     }
 }
@@ -157,10 +157,10 @@ impl QgcPlan {
             return Ok(QgcPlan { mission, home, ..QgcPlan::default() });
         }
         let value: Value = serde_json::from_str(text)
-            .map_err(|error| FileError::whole(file, format!("no JSON: {error}; save the plan again")))?;
+            .map_err(|error| FileError::whole(file, format!("the file is not JSON: {error}; save the plan again")))?;
         let whole = PlanSection { file, place: "plan".into(), value: &value };
         if value.get("fileType").and_then(Value::as_str) != Some("Plan") {
-            return Err(FileError::whole(file, "no plan of QGroundControl: its fileType is not Plan"));
+            return Err(FileError::whole(file, "the file is no plan of QGroundControl: its fileType is not Plan"));
         }
         whole.known(Some(1), PLAN)?;
         let part = |key: &str| whole.at(key).map(|part| PlanSection { place: key.into(), ..part });
@@ -184,9 +184,11 @@ fn read_mission(mission: &PlanSection<'_>) -> Result<Vec<MissionItem>, FileError
             Some("SimpleItem") => simple.push(item),
             Some("ComplexItem") => match item.at("TransectStyleComplexItem").and_then(|style| style.at("Items")) {
                 Some(worked_out) => simple.extend(worked_out.list()?),
-                None => return Err(item.wrong("complex items without a list of Items cannot be flown; remove it")),
+                None => {
+                    return Err(item.wrong("a complex item without a list of Items cannot be flown; remove the item"));
+                }
             },
-            _ => return Err(item.wrong("its type must be SimpleItem or ComplexItem")),
+            _ => return Err(item.wrong("the item's type must be SimpleItem or ComplexItem")),
         }
     }
     let names: Vec<_> = simple.iter().map(|item| item.value.get("doJumpId").and_then(Value::as_u64)).collect();
@@ -205,15 +207,16 @@ fn simple_item(item: &PlanSection<'_>, number: u16, names: &[Option<u64>]) -> Re
     let number_of = |part: &PlanSection<'_>| if part.value.is_null() { Ok(f64::NAN) } else { part.number() };
     let numbers = numbers.iter().map(number_of).collect::<Result<Vec<_>, _>>()?;
     let [first, second, third, fourth, x, y, z] = numbers.as_slice() else {
-        return Err(params.wrong("it must have seven numbers; save the plan again in QGroundControl"));
+        return Err(params.wrong("an item must have seven numbers; save the plan again in QGroundControl"));
     };
     let mut parameters = [*first, *second, *third, *fourth].map(|number| number as f32);
     if command == JUMP {
         let mut places = (0..names.len()).filter(|place| names.get(*place) == Some(&Some(*first as u64)));
         let place = places.next().filter(|_| first.fract() == 0.0);
-        let place = place.ok_or_else(|| item.wrong("no item has the doJumpId that it jumps to; correct it"))?;
+        let place =
+            place.ok_or_else(|| item.wrong("the jump's target doJumpId belongs to no item; correct the target"))?;
         if places.next().is_some() {
-            return Err(item.wrong("several items have the doJumpId that it jumps to; correct it"));
+            return Err(item.wrong("the jump's target doJumpId belongs to several items; correct the target"));
         }
         let [target, ..] = &mut parameters;
         *target = place as f32;
@@ -239,7 +242,7 @@ fn simple_item(item: &PlanSection<'_>, number: u16, names: &[Option<u64>]) -> Re
 
 fn read_fence(fence: &PlanSection<'_>) -> Result<Vec<MissionItem>, FileError> {
     if let Some(point) = fence.at("breachReturn") {
-        return Err(point.wrong("return points are not supported; remove it, the vehicle returns home"));
+        return Err(point.wrong("return points are not supported; remove this one, since the vehicle returns home"));
     }
     fence.known(Some(2), FENCE)?;
     let mut items = Vec::new();

@@ -146,7 +146,7 @@ impl PlanStation<'_> {
                 return Ok(());
             }
         }
-        Err(format!("the vehicle does not get ready: {}", texts.join(", ")))
+        Err(format!("the vehicle did not become ready to arm: {}", texts.join(", ")))
     }
 
     fn upload(&mut self, items: &[MissionItem], plan: MissionType, part: &str) -> Result<(), String> {
@@ -160,7 +160,7 @@ impl PlanStation<'_> {
                 Some(UploadEnd::Refused(_, result)) => {
                     self.wait(TEXT_MS);
                     let why = self.take_texts().pop().unwrap_or_else(|| format!("result {}", result.0));
-                    return Err(format!("{part}: the vehicle refuses it: {why}; change it in QGroundControl"));
+                    return Err(format!("{part}: the vehicle refuses this part: {why}; change it in QGroundControl"));
                 }
                 Some(UploadEnd::Silent(_)) => return Err(format!("{part}: the vehicle does not answer")),
             }

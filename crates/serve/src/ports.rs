@@ -139,7 +139,10 @@ fn counted(first: u16, place: usize, step: u16) -> Result<u16, String> {
     match port {
         _ if first == 0 => Ok(0),
         Some(port) => Ok(port),
-        None => Err(format!("ports from {first} on are not enough for {} vehicles; begin lower", place + 1)),
+        None => Err(format!(
+            "the ports from {first} on do not suffice for {} vehicles; choose a lower first port",
+            place + 1
+        )),
     }
 }
 
@@ -147,13 +150,13 @@ fn counted(first: u16, place: usize, step: u16) -> Result<u16, String> {
 fn taken(protocol: &str, address: IpAddr, port: u16, option: &str, error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::AddrInUse => format!(
-            "{protocol} port {port} of {address} is taken, perhaps by another sitl serve; end that, or choose another \
-             by {option}, as in {option} {}, or {option} 0 for any free one",
+            "{protocol} port {port} of {address} is taken, perhaps by another sitl serve; end that program, or choose \
+             another port by {option}, as in {option} {}, or {option} 0 for any free port",
             port.saturating_add(100)
         ),
         io::ErrorKind::AddrNotAvailable => {
-            format!("{address} is no address of this machine; take one that `ip address` lists, or --bind 0.0.0.0")
+            format!("{address} is no address of this machine; choose one that `ip address` lists, or --bind 0.0.0.0")
         }
-        _ => format!("{protocol} port {port} of {address} cannot be opened ({error}); choose another by {option}"),
+        _ => format!("{protocol} port {port} of {address} cannot be opened ({error}); choose another port by {option}"),
     }
 }

@@ -144,11 +144,11 @@ pub fn run(
                     }
                 }
                 (ServerAction::Step(_), TimeRate::Times(_)) => {
-                    reply.lines = vec!["error step: time goes on by itself; start with --lockstep".into()];
+                    reply.lines = vec!["error step: time already runs by itself; start with --lockstep".into()];
                 }
                 (ServerAction::Speed(_) | ServerAction::Pause(_), TimeRate::Lockstep) => {
                     let command = line.split_whitespace().next().unwrap_or_default();
-                    let problem = "time goes on by step alone; start without --lockstep";
+                    let problem = "only step moves time; start without --lockstep";
                     reply.lines = vec![format!("error {command}: {problem}")];
                 }
                 (action, _) => time.change(action, began.elapsed()),
@@ -174,7 +174,9 @@ pub fn run(
             Wait::Lost(lost) => {
                 if reported.is_none_or(|at| now.saturating_sub(at) > REPORTED_EVERY) {
                     let (now_s, lost_s) = (server.now_s(), lost.as_secs_f64());
-                    log(&format!("{now_s:.3} behind: this machine was too slow or suspended; {lost_s:.1} s are lost"));
+                    log(&format!(
+                        "{now_s:.3} behind real time: this machine was too slow or suspended; {lost_s:.1} s are lost"
+                    ));
                     reported = Some(now);
                 }
             }

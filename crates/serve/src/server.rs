@@ -139,7 +139,7 @@ impl Server {
             changed |= vehicle.system() != system;
         }
         if changed && let Some(system) = self.ambiguous() {
-            log(&format!("{now_s:.3} several vehicles have the system id {system}: set MAV_SYS_ID of one of them"));
+            log(&format!("{now_s:.3} several vehicles have the system id {system}: change MAV_SYS_ID of all but one"));
         }
         self.now_ms += 1;
         action
@@ -188,13 +188,13 @@ impl Server {
                 Some(format!("there is no vehicle {system}; they are {}", listed(&self.systems())))
             }
             ScheduledLine { at_s: Some(_), command: ServerCommand::Step(_), .. } => {
-                Some("step cannot be put off".into())
+                Some("step cannot be scheduled for later".into())
             }
             ScheduledLine { at_s: Some(_), .. } if self.agenda.len() >= AGENDA_MAX => {
-                Some(format!("{AGENDA_MAX} lines wait for their time already; send this one later"))
+                Some(format!("{AGENDA_MAX} scheduled lines are waiting already; send this line later"))
             }
             ScheduledLine { at_s: Some(at_s), .. } if *at_s < self.now_s() => {
-                Some(format!("{at_s} s are over; it is {:.3} s", self.now_s()))
+                Some(format!("{at_s} s has passed; the time is now {:.3} s", self.now_s()))
             }
             _ => None,
         }

@@ -268,7 +268,7 @@ impl ServedVehicle {
     pub fn apply(&mut self, change: &WorldChange) -> Result<(), String> {
         if let WorldChange::Hold(grip) = change {
             if self.mode.armed() {
-                return Err("hold: an armed vehicle is not touched".into());
+                return Err("hold: refused, the vehicle is armed; disarm it first".into());
             }
             let plant = self.world.plant();
             let now_s = plant.time_s();
@@ -284,7 +284,7 @@ impl ServedVehicle {
     /// Fails with one line that says why the law cannot be used.
     pub fn change_law(&mut self, kind: ControllerKind) -> Result<(), String> {
         if self.exact_log.is_some() {
-            return Err("law: an exact log is of one law; serve without --exact-log".into());
+            return Err("law: an exact log can only contain one law; serve without --exact-log".into());
         }
         let law = match (kind, &self.scenario.vehicle_file) {
             (ControllerKind::Afbc, _) => None,

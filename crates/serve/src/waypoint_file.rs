@@ -56,7 +56,8 @@ pub(crate) fn read(file: &str, text: &str) -> Result<(Vec<MissionItem>, Option<P
         if item.command == JUMP {
             // The target must be a line of the mission; the home line is not part of it.
             if !(skipped as f32..count as f32).contains(target) || target.fract() != 0.0 {
-                let problem = format!("item {}: it jumps to {target}, which is no item; correct it", item.number);
+                let problem =
+                    format!("item {}: the jump's target {target} does not exist; correct the target", item.number);
                 return Err(FileError::whole(file, problem));
             }
             *target -= skipped as f32;
@@ -73,10 +74,10 @@ fn item(line: &str, number: usize) -> Result<(MissionItem, [f64; 2]), String> {
     let columns: Vec<&str> = line.split_whitespace().collect();
     let Ok::<[&str; 12], _>([index, _, frame, command, a, b, c, d, x, y, z, goes_on]) = columns.as_slice().try_into()
     else {
-        return Err(format!("{} columns instead of 12; write the line again", columns.len()));
+        return Err(format!("the line has {} columns instead of 12; write the line again", columns.len()));
     };
     if index.parse() != Ok(number) {
-        return Err(format!("its number is {index:?}, not {number}; number the lines from 0 on"));
+        return Err(format!("the line's number is {index:?} instead of {number}; number the lines from 0 on"));
     }
     let frame: u8 = whole("frame", frame)?;
     let command: u16 = whole("command", command)?;
@@ -85,7 +86,7 @@ fn item(line: &str, number: usize) -> Result<(MissionItem, [f64; 2]), String> {
     let place = [finite("latitude", x)?, finite("longitude", y)?];
     let [latitude, longitude] = place;
     if !is_local && frame != MISSION && (latitude.abs() > 90.0 || longitude.abs() > 180.0) {
-        return Err(format!("there is no place {latitude} {longitude}; latitude and longitude are in degrees"));
+        return Err(format!("latitude {latitude} or longitude {longitude} is out of range; write both in degrees"));
     }
     let units = if is_local { 1e4 } else { 1e7 };
     // The conversion saturates, so values out of range stay out of range.

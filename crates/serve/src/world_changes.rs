@@ -170,7 +170,7 @@ fn load(
 
 /// Refuses more changes of one kind than may act at the same time.
 fn bounded(count: usize) -> Result<(), String> {
-    let most = format!("{ACTIVE_MAX} of its kind act already; clear ends them");
+    let most = format!("{ACTIVE_MAX} changes of this kind act already; `clear` ends them");
     if count <= ACTIVE_MAX { Ok(()) } else { Err(most) }
 }
 

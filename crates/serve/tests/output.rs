@@ -74,7 +74,7 @@ fn a_flight_waits_for_no_reader() {
         );
     }
     let refused = server.line("at 2.5 quit").lines.concat();
-    assert!(refused.contains("1000 lines wait for their time already"), "{refused}");
+    assert!(refused.contains("1000 scheduled lines are waiting already"), "{refused}");
     let (reader, begin) = Reader::new();
     let mut output = LineOutput::to(reader.clone()).unwrap();
     let text: String = (0..2000).map(|_| "status\nhelp\n").chain(["quit\n"]).collect();

@@ -94,26 +94,29 @@ fn what_is_wrong_is_named() {
         read(&plan).unwrap_err()
     };
     let cases: &[(&dyn Fn(&mut Value), &str)] = &[
-        (&|plan| plan["fileType"] = json!("Mission"), "my.plan: no plan of QGroundControl: its fileType is not Plan"),
+        (
+            &|plan| plan["fileType"] = json!("Mission"),
+            "my.plan: the file is no plan of QGroundControl: its fileType is not Plan",
+        ),
         (
             &|plan| plan["mission"]["items"][2]["command"] = json!("fly"),
-            "my.plan: mission item 2.command: it must be a whole number up to 65535",
+            "my.plan: mission item 2.command: a whole number up to 65535 is needed here",
         ),
         (
             &|plan| plan["mission"]["items"][2]["params"] = json!([1, 2]),
-            "my.plan: mission item 2.params: it must have seven numbers; save the plan again in QGroundControl",
+            "my.plan: mission item 2.params: an item must have seven numbers; save the plan again in QGroundControl",
         ),
         (
             &|plan| plan["mission"]["items"][5]["params"][0] = json!(77),
-            "my.plan: mission item 5: no item has the doJumpId that it jumps to; correct it",
+            "my.plan: mission item 5: the jump's target doJumpId belongs to no item; correct the target",
         ),
         (
             &|plan| plan["mission"]["items"][6] = json!({ "type": "ComplexItem", "complexItemType": "StructureScan" }),
-            "my.plan: mission item 6: complex items without a list of Items cannot be flown; remove it",
+            "my.plan: mission item 6: a complex item without a list of Items cannot be flown; remove the item",
         ),
         (
             &|plan| plan["mission"]["items"][0]["type"] = json!(null),
-            "my.plan: mission item 0: its type must be SimpleItem or ComplexItem",
+            "my.plan: mission item 0: the item's type must be SimpleItem or ComplexItem",
         ),
         (
             &|plan| plan["geoFence"]["circles"][0]["circle"] = json!({ "center": [0, 0] }),
@@ -121,31 +124,32 @@ fn what_is_wrong_is_named() {
         ),
         (
             &|plan| plan["geoFence"]["polygons"][0]["polygon"][1] = json!([91, 0]),
-            "my.plan: geoFence polygon 0.polygon 1: there is no such place; latitude and longitude are in degrees",
+            "my.plan: geoFence polygon 0.polygon 1: latitude or longitude is out of range; write both in degrees",
         ),
         (
             &|plan| plan["geoFence"]["breachReturn"] = json!([1, 2, 3]),
-            "my.plan: geoFence.breachReturn: return points are not supported; remove it, the vehicle returns home",
+            "my.plan: geoFence.breachReturn: return points are not supported; remove this one, since the vehicle \
+             returns home",
         ),
-        (&|plan| plan["rallyPoints"]["points"] = json!(7), "my.plan: rally point: it must be a list"),
+        (&|plan| plan["rallyPoints"]["points"] = json!(7), "my.plan: rally point: a list is needed here"),
         (
             &|plan| plan["mission"]["items"][2]["autoContinue"] = json!(false),
             "my.plan: mission item 2: autoContinue must be true: a mission does not wait between items",
         ),
         (
             &|plan| plan["mission"]["items"][3]["doJumpId"] = json!(3),
-            "my.plan: mission item 5: several items have the doJumpId that it jumps to; correct it",
+            "my.plan: mission item 5: the jump's target doJumpId belongs to several items; correct the target",
         ),
         (
             &|plan| plan["geoFence"]["polygons"][0]["polygon"][1] = json!([HOME[0], HOME[1], 50.0]),
-            "my.plan: geoFence polygon 0.polygon 1: an altitude is not flown; remove it",
+            "my.plan: geoFence polygon 0.polygon 1: an altitude has no effect here; remove it",
         ),
     ];
     for (change, line) in cases {
         assert_eq!(changed(change), *line);
     }
     let torn = QgcPlan::read("my.plan", "{\"fileType\": ").unwrap_err().to_string();
-    assert!(torn.starts_with("my.plan: no JSON: ") && torn.ends_with("; save the plan again"), "{torn}");
+    assert!(torn.starts_with("my.plan: the file is not JSON: ") && torn.ends_with("; save the plan again"), "{torn}");
 }
 
 /// Unknown versions and unknown names are refused in every part of a plan: anything added to an object is read, known
@@ -176,14 +180,14 @@ fn what_is_not_understood_is_refused_by_name() {
         let mut other = whole.clone();
         other.pointer_mut(&path).unwrap()["speedLimit"] = json!(3);
         let line = read(&other).unwrap_err();
-        assert!(line.ends_with(": speedLimit is not known, and is not flown; remove it"), "{path}: {line}");
+        assert!(line.ends_with(": speedLimit is unknown and cannot be flown; remove it"), "{path}: {line}");
         let Some(version) = whole.pointer(&path).unwrap().get("version").and_then(Value::as_u64) else { continue };
         versions += 1;
         for wrong in [json!(version + 1), json!(version - 1), json!(42), json!(1.5), json!("2"), json!(null)] {
             let mut other = whole.clone();
             other.pointer_mut(&path).unwrap()["version"] = wrong.clone();
             let line = read(&other).unwrap_err();
-            let named = if wrong.is_null() { "version is missing" } else { "is not known" };
+            let named = if wrong.is_null() { "version is missing" } else { "is unknown" };
             assert!(line.contains("version") && line.contains(named), "{path} {wrong}: {line}");
         }
     }
@@ -191,8 +195,11 @@ fn what_is_not_understood_is_refused_by_name() {
     // A fence in an old format, with other names.
     let mut old = whole.clone();
     old["geoFence"] = json!({ "version": 1, "polygon": [at(-60.0, -60.0), at(60.0, -60.0), at(60.0, 60.0)] });
-    let cure = "save the plan again in a QGroundControl of today";
-    assert_eq!(read(&old).unwrap_err(), format!("my.plan: geoFence.version: 1 is not known, 2 is; {cure}"));
+    let cure = "save the plan again in a current QGroundControl";
+    assert_eq!(
+        read(&old).unwrap_err(),
+        format!("my.plan: geoFence.version: version 1 is unknown, only 2 is known; {cure}")
+    );
 }
 
 /// Flies from take-off to the landing at home inside the fence, with the loop flown twice.
@@ -214,15 +221,16 @@ fn what_the_vehicle_refuses_is_named() {
     };
     assert_eq!(
         refused(&|plan| plan["mission"]["items"][3]["command"] = json!(183)),
-        "mission: the vehicle refuses it: mission item 3: DO_SET_SERVO unsupported; change it in QGroundControl"
+        "mission: the vehicle refuses this part: mission item 3: DO_SET_SERVO unsupported; change it in QGroundControl"
     );
     assert_eq!(
         refused(&|plan| plan["mission"]["items"][4]["params"][5] = json!(at(0.0, 70.0)[1])),
-        "mission: the vehicle refuses it: mission item 4: outside the geofence; change it in QGroundControl"
+        "mission: the vehicle refuses this part: mission item 4: outside the geofence; change it in QGroundControl"
     );
     assert_eq!(
         refused(&|plan| plan["geoFence"]["circles"][0]["circle"]["center"] = json!(HOME)),
-        "geoFence: the vehicle refuses it: fence item 4: the vehicle is outside; change it in QGroundControl"
+        "geoFence: the vehicle refuses this part: fence item 4: the vehicle is outside this fence; change it in \
+         QGroundControl"
     );
     assert_eq!(refused(&|plan| plan["mission"]["items"] = json!([])), "the mission has no items; add some");
 }

@@ -168,9 +168,9 @@ fn a_port_that_is_taken_is_named_with_the_cure() {
     let port = other.local_addr().unwrap().port();
     let refused = Ports::open(&Addresses { udp: port, ..free() }, 1).err().unwrap();
     assert!(refused.starts_with(&format!("UDP port {port} of 127.0.0.1 is taken")), "{refused}");
-    assert!(refused.contains("--port 0 for any free one"), "{refused}");
+    assert!(refused.contains("--port 0 for any free port"), "{refused}");
     let refused = Ports::open(&Addresses { udp: 65_535, ..free() }, 2).err().unwrap();
-    assert_eq!(refused, "ports from 65535 on are not enough for 2 vehicles; begin lower");
+    assert_eq!(refused, "the ports from 65535 on do not suffice for 2 vehicles; choose a lower first port");
 }
 
 /// Runs these lines like `sitl serve --lockstep`: only `step` advances time, and the end of the input ends the run.
@@ -194,7 +194,7 @@ fn in_lockstep_lines_drive_the_clock() {
     assert_eq!((end, now_s), (RunEnd::Silent, 0.3));
     let wanted = [
         "ok step 250",
-        "error speed: time goes on by step alone; start without --lockstep",
+        "error speed: only step moves time; start without --lockstep",
         "ok wind 1 0 0",
         "ok step 50",
         "error \"nonsense\": no such command; help lists the commands",
@@ -221,7 +221,10 @@ fn as_fast_as_possible_it_ends_when_asked_to() {
     );
     assert_eq!(end, RunEnd::Quit);
     assert!((server.now_s() - 30.001).abs() < 1e-9);
-    assert!(reported.contains(&"error step: time goes on by itself; start with --lockstep".into()), "{reported:?}");
+    assert!(
+        reported.contains(&"error step: time already runs by itself; start with --lockstep".into()),
+        "{reported:?}"
+    );
     stop.store(true, std::sync::atomic::Ordering::Relaxed);
     let end = run(
         &mut server,

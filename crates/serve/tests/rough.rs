@@ -92,7 +92,7 @@ fn gnss_that_comes_back_gives_back_what_was_flown() {
     session.run(HOLDS);
     session.line("fault gnss lost 5.5");
     session.run(HOLDS + 9_000);
-    assert!(session.says("hold: the state is back"), "{:#?}", session.lines);
+    assert!(session.says("hold: the state estimate is back"), "{:#?}", session.lines);
     session.line("fault gnss lost 5.5");
     session.run(HOLDS + 9_000 + 5_800);
     // GNSS is back, but the descent has not ended yet: it continues for another second.

@@ -220,7 +220,7 @@ fn lines_with_a_time_are_carried_out_then_and_in_order() {
     ];
     assert_eq!(reported, wanted);
     assert!(status(&mut server).contains("50 %"));
-    assert_eq!(server.line("at 0.4 battery 1").lines, ["error 0.4 s are over; it is 0.500 s"]);
+    assert_eq!(server.line("at 0.4 battery 1").lines, ["error 0.4 s has passed; the time is now 0.500 s"]);
 }
 
 /// Every bad line gets one line that begins with `error`, and changes nothing.
@@ -229,7 +229,7 @@ fn bad_lines_are_refused_in_one_line() {
     let lines = [
         ("foo", "\"foo\": no such command; help lists the commands"),
         ("wnd 1 2 3", "\"wnd\": no such command; did you mean wind?"),
-        ("wind 1 2", "wind X Y Z: it needs three numbers"),
+        ("wind 1 2", "wind X Y Z: three numbers are needed"),
         ("wind 1 2 x", "wind X Y Z: \"x\" is no number"),
         ("wind 1 2 3 4", "wind X Y Z: \"4\" is too much"),
         ("wind 1 2 nan", "wind: steady_m_s = NaN, out of range: it must lie within -50 to 50"),
@@ -238,21 +238,21 @@ fn bad_lines_are_refused_in_one_line() {
         ("rotor 5 0.5", "rotor = 5, out of range: it must lie within 1 to 4"),
         ("rotor 2 1.5", "rotor: efficiency = 1.5, out of range: it must lie within 0 to 1"),
         ("battery", "battery SHARE: initial_charge is missing"),
-        ("fault", "fault INSTRUMENT FAILURE [NUMBERS] [SECONDS]: it needs an instrument, as in: fault gnss lost"),
-        ("fault gps lost", "fault: \"gps\" is no instrument; it must be imu, tracker, gnss, barometer or magnetometer"),
+        ("fault", "fault INSTRUMENT FAILURE [NUMBERS] [SECONDS]: it needs name an instrument, as in: fault gnss lost"),
+        ("fault gps lost", "fault: \"gps\" is no instrument; write imu, tracker, gnss, barometer or magnetometer"),
         ("fault gnss stuck", "fault gnss: \"stuck\" is none of lost, jumped, multipath"),
         ("fault tracker lost", "this vehicle has no tracker"),
         ("fault gnss lost -3", "fault: seconds = -3, out of range: it must lie within 0 to 1000000"),
         ("turbulence strong", "turbulence: \"strong\" is not one of none, light, moderate, severe"),
         (
             "change weight 2",
-            "change: \"weight\" is not one of mass, inertia, thrust-factor, drag-factor, \
-          roll-moment, pitch-moment, yaw-moment",
+            "change: \"weight\" is not one of multiplies a quantity: mass, inertia, thrust-factor, drag-factor, \
+             roll-moment, pitch-moment, yaw-moment",
         ),
         ("vehicle 9 clear", "there is no vehicle 9; they are 1 to 2"),
         ("at", "at SECONDS COMMAND: at is missing"),
         ("at 5", "a command is missing"),
-        ("at 5 step 3", "step cannot be put off"),
+        ("at 5 step 3", "step cannot be scheduled for later"),
         ("at 5 at 6 clear", "at: a second time"),
         ("step 0", "step: \"0\" is not milliseconds, 1 to 3600000"),
         ("speed -1", "speed: speed = -1, out of range: it must lie within 0 to 1000"),
@@ -329,7 +329,7 @@ fn what_lines_leave_behind_is_bounded() {
         let taken = (0..2000).take_while(|_| server.line(line).lines == [format!("ok {line}")]).count();
         assert!((100..=256).contains(&taken), "{line}: {taken}");
         let refused = server.line(line).lines.concat();
-        assert_eq!(refused, "error 256 of its kind act already; clear ends them", "{line}");
+        assert_eq!(refused, "error 256 changes of this kind act already; `clear` ends them", "{line}");
         // Other changes are still accepted, and the suggested remedy works.
         ok(&mut server, "battery 0.9");
         ok(&mut server, "clear");
@@ -346,6 +346,6 @@ fn what_lines_leave_behind_is_bounded() {
     assert_eq!(server.line(&long).lines, ["error a line has at most 512 characters"]);
     let taken = (0..2000).take_while(|_| server.line("at 1000 wind 1 0 0").lines == ["ok at 1000 wind 1 0 0"]).count();
     assert_eq!(taken, 1000);
-    assert!(server.line("at 1000 wind 1 0 0").lines.concat().starts_with("error 1000 lines wait for their time"));
+    assert!(server.line("at 1000 wind 1 0 0").lines.concat().starts_with("error 1000 scheduled lines are waiting"));
     ok(&mut server, "wind 1 0 0");
 }

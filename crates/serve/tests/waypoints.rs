@@ -87,7 +87,7 @@ fn what_cannot_be_read_is_refused_by_line() {
     for (from, to, said) in [
         ("WPL 110", "WPL 130", ":1: QGC WPL \"130\" is no known version"),
         ("WPL 110", "WPL", ":1: QGC WPL \"\" is no known version"),
-        ("\t1\n1\t", "\t1\n2\t", ":3: its number is \"2\", not 1"),
+        ("\t1\n1\t", "\t1\n2\t", ":3: the line's number is \"2\" instead of 1"),
         ("\t16\t1.5\t", "\t16\tone\t", ":4: param1 is \"one\"; it must be a number"),
         ("\t16\t1.5\t", "\tsixteen\t1.5\t", ":4: command is \"sixteen\""),
         ("\t16\t1.5\t", "\t70000\t1.5\t", ":4: command is \"70000\""),
@@ -99,10 +99,10 @@ fn what_cannot_be_read_is_refused_by_line() {
         ("\t-6\t1\n", "\t-6\n", ":6: 11 columns instead of 12"),
         ("\t-6\t1\n", "\t-6\t2\n", ":6: the last column (autocontinue) is \"2\"; it must be 1"),
         ("\t-6\t1\n", "\t-6\t0\n", ":6: the last column (autocontinue) must be 1"),
-        ("\t177\t2\t", "\t177\t9\t", ": item 4: it jumps to 9, which is no item"),
-        ("\t177\t2\t", "\t177\t0\t", ": item 4: it jumps to 0, which is no item"),
-        ("\t177\t2\t", "\t177\t1.5\t", ": item 4: it jumps to 1.5, which is no item"),
-        ("\t177\t2\t", "\t177\tnan\t", ": item 4: it jumps to NaN, which is no item"),
+        ("\t177\t2\t", "\t177\t9\t", ": item 4: the jump's target 9 does not exist"),
+        ("\t177\t2\t", "\t177\t0\t", ": item 4: the jump's target 0 does not exist"),
+        ("\t177\t2\t", "\t177\t1.5\t", ": item 4: the jump's target 1.5 does not exist"),
+        ("\t177\t2\t", "\t177\tnan\t", ": item 4: the jump's target NaN does not exist"),
     ] {
         let bad = good.replacen(from, to, 1);
         assert_ne!(bad, good, "{from:?}");

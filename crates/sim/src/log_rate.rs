@@ -21,7 +21,7 @@ impl FromStr for LogRate {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         match text.parse() {
             Ok(hz @ 1..=1000) if 1000 % hz == 0 => Ok(LogRate(hz)),
-            _ => Err("it must divide 1000: 1, 2, 4, 5, 8, 10, 20, 25, 40, 50, 100, 125, 200, 250, 500 or 1000"),
+            _ => Err("the rate must divide 1000: 1, 2, 4, 5, 8, 10, 20, 25, 40, 50, 100, 125, 200, 250, 500 or 1000"),
         }
     }
 }
@@ -65,7 +65,8 @@ impl LogRate {
         if rows > ROWS {
             let duration_s = scenario.duration_s;
             return Err(format!(
-                "--log-hz {hz}: {duration_s} s would give {rows:.1e} rows, more than {ROWS:.1e}; lower it or --duration"
+                "--log-hz {hz}: {duration_s} s would give {rows:.1e} rows, more than {ROWS:.1e}; lower --log-hz or \
+                 --duration"
             ));
         }
         Ok(steps as u64)

@@ -47,7 +47,7 @@ fn instruments_and_faults_that_do_not_exist_are_refused() {
         ("[instruments]\ncompass = \"ist8310\"", format!("2: instruments.compass: unknown key; known here: {known}")),
         (
             "[instruments]\ngnss = \"m10\"",
-            "1: instruments.imu: missing; add it, since the other instruments have no effect without it".into(),
+            "1: instruments.imu: missing; add an imu, since the other instruments have no effect without one".into(),
         ),
         (
             "[instruments.imu.gyro]\nscale = 0.2",
@@ -63,7 +63,7 @@ fn instruments_and_faults_that_do_not_exist_are_refused() {
         ),
         (
             "[[instrument_fault]]\nfailure = \"imu-dead\"\nstart_s = 1",
-            "2: instrument_fault.failure: there is no imu to fail; add it to [instruments]".into(),
+            "2: instrument_fault.failure: the scenario has no imu that could fail; add it to [instruments]".into(),
         ),
         (
             &format!("{imu}[[instrument_fault]]\nfailure = \"imu-noisy\"\nrates_rad_s = 1\nstart_s = 1"),
@@ -75,16 +75,20 @@ fn instruments_and_faults_that_do_not_exist_are_refused() {
         ),
         (
             &format!("{imu}[[instrument_fault]]\nfailure = \"imu-dead\"\nstart_s = 1\nrise_s = 2"),
-            "6: instrument_fault.rise_s: imu-dead has no size that could grow; leave it out".into(),
+            "6: instrument_fault.rise_s: the failure imu-dead has no size that could grow; leave rise_s out".into(),
         ),
         (
             "told = \"drawn\"",
-            "1: told: there are no instruments to be told of; add [instruments], or leave it out".into(),
+            "1: told: the scenario has no instruments that [told] could describe; add [instruments], or leave [told] \
+             out"
+            .into(),
         ),
         (&format!("told = \"flown\"\n{imu}"), "1: told: \"flown\" is unknown; it must be \"drawn\"".into()),
         (
             &format!("{imu}[told]\ngnss = \"m10\""),
-            "4: told.gnss: there is no gnss to be told of; add it to [instruments], or leave it out".into(),
+            "4: told.gnss: the scenario has no gnss that [told] could describe; add it to [instruments], or leave it \
+             out of [told]"
+                .into(),
         ),
         (&format!("{imu}[told]\nbaro = 1"), "4: told.baro: unknown key; did you mean barometer?".into()),
         (&format!("{imu}[tolt]\nimu = \"bmi270\""), "3: tolt: unknown key; did you mean told?".into()),

@@ -30,9 +30,9 @@ impl<E> Error<E> {
     /// Returns the reason as text of at most 50 characters.
     pub const fn reason(&self) -> &'static str {
         match self {
-            Error::Flash(_) => "not kept: the flash does not take it",
-            Error::NeedsErase => "not kept: store is full until the next start",
-            Error::Full => "not kept: store is full, restore defaults",
+            Error::Flash(_) => "not kept: the flash cannot be written",
+            Error::NeedsErase => "not kept: store is full, restart to clean up",
+            Error::Full => "not kept: store is full, reset parameters",
         }
     }
 }

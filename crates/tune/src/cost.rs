@@ -15,7 +15,7 @@ pub const POSITION_M: f64 = 0.1;
 pub const WORST_M: f64 = 0.3;
 /// Root mean square error of yaw that costs 1 \[rad\].
 pub const YAW_RAD: f64 = 0.05;
-/// Sum over U1..U4 of the mean |change per step| that costs 1 \[N\], on the paper's vehicle.
+/// Input roughness that costs 1: the mean |change per step|, summed over U1 to U4, on the paper's vehicle \[N\].
 pub const JUMP_N: f64 = 0.5;
 /// Cost of a loss, or of a trip of the monitor, at the end of the flight. At the start it costs twice as much.
 pub const LOST: f64 = 1000.0;

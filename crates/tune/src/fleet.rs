@@ -229,7 +229,7 @@ impl FleetResults {
         };
         let cured = |error| match error {
             files::Error::Foreign { path, whose } => {
-                format!("{}: {whose}; choose another folder, or delete it", path.display())
+                format!("{}: {whose}; choose another folder, or delete the old one", path.display())
             }
             error => error.to_string(),
         };
@@ -237,9 +237,11 @@ impl FleetResults {
         let held = read::<FleetManifest>(&path.join(MANIFEST))?;
         if let Some(held) = held.as_ref().filter(|held| **held != manifest) {
             let what = held.differs(&manifest);
-            return Err(
-                format!("{}: holds searches {what}; choose another folder, or delete it", path.display()).into()
-            );
+            return Err(format!(
+                "{}: the folder holds searches {what}; choose another folder, or delete the old one",
+                path.display()
+            )
+            .into());
         }
         let folder = Folder::open(path, COMMAND, NAME, false).map_err(cured)?;
         if held.is_none() {
@@ -259,7 +261,8 @@ impl FleetResults {
         let path = self.folder.path().join(file_name(&planned));
         match read::<FleetOutcome>(&path)? {
             Some(outcome) if outcome.planned != planned => {
-                Err(format!("{}: the result of another search; delete it, and start again", path.display()).into())
+                Err(format!("{}: the file is the result of another search; delete it, and start again", path.display())
+                    .into())
             }
             outcome => Ok(outcome),
         }
@@ -334,8 +337,8 @@ impl FleetResults {
                 Ok(held) if held == text.as_bytes() => {}
                 // The same searches would write the same bytes, so somebody changed the file.
                 Ok(_) => {
-                    let cure = "move it, and start again";
-                    return Err(format!("{}: changed since it was written; {cure}", path.display()).into());
+                    let cure = "move the file, and start again";
+                    return Err(format!("{}: the file was changed after it was written; {cure}", path.display()).into());
                 }
                 Err(_) => files::write_atomically(&path, |out| out.write_all(text.as_bytes()))
                     .map_err(|source| files::Error::Write { path: path.clone(), source })?,
@@ -382,8 +385,8 @@ impl FleetManifest {
         let name = |searches: &[PlannedSearch]| searches.iter().map(file_name).collect::<Vec<_>>();
         match pairs.into_iter().find(|(_, held, wanted)| held != wanted) {
             Some((what, held, wanted)) => format!("with {what} {held}, not {wanted}"),
-            None if name(&self.searches) != name(&wanted.searches) => "of other laws or vehicles".into(),
-            None => "of other flights, vehicles or starting gains".into(),
+            None if name(&self.searches) != name(&wanted.searches) => "for other laws or vehicles".into(),
+            None => "with other flights, vehicles or starting gains".into(),
         }
     }
 }
@@ -411,9 +414,12 @@ fn read<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<Option<T>, Box<dyn Er
         Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
             return Ok(None);
         }
-        bytes => bytes.map_err(|error| format!("{}: cannot be read ({error}); make it readable", path.display()))?,
+        bytes => {
+            bytes.map_err(|error| format!("{}: the file cannot be read ({error}); make it readable", path.display()))?
+        }
     };
-    let damaged = |problem: String| format!("{}: damaged ({problem}); delete it, and start again", path.display());
+    let damaged =
+        |problem: String| format!("{}: the file is damaged ({problem}); delete it, and start again", path.display());
     seal::verify(&mut io::Cursor::new(&bytes)).map_err(|error| damaged(error.to_string()))?;
     let page: ChecksummedFile<T> = serde_json::from_slice(&bytes).map_err(|error| damaged(error.to_string()))?;
     Ok(Some(page.page))

@@ -4,7 +4,8 @@ use crate::{ParameterNumber, parameters, sin_cos};
 use nalgebra::{Matrix3, Vector3};
 
 parameters! {
-    /// Mounting of the inertial sensor: the true one in `f64` in the plant, the known one in `f32` in flight software.
+    /// Mounting of the inertial sensor. The plant has the true mounting in `f64`, flight software the nominal one in
+    /// `f32`.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     #[cfg_attr(feature = "serde", serde(bound = "T: crate::ParameterNumber + serde::Serialize"))]

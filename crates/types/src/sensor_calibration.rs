@@ -21,10 +21,10 @@ parameters! {
         /// Offset of the accelerometer, sensor axes.
         #[parameter(ACC0_OFF, "m/s2", -5.0..=5.0)]
         pub accel_offset_m_s2: Vector3<f32> = Vector3::new(0.0, 0.0, 0.0),
-        /// Factors on the accelerometer's readings less its offset, sensor axes.
+        /// Scale factors of the accelerometer, applied after its offset is subtracted, sensor axes.
         #[parameter(ACC0_SCALE, "1", 0.8..=1.25)]
         pub accel_scale: Vector3<f32> = Vector3::new(1.0, 1.0, 1.0),
-        /// Offset of the magnetometer, hard iron among it, body frame.
+        /// Offset of the magnetometer, including hard iron, body frame.
         #[parameter(MAG0_OFF, "uT", -1000.0..=1000.0)]
         pub mag_offset_ut: Vector3<f32> = Vector3::new(0.0, 0.0, 0.0),
         /// Diagonal of the magnetometer's matrix, body frame.

@@ -23,7 +23,7 @@ pub fn built_in(name: &str) -> Option<&'static BuiltIn<Vehicle>> {
 pub fn unknown(name: &str) -> String {
     let cure = match BuiltIn::similar(&BUILT_IN, name) {
         Some(known) => format!("did you mean {}?", known.name),
-        None => "`sitl vehicles` lists the built-in ones; a file needs its path, as in ./my.toml".into(),
+        None => "`sitl vehicles` lists the built-in vehicles; for a file, write its path, as in ./my.toml".into(),
     };
     format!("\"{name}\" is no built-in vehicle; {cure}")
 }

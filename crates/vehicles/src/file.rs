@@ -25,9 +25,10 @@ const ARM_TOLERANCE: f64 = 0.01;
 /// Time step for checking drag and ground \[s\]; a scenario checks them again with its own step.
 const STEP_S: f64 = 0.001;
 /// Remedy for drag that is out of range for the laws' feed-forward.
-const CHECK: &str = "check mass_kg, thrust_factor_n_s2 and what is in [drag]";
+const CHECK: &str = "check mass_kg, thrust_factor_n_s2 and the values in [drag]";
 /// Remedy for a vehicle that cannot hover with a margin.
-const UNFIT: &str = "AFBC would not fly it with a margin: stronger or quicker rotors, less mass, or gains of its own";
+const UNFIT: &str =
+    "AFBC would fly this vehicle without a margin; choose stronger or quicker rotors, less mass, or [gains]";
 
 /// Reads and checks the vehicle file at `path`.
 ///
@@ -182,7 +183,8 @@ fn frame(root: &mut Table<'_>, arm_m: f64) -> Result<(Vec<Rotor<f64>>, f64), Fil
         }
         for along in [rotor.x, rotor.y] {
             if let Err(error) = ROTOR_POSITION.check(along) {
-                let problem = format!("{}, in arm's lengths; move the rotor, or change arm_m", out_of_range(&error));
+                let problem =
+                    format!("{}, in multiples of arm_m; move the rotor, or change arm_m", out_of_range(&error));
                 table.clash(POSITION.name, &["vehicle.arm_m"], problem)?;
                 are_known = false;
             }
@@ -196,7 +198,8 @@ fn frame(root: &mut Table<'_>, arm_m: f64) -> Result<(Vec<Rotor<f64>>, f64), Fil
     let mean = |of: fn(&Vector3<f64>) -> f64| places_m.iter().map(of).sum::<f64>() / places_m.len() as f64;
     let distance_m = mean(|at_m| libm::hypot(at_m.x, at_m.y));
     if (distance_m - arm_m).abs() > ARM_TOLERANCE * distance_m {
-        let problem = format!("arm_m is {arm_m}, but the rotors are {distance_m:.4} m from the z axis; change either");
+        let problem =
+            format!("arm_m is {arm_m}, but the rotors are {distance_m:.4} m from the z axis; change one of them");
         root.clash("rotor", &["vehicle.arm_m", "rotor"], problem)?;
     }
     Ok((rotors, mean(|at_m| at_m.z)))
@@ -256,7 +259,7 @@ fn estimation(
     let mut estimation = imu.map_or(default, for_part);
     let mut stated = Vec::new();
     if let Some(mut table) = root.table("estimator")? {
-        table.forbid(gravity.name, "gravity is that of [vehicle]; take it out")?;
+        table.forbid(gravity.name, "the gravity comes from [vehicle]; remove this key")?;
         table.declared(&mut estimation)?;
         let Ok(()) = estimation.visit(&mut |declaration, _| {
             stated.extend(Some(declaration.range.name).filter(|name| table.has(name)));
@@ -282,10 +285,11 @@ fn gains(root: &mut Table<'_>, gains: &mut PerAxis<Gains>, settings: &mut Settin
         axes.finish()?;
     }
     if let Some(mut cascade) = flight.table(CASCADE)? {
-        cascade.forbid(afbc_control::Settings::DT.range.name, "the time step is the scenario's; take it out")?;
+        cascade
+            .forbid(afbc_control::Settings::DT.range.name, "the time step comes from the scenario; remove this key")?;
         cascade.forbid(
             afbc_control::Settings::FORCE_MAX.range.name,
-            "the rotors' largest force follows from [rotors]; take it out",
+            "the rotors' largest force follows from [rotors]; remove this key",
         )?;
         cascade.declared(settings)?;
         cascade.declared_in("limits", settings)?;

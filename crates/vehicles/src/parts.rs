@@ -80,14 +80,14 @@ fn max_by_force(table: &mut Table<'_>, rotors: &mut Rotors, truth: &Parameters<f
     let max = &Rotors::MAX.range;
     let Some(force_n) = table.number(&FORCE_MAX)? else { return Ok(()) };
     if table.has(max.name) {
-        let problem = format!("a second limit; write it or {}, not both", max.name);
+        let problem = format!("the rotors have two limits; write force_max_n or {}, not both", max.name);
         return table.clash(FORCE_MAX.name, &[], problem);
     }
     let max_rad_s = libm::sqrt(force_n / truth.thrust_factor_n_s2);
     match max.check(max_rad_s) {
         Ok(()) => rotors.max_rad_s = max_rad_s,
         Err(error) => {
-            table.clash(FORCE_MAX.name, ALL, format!("it makes {}; change the force", out_of_range(&error)))?;
+            table.clash(FORCE_MAX.name, ALL, format!("the force causes {}; change the force", out_of_range(&error)))?;
         }
     }
     Ok(())

@@ -72,7 +72,7 @@ fn drag_of_the_file_is_known_per_mass() {
 #[test]
 fn what_cannot_hover_with_a_margin_is_refused_by_name() {
     let weak = refused(&changed("iris", "force_max_n = 7.066", "force_max_n = 4.5"));
-    assert!(weak.contains("rotor_force_max_n") && weak.contains("would not fly"), "{weak}");
+    assert!(weak.contains("rotor_force_max_n") && weak.contains("without a margin"), "{weak}");
     let heavy = refused(&changed("racer", "mass_kg = 0.752", "mass_kg = 5.0"));
     assert!(heavy.contains("rotor_force_max_n") && heavy.contains("at least") | heavy.contains("within"), "{heavy}");
     let sluggish =

@@ -269,7 +269,7 @@ await step("payload, rotor fault and outage show, and are cleared", async () => 
       globalThis.page.frame.payload_kg > 0 &&
       globalThis.page.frame.faults.length === 2 &&
       /rotor/.test(document.getElementById("suffers").textContent),
-    "what it suffers",
+    "its faults",
   );
   await click('[data-line="clear"]');
   await until(() => globalThis.page.frame.faults.length === 0, "a sound vehicle");

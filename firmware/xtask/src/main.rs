@@ -24,7 +24,7 @@ const TABLE: &str = "flight-";
 /// USB vendor and product of the chips' boot loader.
 const BOOT_LOADER: &str = "0483:df11";
 
-/// Work on the firmware.
+/// Builds and flashes the firmware.
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", arg_required_else_help = true)]
 enum Task {
@@ -32,7 +32,7 @@ enum Task {
     Flash(Flash),
 }
 
-/// Build the image of a board: an ELF file, and beside it an Intel HEX file. Reports flash and RAM.
+/// Build the image of a board, as ELF and Intel HEX files. Reports the use of flash and RAM.
 ///
 /// RUSTUP_TOOLCHAIN=$(scripts/thumb-toolchain.sh) selects a compiler where rustup has no target for microcontrollers.
 #[derive(Debug, clap::Args)]
@@ -51,7 +51,7 @@ struct Build {
 struct Flash {
     #[command(flatten)]
     image: Image,
-    /// What to flash it by.
+    /// Programmer that flashes the image.
     #[arg(long, value_enum, default_value = "dfu")]
     by: Programmer,
 }
@@ -59,19 +59,19 @@ struct Flash {
 /// Connection and program that flash an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Programmer {
-    /// By USB and dfu-util, a board whose boot loader runs.
+    /// USB and dfu-util; the board's boot loader must be running.
     Dfu,
-    /// By an SWD probe and probe-rs.
+    /// An SWD probe and probe-rs.
     Probe,
 }
 
 /// Which image.
 #[derive(Debug, clap::Args)]
 struct Image {
-    /// A folder in firmware/boards/, or a table of one's src/bin/.
+    /// Name of a folder in firmware/boards/, or of a board table in such a folder's src/bin/.
     #[arg(value_parser = named())]
     board: String,
-    /// A name in vehicles/, or a path [default: VEHICLE of the environment, or the paper's].
+    /// Name in vehicles/, or path of a vehicle file [default: the environment's VEHICLE, or the paper's vehicle].
     #[arg(long)]
     vehicle: Option<String>,
     /// Further options of cargo.
@@ -127,7 +127,7 @@ struct Board {
 impl Board {
     /// Returns the chip of the board, or an error if the board is emulated.
     fn chip(&self, image: &Image) -> Result<&str, String> {
-        let emulated = || format!("{} is emulated: fly it by `cargo run --release -- pil`", image.board);
+        let emulated = || format!("{} only runs in the emulator: fly it by `cargo run --release -- pil`", image.board);
         self.chip.as_deref().ok_or_else(emulated)
     }
 
@@ -218,7 +218,7 @@ impl Image {
             let room = room(&usage);
             println!("{what}: {room}");
             if room.percent < percent && board.chip.as_deref().is_some_and(|name| name.starts_with(chip)) {
-                return Err(format!("{}: {what} {room}, and {percent} % have to be", self.board));
+                return Err(format!("{}: {what} {room}, but {percent} % must stay free", self.board));
             }
         }
         Ok(())

@@ -15,15 +15,14 @@ const WITH_MANIFEST: [&str; 4] = ["campaign", "compare", "fly", "paper"];
 /// Command that resumes in an existing folder instead of starting afresh.
 const RESUMES: &str = "campaign";
 
-/// Make results again from their manifest, and compare them byte by byte
+/// Repeat results from their manifest, and compare them byte by byte
 ///
-/// Runs the command that the manifest names, with the results in a folder of their own, and compares every file with
-/// the manifest's hash. Paths of the command are relative to the current folder. A manifest by others is as good as
-/// one's own: it can name scenarios, vehicles and what else decides results, and nothing that writes elsewhere. Exits
-/// with 1 if a file differs.
+/// Runs the command that the manifest names into another folder, and compares every file with the manifest's hash.
+/// Paths in the command are relative to the current folder. Somebody else's manifest is safe to run: the command cannot
+/// write anywhere but into this folder. Exits with 1 if a file differs.
 #[derive(Args, Debug)]
 pub(crate) struct AgainArgs {
-    /// manifest.json of a folder of results, or the folder
+    /// Folder of results, or its manifest.json
     manifest: PathBuf,
 
     /// Folder for the new results [default: the manifest's folder with -again]
@@ -39,9 +38,11 @@ impl AgainArgs {
             checked(&before.command, &program).map_err(|problem| format!("{}: {problem}", self.manifest.display()))?;
         let out = self.out.clone().unwrap_or_else(|| beside(&self.manifest));
         if command == RESUMES && out.exists() {
-            return Err(
-                format!("{}: exists already; choose another folder with --out, or remove it", out.display()).into()
-            );
+            return Err(format!(
+                "{}: the folder exists already; choose another folder with --out, or remove this one",
+                out.display()
+            )
+            .into());
         }
         for (what, then, now) in [
             ("version", Some(before.version.clone()), Some(manifest::version())),
@@ -49,7 +50,7 @@ impl AgainArgs {
         ] {
             if then != now {
                 let word = |it: Option<String>| it.unwrap_or_else(|| "unknown".into());
-                say(&format!("{what}: {} then, {} now; results may differ", word(then), word(now)));
+                say(&format!("{what}: {} at that time, {} now; results may differ", word(then), word(now)));
             }
         }
         // Runs this program's own file, since another `sitl` in the path may have another version.
@@ -63,19 +64,23 @@ impl AgainArgs {
             .map_err(|error| format!("the command cannot be run again ({error})"))?;
         // Exit code 1 means that a vehicle was lost, which is a valid result.
         if !matches!(status.code(), Some(0 | 1)) {
-            return Err(format!("sitl {}: failed, see above; nothing was compared", before.command.join(" ")).into());
+            return Err(format!(
+                "sitl {}: the command failed, see above; nothing was compared",
+                before.command.join(" ")
+            )
+            .into());
         }
         let after = manifest::read(&out)?;
         let differences = differences(&before, &after, &out);
         if differences.is_empty() {
             let files = before.results.len();
-            print(&format!("the same bytes: {files} files in {} are those of the manifest\n", out.display()))?;
+            print(&format!("the same bytes: {files} files in {} equal those of the manifest\n", out.display()))?;
             return Ok(ExitCode::SUCCESS);
         }
         let cause = if before.fingerprint == after.fingerprint {
-            "what was flown is the same; the program or the machine's arithmetic is another"
+            "the inputs are the same, so the program or the machine's arithmetic differs"
         } else {
-            "what was flown is not the same: a file that the command names, a gain or the program has changed"
+            "the inputs differ: a file that the command names, a gain or the program has changed"
         };
         print(&format!("{}\n{cause}\n", differences.join("\n")))?;
         Ok(ExitCode::FAILURE)
@@ -92,20 +97,20 @@ fn is_named(arguments: &[String]) -> bool {
 fn checked(arguments: &[String], program: &CliCommand) -> Result<String, String> {
     let command = if is_named(arguments) { arguments.first().map_or("", String::as_str) } else { "paper" };
     let known = WITH_MANIFEST.join(", ");
-    let unknown = || format!("its command is {:?}, not one of {known}", command.escape_debug().to_string());
+    let unknown =
+        || format!("the manifest's command is {:?}, which is none of {known}", command.escape_debug().to_string());
     let name = WITH_MANIFEST.iter().find(|known| **known == command).ok_or_else(unknown)?;
     let options = program.find_subcommand(name).ok_or_else(unknown)?;
     let rest = arguments.iter().skip(usize::from(is_named(arguments)));
     let words = [*name].into_iter().chain(rest.map(String::as_str));
     let given: ArgMatches = options.clone().no_binary_name(false).try_get_matches_from(words).map_err(|error| {
         let line = error.to_string();
-        format!("its command cannot be run: {}", line.lines().next().unwrap_or_default())
+        format!("the manifest's command cannot be run: {}", line.lines().next().unwrap_or_default())
     })?;
     let is_given = |arg: &&Arg| given.value_source(arg.get_id().as_str()) == Some(ValueSource::CommandLine);
     match places(options).find(is_given).and_then(Arg::get_long) {
         Some(place) => Err(format!(
-            "its command has --{place}, which decides no result; a manifest names only what may be made again, run \
-             that command yourself if you trust it"
+            "the manifest's command has --{place}, which no result depends on; run the command yourself if you trust it"
         )),
         None => Ok((*name).into()),
     }
@@ -141,5 +146,5 @@ fn differences(before: &ResultsManifest, after: &ResultsManifest, out: &Path) ->
         Err(_) => Some(format!("{name}: not made again")),
     });
     let new = after.results.keys().filter(|name| !before.results.contains_key(*name));
-    changed.chain(new.map(|name| format!("{name}: was not there before"))).collect()
+    changed.chain(new.map(|name| format!("{name}: the manifest does not have this file"))).collect()
 }

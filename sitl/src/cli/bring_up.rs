@@ -14,29 +14,30 @@ use std::process::ExitCode;
 use std::str::FromStr;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Take the first steps with a board, propellers off, and write a log that can be sent back
+/// Take the first steps with a board, propellers off, and write a log that you can send to the developers
 ///
-/// Asks the board for its version, parameters, sensors, ticks and noise at rest over MAVLink, leads through turns by
-/// hand, and gives a verdict on each step. It never arms and changes no parameter. See docs/bring-up.md.
+/// Reads the board's version, parameters, sensors, control ticks and noise at rest over MAVLink, guides you through
+/// turning the board by hand, and gives a verdict on each step. The command never arms the board and changes no
+/// parameter. See docs/bring-up.md.
 #[derive(Args, Debug)]
 pub(crate) struct BringUpArgs {
-    /// How the board is connected: serial:DEVICE[:BAUD], udp:HOST:PORT or tcp:HOST:PORT
+    /// Connection to the board: serial:DEVICE[:BAUD], udp:HOST:PORT or tcp:HOST:PORT
     #[arg(long, value_name = "CONNECTION", default_value = "serial:/dev/ttyACM0")]
     connect: BoardAddress,
 
-    /// File to write; one that is there already is not overwritten
+    /// File to write; an existing file is not overwritten
     #[arg(long, short, value_name = "FILE", default_value = "bring-up.md")]
     out: PathBuf,
 
-    /// What board it is, and what is connected to it, for the log
+    /// Name of the board and of the parts connected to it, for the log
     #[arg(long, value_name = "TEXT", default_value = "not said")]
     board: String,
 
-    /// Time at rest over which noise and ticks are measured [s]
+    /// Time at rest during which noise and ticks are measured [s]
     #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = value_parser!(u32).range(1..=3600))]
     rest: u32,
 
-    /// Ask nothing: the propellers are off, and nobody is there to turn the board
+    /// Ask nothing: confirms that the propellers are off, and skips the steps that need somebody to turn the board
     #[arg(long)]
     yes: bool,
 }
@@ -81,7 +82,7 @@ impl BringUpArgs {
         let mut exchange = |uplink: &[u8], hear: &mut dyn FnMut(&[u8])| Ok(port.exchange(uplink, hear)?);
         let mut log = bring_up(&mut exchange, options, &mut say)?;
         let head = [
-            ("board, as it was said", self.board),
+            ("board, as given by the user", self.board),
             ("connection", connected),
             ("begun before", date(SystemTime::now())),
             ("by", concat!("sitl ", env!("CARGO_PKG_VERSION")).into()),
@@ -122,7 +123,7 @@ fn confirm() -> Result<(), CommandError> {
     if answer.trim() == "yes" {
         return Ok(());
     }
-    Err("take the propellers off first; --yes says that they are, and that nobody is there".into())
+    Err("take the propellers off first; --yes confirms this without a question".into())
 }
 
 /// Returns a time as year, month, day, hour and minute in UTC.

@@ -23,11 +23,10 @@ use std::thread;
 /// Option that selects a part of a campaign.
 const SHARD: &str = "--shard";
 
-/// Fly a campaign: one scenario, many times, with drawn vehicles, weather and faults
+/// Fly a campaign: one scenario many times, with randomly drawn vehicles, weather and faults
 ///
-/// Every contender flies the same draws. Finished flights are kept: after Ctrl-C or a crash, the same command resumes.
-/// See
-/// docs/campaigns.md.
+/// Every contender flies the same draws. Finished flights are kept; after Ctrl-C or a crash, the same command resumes.
+/// See docs/campaigns.md.
 #[derive(Args, Debug)]
 pub(crate) struct CampaignArgs {
     /// Name of a built-in campaign, or path of a campaign file
@@ -41,7 +40,7 @@ pub(crate) struct CampaignArgs {
     #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<u64>,
 
-    /// Fly only part I of N, as one of N machines; `sitl merge` joins the parts
+    /// Fly only part I of N, to share a campaign among N machines; `sitl merge` joins the parts
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
 
@@ -49,7 +48,7 @@ pub(crate) struct CampaignArgs {
     #[arg(long, value_name = "INDEX", conflicts_with_all = ["threads", "shard"])]
     flight: Option<u64>,
 
-    /// Contender to fly with --flight, instead of all; may be given more than once
+    /// Contender to fly with --flight, instead of all contenders; may be given more than once
     #[arg(long = "contender", value_name = "NAME", requires = "flight")]
     contenders: Vec<String>,
 
@@ -81,14 +80,16 @@ impl CampaignArgs {
         }
         let shard = self.shard.unwrap_or(Shard::WHOLE);
         if shard.of > plan.flights {
-            return Err(format!("--shard {shard}: there are only {} flights; use fewer parts", plan.flights).into());
+            return Err(
+                format!("--shard {shard}: the campaign has only {} flights; use fewer parts", plan.flights).into()
+            );
         }
         let name =
             if shard.of > 1 { format!("{}-{}-of-{}", plan.name, shard.index, shard.of) } else { plan.name.clone() };
         let (out, flights) = (self.place.path(&name), shard.count(plan.flights));
         let threads = useful(self.threads, flights);
         interrupt::ends_with(format!(
-            "stopped; finished flights are in {}, and the same command resumes",
+            "stopped; finished flights are in {}; run the same command to resume",
             out.display()
         ))?;
         let folder = CampaignFolder::open(&out, Manifest::new(&plan, shard), self.place.force)?;
@@ -127,7 +128,11 @@ impl CampaignArgs {
         scenario.name = format!("{}-{flight}", plan.name);
         let names: Vec<_> = scenario.contenders.iter().map(|contender| contender.name.clone()).collect();
         if let Some(unknown) = self.contenders.iter().find(|name| !names.contains(name)) {
-            return Err(format!("--contender {unknown}: not in the campaign; it has: {}", names.join(", ")).into());
+            return Err(format!(
+                "--contender {unknown}: the campaign has no such contender; its contenders are {}",
+                names.join(", ")
+            )
+            .into());
         }
         if !self.contenders.is_empty() {
             scenario.contenders.retain(|contender| self.contenders.contains(&contender.name));
@@ -141,7 +146,10 @@ impl CampaignArgs {
 }
 
 fn threads(text: &str) -> Result<u64, &'static str> {
-    text.parse().ok().filter(|threads| *threads > 0).ok_or("it must be a whole number from 1 on, such as 4")
+    text.parse()
+        .ok()
+        .filter(|threads| *threads > 0)
+        .ok_or("the number of threads must be a whole number from 1 on, such as 4")
 }
 
 /// Returns the number of threads: `wanted`, or else all cores, but at most the number of cores and of `flights`.
@@ -150,7 +158,7 @@ fn useful(wanted: Option<u64>, flights: u64) -> usize {
     let most = cores.min(flights);
     if let Some(wanted) = wanted.filter(|wanted| *wanted > most) {
         let why = if flights < cores { format!("{flights} flights") } else { format!("{cores} cores") };
-        say(&format!("--threads {wanted}: flying on {most}, since there are {why}; more would not be faster"));
+        say(&format!("--threads {wanted}: using only {most}, since there are {why}; more would not be faster"));
     }
     wanted.unwrap_or(most).min(most) as usize
 }
@@ -194,7 +202,7 @@ pub(crate) struct MergeArgs {
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
 
-    /// Write into the folder even if it holds something else; replaces files of the same names
+    /// Write into the folder even if the folder holds something else; replaces files of the same names
     #[arg(long)]
     force: bool,
 
@@ -205,7 +213,7 @@ pub(crate) struct MergeArgs {
 impl MergeArgs {
     /// Merges the parts, writes the results and prints a summary.
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
-        interrupt::ends_with("stopped; the same command starts again".into())?;
+        interrupt::ends_with("stopped; run the same command to start again".into())?;
         let (folder, summary) = campaign::merge(&self.shards, &self.out, self.force)?;
         conclude(&folder, &summary, whole(&self.shards), &summary.manifest.target(), self.json)
     }

@@ -18,33 +18,34 @@ use std::process::ExitCode;
 
 /// Fly every controller in every scenario, and compare them
 ///
-/// Without arguments: AFBC, AFBC as printed, and every other law in the built-in scenario `hardware`. With `--suite`:
-/// these, and AFBC under its monitor, in every flight of a suite, each on that flight's vehicle; one report, in
-/// out/suite. With `--suite random`: flights drawn from --seed, on all built-in vehicles or one; how the contenders
-/// stand is in out/random. With `--suite rough-estimate`: AFBC under its monitor, or one other, with sensors that do
-/// what it is not told; how good its estimate is stands in out/rough-estimate. A lost vehicle is part of the comparison
-/// and does not change the exit code.
+/// Without arguments, AFBC, AFBC as printed in the paper and every other law fly the built-in scenario `hardware`. With
+/// `--suite`, these laws and AFBC with its monitor fly every flight of a suite, each on that flight's vehicle; the
+/// report is in out/suite. With `--suite random`, they fly flights drawn from --seed, on all built-in vehicles or one;
+/// the ranking is in out/random. With `--suite rough-estimate`, AFBC with its monitor, or another law, flies with
+/// sensor errors that the estimator does not expect; the quality of the estimate is in out/rough-estimate. A lost
+/// vehicle is a result and does not change the exit code.
 #[derive(Args, Debug)]
 pub(crate) struct CompareArgs {
-    /// Built-in scenarios or scenario files; the contenders of all of them fly each one
+    /// Built-in scenarios or scenario files; each scenario is flown by the contenders of all these scenarios
     #[arg(value_name = "SCENARIO")]
     scenarios: Vec<TargetArg>,
 
-    /// Fly this suite instead: name of a built-in one (`sitl suites`), or path of a file
+    /// Fly this suite instead: name of a built-in suite (`sitl suites`), or path of a suite file
     #[arg(long, value_name = "SUITE", conflicts_with = "scenarios")]
     suite: Option<PathBuf>,
 
-    /// Contenders to fly instead, by name: those of the scenarios, any law (afbc, pid...), afbc-as-printed; with
-    /// `--suite` also afbc-monitored
+    /// Names of the contenders to fly instead: contenders of the scenarios, any law (afbc, pid...), or afbc-as-printed;
+    /// with `--suite` also afbc-monitored
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     controllers: Vec<String>,
 
-    /// Fly each scenario with this many consecutive seeds, from its own on; with `--suite random`, draw flights from
-    /// this many [default: 10, or 1 where no seed changes a flight; 1 for the suites random and rough-estimate]
+    /// Number of consecutive seeds with which each scenario is flown, beginning with the scenario's own; with `--suite
+    /// random`, number of seeds from which flights are drawn [default: 10, or 1 if a seed changes nothing; 1 for the
+    /// suites random and rough-estimate]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     seeds: Option<u64>,
 
-    /// Contender that the others are compared with [default: afbc, or else the first]
+    /// Contender with which the others are compared [default: afbc, or else the first]
     #[arg(long, value_name = "NAME")]
     against: Option<String>,
 
@@ -76,7 +77,7 @@ impl CompareArgs {
             if is_rough {
                 random.are_for(afbc_campaign::rough::NAME)?;
                 if against.is_some() {
-                    return Err("--against: --suite rough-estimate compares nobody; leave it out".into());
+                    return Err("--against: --suite rough-estimate compares no contenders; leave --against out".into());
                 }
                 return rough::run(&random, self.on.vehicle()?, &contenders, seeds.unwrap_or(1), &output);
             }
@@ -84,20 +85,24 @@ impl CompareArgs {
                 random.are_for(afbc_campaign::random::NAME)?;
                 if let Some(twice) = own.iter().find(|own| contenders.iter().any(|other| other.name == own.name)) {
                     let name = &twice.name;
-                    return Err(format!("--controllers {name}: --from has a contender of this name; rename it").into());
+                    return Err(format!(
+                        "--controllers {name}: --from has a contender of this name; rename that contender"
+                    )
+                    .into());
                 }
                 let against = against.as_deref().unwrap_or("afbc");
                 return random.run(self.on.vehicle()?, [&contenders, &own], seeds.unwrap_or(1), against, &output);
             }
             let suite = suite_at(path)?;
             if let Some(option) = self.on.vehicle()?.map(|_| "--vehicle").or_else(|| random.given()) {
-                let cure = "only --suite random takes it, or rough-estimate: this suite is a file; leave it out";
+                let cure = "this option needs --suite random or rough-estimate, but the suite is a file; leave the \
+                     option out";
                 return Err(format!("{option}: {cure}").into());
             }
             return suite::run(&suite, &contenders, seeds, against.as_deref(), &output);
         }
         if let Some(option) = self.random.given() {
-            return Err(format!("{option}: only --suite random takes it; leave it out").into());
+            return Err(format!("{option}: only --suite random has this option; leave {option} out").into());
         }
         let named = if self.scenarios.is_empty() { &[TargetArg::from("hardware")][..] } else { &self.scenarios };
         let mut scenarios = named.iter().map(TargetArg::scenario).collect::<Result<Vec<_>, _>>()?;

@@ -9,14 +9,15 @@ use clap::{Args, ValueEnum};
 use std::io;
 use std::path::PathBuf;
 
-/// Where the results of a comparison go.
+/// Output of a comparison's results.
 #[derive(Args, Debug)]
 pub(super) struct ComparisonOutputArgs {
     /// Write the suite's table into this page, between its two markers, and nothing else
     #[arg(long, value_name = "PAGE", requires = "suite", conflicts_with_all = ["json", "out", "force"])]
     pub(super) write: Option<PathBuf>,
 
-    /// Print the tables for a paper instead; the folder has both as tables.md and tables.tex
+    /// Print the tables for a paper in this format instead; the output folder has both formats, tables.md and
+    /// tables.tex
     #[arg(long, value_name = "FORMAT", conflicts_with_all = ["json", "write"])]
     pub(super) table: Option<TableFormatArg>,
 
@@ -30,9 +31,9 @@ pub(super) struct ComparisonOutputArgs {
 /// Format of `--table`.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum TableFormatArg {
-    /// For GitHub and the like
+    /// Markdown, for GitHub and similar pages
     Markdown,
-    /// With the package booktabs
+    /// LaTeX, with the package booktabs
     Latex,
 }
 

@@ -22,16 +22,16 @@ const QUIET_KB: u64 = 16 * 1024;
 /// Options of an exact replay.
 #[derive(Args, Debug)]
 pub(super) struct ExactReplayArgs {
-    /// The log is an exact log: run the firmware's own code over it, and compare every motor command
+    /// Replay an exact log: run the firmware's own code over the log, and compare every motor command
     #[arg(long)]
     pub(super) exact: bool,
 
-    /// Show what another setting would have commanded from the same inputs: a parameter as stations know it, or law and
-    /// the name of a law; may be repeated
+    /// Show the commands that another setting would have given for the same inputs: PARAMETER=VALUE, or law=NAME; may
+    /// be repeated
     #[arg(long = "change", value_name = "KEY=VALUE", requires = "exact")]
     changes: Vec<SettingChange>,
 
-    /// Vehicle that the log is of, if it is none of the built-in ones: path of its file
+    /// Path of the vehicle's file, if the log is not from a built-in vehicle
     #[arg(long, value_name = "VEHICLE", requires = "exact")]
     vehicle: Option<PathBuf>,
 }

@@ -40,10 +40,16 @@ impl FleetArgs<'_> {
         };
         for (index, vehicle) in vehicles.iter().enumerate() {
             if vehicles.iter().take(index).any(|other| other.name == vehicle.name) {
-                return Err(format!("--vehicle {}: named twice; name it once", vehicle.name.escape_debug()).into());
+                return Err(format!(
+                    "--vehicle {}: the vehicle is named twice; name it once",
+                    vehicle.name.escape_debug()
+                )
+                .into());
             }
             if vehicle.name.contains(['/', '\\']) || vehicle.name.starts_with('.') {
-                return Err(format!("{}: no name for a file; change it", vehicle.name.escape_debug()).into());
+                return Err(
+                    format!("{}: the name cannot be a file name; change it", vehicle.name.escape_debug()).into()
+                );
             }
         }
         // Checked before the search, which takes hours.
@@ -69,24 +75,32 @@ impl FleetArgs<'_> {
         let outcomes = results.complete(&searches, &stop, |tries| progress.add(tries as u64))?;
         drop(progress);
         let Some(outcomes) = outcomes else {
-            say(&format!("stopped; finished searches are kept in {}, the same command goes on", self.folder.display()));
+            say(&format!(
+                "stopped; finished searches are kept in {}; run the same command to resume",
+                self.folder.display()
+            ));
             return Ok(ExitCode::from(INTERRUPTED));
         };
         results.write_gains(&outcomes)?;
         let mut text = table(&outcomes);
-        let _ = writeln!(text, "\ngains of each vehicle in {}", self.folder.join(GAINS).display());
+        let _ = writeln!(text, "\nthe gains of each vehicle are in {}", self.folder.join(GAINS).display());
         if let Some(folder) = self.write {
             for vehicle in &vehicles {
                 if is_paper(vehicle) {
-                    let _ = writeln!(text, "{}: not written, its gains are those of the profile", vehicle.name);
+                    let _ = writeln!(
+                        text,
+                        "{}: not written, since the vehicle flies with the profile's gains",
+                        vehicle.name
+                    );
                     continue;
                 }
                 let (path, whole) = with_gains(folder, &vehicle.name, &results.gains_of(&vehicle.name, &outcomes))?;
                 // The new file is parsed first, so that no file that cannot fly is written.
                 let read = afbc_vehicles::parse(&path.display().to_string(), &whole, &vehicle.name)?;
                 Law::on(ControllerKind::Afbc, &read, afbc::Profile::Flight)?;
-                afbc_files::write_atomically(&path, |out| out.write_all(whole.as_bytes()))
-                    .map_err(|source| format!("{}: cannot be written ({source}); make it writable", path.display()))?;
+                afbc_files::write_atomically(&path, |out| out.write_all(whole.as_bytes())).map_err(|source| {
+                    format!("{}: the file cannot be written ({source}); make it writable", path.display())
+                })?;
                 let _ = writeln!(text, "{}: written", path.display());
             }
         }
@@ -119,7 +133,10 @@ fn laws(names: &[String]) -> Result<Vec<ControllerKind>, CommandError> {
 fn with_gains(folder: &Path, vehicle: &str, gains: &str) -> Result<(PathBuf, String), CommandError> {
     let path = folder.join(format!("{vehicle}.toml"));
     let text = std::fs::read_to_string(&path).map_err(|error| {
-        format!("{}: cannot be read ({error}); --write takes the folder of the vehicles' files", path.display())
+        format!(
+            "{}: the folder cannot be read ({error}); --write needs the folder of the vehicles' files",
+            path.display()
+        )
     })?;
     let whole = replaced(&text, gains).map_err(|problem| format!("{}: {problem}", path.display()))?;
     Ok((path, whole))
@@ -133,10 +150,14 @@ fn replaced(text: &str, gains: &str) -> Result<String, String> {
             Some((_, after)) => (before, after.trim_start_matches('\n')),
             None => return Err("the line that ends the gains stands before the one that begins them".into()),
         },
-        _ => return Err("only one of the two lines between which the gains stand; delete it with them".into()),
+        _ => {
+            return Err(
+                "only one of the two lines that enclose the gains is there; delete that line and the gains".into()
+            );
+        }
     };
     if [before, after].iter().any(|text| text.lines().any(|line| line.trim_start().starts_with("[gains"))) {
-        return Err("[gains] of its own beside those of `sitl tune --fleet`; delete them".into());
+        return Err("the file has [gains] of its own beside those of `sitl tune --fleet`; delete its own".into());
     }
     let after = if after.is_empty() { String::new() } else { format!("\n{after}") };
     Ok(format!("{}\n\n{BEGIN}\n{}\n{END}\n{after}", before.trim_end(), gains.trim_end()))

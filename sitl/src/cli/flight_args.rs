@@ -24,16 +24,17 @@ pub(crate) struct FlightArgs {
     #[arg(long, value_name = "SECONDS", value_parser = duration)]
     pub(crate) duration: Option<f64>,
 
-    /// Log rows per second, a divisor of 1000; rounded to whole numbers of control steps [default: 100; less for more
-    /// than 10
-    /// minutes]
+    /// Log rows per second, a divisor of 1000; rounded to whole numbers of control steps [default: 100; less for
+    /// flights over 10 minutes]
     #[arg(long, value_name = "HZ")]
     pub(crate) log_hz: Option<LogRate>,
 }
 
 fn duration(text: &str) -> Result<f64, String> {
-    let seconds = text.parse().map_err(|_| "it must be a number of seconds".to_owned())?;
-    DURATION.check(seconds).map_err(|_| format!("it must lie within {} to {} seconds", DURATION.min, DURATION.max))?;
+    let seconds = text.parse().map_err(|_| "the time must be a number of seconds".to_owned())?;
+    DURATION
+        .check(seconds)
+        .map_err(|_| format!("the time must lie within {} to {} seconds", DURATION.min, DURATION.max))?;
     Ok(seconds)
 }
 

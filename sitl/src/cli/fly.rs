@@ -16,9 +16,9 @@ use std::process::ExitCode;
 
 /// Fly a built-in scenario or a scenario file; exits with 1 if a vehicle is lost
 ///
-/// A plan of QGroundControl, a file that ends in `.plan`, is flown by the firmware's own code as `sitl serve` flies,
-/// outdoors in a breeze, from its planned home on: mission, geofence and rally points, for an hour at most. Of the
-/// options then --vehicle, --duration, --exact-log, --ulog and --mcap apply. It exits with 1 if the mission is not
+/// A plan of QGroundControl, a file that ends in `.plan`, flies as in `sitl serve`: the firmware's own code flies the
+/// mission, geofence and rally points outdoors in a breeze, from the planned home on, for an hour at most. Only the
+/// options --vehicle, --duration, --exact-log, --ulog and --mcap apply to a plan. Exits with 1 if the mission is not
 /// completed.
 #[derive(Args, Debug)]
 pub(crate) struct FlyArgs {
@@ -30,17 +30,18 @@ pub(crate) struct FlyArgs {
     #[arg(long = "controller", value_name = "NAME")]
     controllers: Vec<String>,
 
-    /// Also fly it by the firmware's own code, as `sitl pil` does, under the first of the controllers, and keep the
-    /// exact log of that flight, for `sitl replay --exact`, in this file, which must not exist
+    /// Also fly the scenario with the firmware's own code, as in `sitl pil`, with the first of the controllers, and
+    /// write the exact log of that flight to this new file, for `sitl replay --exact`
     #[arg(long, value_name = "FILE")]
     exact_log: Option<PathBuf>,
 
-    /// The same for the black box: PX4's ULog of that flight, for PX4's tools and `sitl replay`, in this file, which
-    /// must not exist
+    /// Also fly the scenario with the firmware's own code, and write the black box of that flight to this new file:
+    /// PX4's ULog, for PX4's tools and `sitl replay`
     #[arg(long, value_name = "FILE")]
     ulog: Option<PathBuf>,
 
-    /// The same as MCAP, for Foxglove, PlotJuggler and ROS 2's tools, in this file, which must not exist
+    /// Also fly the scenario with the firmware's own code, and write the black box to this new file as MCAP, for
+    /// Foxglove, PlotJuggler and ROS 2's tools
     #[arg(long, value_name = "FILE")]
     mcap: Option<PathBuf>,
 

@@ -27,11 +27,11 @@ pub(crate) struct HitlArgs {
     #[arg(long, value_name = "DEVICE", required_unless_present = "list")]
     port: Option<String>,
 
-    /// Baud rate of the port; the firmware's is 460800, unless its parameter SER_TEL1_BAUD says another
+    /// Baud rate of the port; the firmware uses 460800, unless its parameter SER_TEL1_BAUD sets another rate
     #[arg(long, value_name = "N", default_value_t = BAUD)]
     baud: u32,
 
-    /// List the serial ports instead
+    /// Only list the serial ports
     #[arg(long)]
     list: bool,
 

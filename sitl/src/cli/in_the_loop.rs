@@ -29,7 +29,7 @@ pub(crate) struct InTheLoopArgs {
     #[command(flatten)]
     pub(super) on: VehicleArgs,
 
-    /// Log the flight to this CSV file, which must not exist, 100 rows per second
+    /// Log the flight to this new CSV file, 100 rows per second
     #[arg(long, value_name = "CSV")]
     out: Option<PathBuf>,
 }

@@ -8,7 +8,7 @@ use std::io;
 /// Option of every command with a JSON output.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct JsonArgs {
-    /// Print JSON instead, as docs/json.md describes it
+    /// Print JSON instead; docs/json.md describes the format
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -148,7 +148,8 @@ pub(super) fn read(path: &Path) -> Result<ResultsManifest, CommandError> {
     let name = path.display();
     let cure = "name the manifest.json of a folder of results";
     let bytes = fs::read(&path).map_err(|error| format!("{name}: cannot be read ({error}); {cure}"))?;
-    let damaged = |problem: &dyn std::fmt::Display| format!("{name}: damaged or no manifest ({problem}); {cure}");
+    let damaged =
+        |problem: &dyn std::fmt::Display| format!("{name}: the file is damaged or no manifest ({problem}); {cure}");
     seal::verify(&mut io::Cursor::new(&bytes)).map_err(|error| damaged(&error))?;
     let manifest: ResultsManifest = serde_json::from_slice(&bytes).map_err(|error| damaged(&error))?;
     // A manifest from somebody else must not name files outside its folder.

@@ -9,13 +9,13 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Convert a ULog, of --ulog or of PX4, to MCAP, for Foxglove, PlotJuggler, Rerun and ROS 2's tools
+/// Convert a ULog, from --ulog or PX4, to MCAP, for Foxglove, PlotJuggler, Rerun and ROS 2's tools
 #[derive(Args, Debug)]
 pub(crate) struct McapArgs {
     /// Path of the log
     log: PathBuf,
 
-    /// File to write, which must not exist [default: the log's name with .mcap, in the current folder]
+    /// New file to write [default: the log's name with .mcap, in the current folder]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -38,7 +38,7 @@ fn converted(log: &Path, output: &OutputFile) -> Result<String, CommandError> {
     output.write(|out| out.write_all(&bytes))?;
     let damaged = match summary.damaged {
         0 => String::new(),
-        pieces => format!("; {pieces} pieces of the log are damaged, and missing"),
+        pieces => format!("; {pieces} pieces of the log are damaged, and left out"),
     };
     let path = output.path().display();
     Ok(format!("{path}: MCAP, {} messages of {} topics{damaged}", summary.messages, summary.topics))

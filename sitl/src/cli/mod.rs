@@ -85,8 +85,8 @@ use terminal::CommandError;
 
 /// Flies an adaptive fuzzy backstepping (AFBC) quadrotor controller and other controllers in simulation.
 ///
-/// Without a command, `sitl` is `sitl paper`: it flies the experiment of Yacef, Bouhali and Hamerlain, prints the
-/// results of both laws and writes logs, figures and a report.
+/// Without a command, `sitl` runs `sitl paper`: it flies the experiment of Yacef, Bouhali and Hamerlain, prints the
+/// results of both laws, and writes logs, figures and a report.
 #[derive(Debug, Parser)]
 #[command(version, args_conflicts_with_subcommands = true, max_term_width = 110)]
 #[command(

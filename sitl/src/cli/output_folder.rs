@@ -9,12 +9,12 @@ use std::path::{Path, PathBuf};
 /// Options of every command with an output folder.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct OutputFolderArgs {
-    /// Output folder [default: out/ and the name of the scenario, campaign or command]
+    /// Output folder [default: out/NAME, with the name of the scenario, campaign or command]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
-    /// Write into the folder even if it holds something else, such as results of the same command with other options;
-    /// replaces files of the same names
+    /// Write into the folder even if the folder holds something else, such as results of the same command with other
+    /// options; replaces files of the same names
     #[arg(long)]
     pub(crate) force: bool,
 }

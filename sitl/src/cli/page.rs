@@ -18,7 +18,7 @@ pub(crate) fn write(
         let page = fs::read_to_string(path).map_err(|error| format!("{name}: cannot be read ({error})"))?;
         let Some((before, _, after)) = markers::parts(&page, markers) else {
             let [begin, end] = markers;
-            return Err(format!("{name}: no place for the table; add the lines {begin} and {end}"));
+            return Err(format!("{name}: the page has no place for the table; add the lines {begin} and {end}"));
         };
         Ok(format!("{before}{table}{after}"))
     };

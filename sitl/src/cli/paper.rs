@@ -13,22 +13,22 @@ use afbc_sim::flown::ScenarioFlight;
 use clap::{Args, ValueEnum};
 use std::process::ExitCode;
 
-/// Fly the paper's experiment under both laws and check its three claims
+/// Fly the paper's experiment with both laws, and check the paper's three claims
 ///
-/// The paper does not define its gusts of "1.2 N" or the signs of its uncertain parameters; both can be chosen. Exits
-/// with 0 even if the `forces` reading loses the vehicle, as is known; any other loss gives 1.
+/// The paper does not define its gusts of "1.2 N" or the signs of its uncertain parameters; choose both by options. The
+/// reading `forces` is known to lose the vehicle and exits with 0; any other loss exits with 1.
 #[derive(Args, Debug)]
 pub(crate) struct PaperArgs {
-    /// Reading of the gusts
+    /// Interpretation of the paper's gusts
     #[arg(long, value_enum, default_value = "persistent")]
     reading: GustReadingArg,
 
     #[arg(long, value_enum, value_name = "SIGN", default_value = "+", hide_possible_values = true)]
-    #[arg(help = "Sign of the inertia's error of 75 % from 20 s to 40 s: +, - or both")]
+    #[arg(help = "Sign of the 75 % error of the inertia from 20 s to 40 s: +, - or both")]
     inertia: SignsArg,
 
     #[arg(long, value_enum, value_name = "SIGN", default_value = "-", hide_possible_values = true)]
-    #[arg(help = "Sign of the thrust factor's error of 40 % from 20 s to 40 s: +, - or both")]
+    #[arg(help = "Sign of the 40 % error of the thrust factor from 20 s to 40 s: +, - or both")]
     thrust: SignsArg,
 
     /// Fly with nominal parameters
@@ -59,7 +59,7 @@ enum GustReadingArg {
     Forces,
     /// No gusts
     None,
-    /// The first three in turn
+    /// The three readings above, one after another
     All,
 }
 

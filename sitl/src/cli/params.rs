@@ -29,24 +29,25 @@ enum ParamsAction {
     Export {
         #[command(flatten)]
         of: ParameterSourceArgs,
-        /// File to write; by its name .parm is MAVProxy's, anything else QGroundControl's [default: standard output]
+        /// File to write; the ending .parm selects MAVProxy's format, any other QGroundControl's [default: standard
+        /// output]
         #[arg(long, short, value_name = "FILE")]
         out: Option<PathBuf>,
-        /// Replace the file if it is there
+        /// Replace an existing file
         #[arg(long, requires = "out")]
         force: bool,
-        /// Format, whatever the file's name
+        /// Format, regardless of the file's name
         #[arg(long, value_enum)]
         format: Option<ParameterFormatArg>,
     },
-    /// Put the values of a file into a store, which is made if there is none; all of them, or none if one is refused
+    /// Put the values of a file into a store, which is created if missing; if one value is refused, none is stored
     Import {
         /// File of parameters, in either format
         file: PathBuf,
         #[command(flatten)]
         of: ParameterSourceArgs,
     },
-    /// Print what differs from the vehicle's defaults: in a file of parameters, or in the store
+    /// Print the parameters that differ from the vehicle's defaults, in a parameter file or in the store
     Diff {
         /// File of parameters, in either format
         file: Option<PathBuf>,
@@ -58,10 +59,10 @@ enum ParamsAction {
 /// Whose parameters.
 #[derive(Args, Clone, Debug)]
 struct ParameterSourceArgs {
-    /// Vehicle: name of a built-in one, or path of a file
+    /// Name of a built-in vehicle, or path of a vehicle file
     #[arg(long, value_name = "VEHICLE", default_value = "paper")]
     vehicle: PathBuf,
-    /// Store of the vehicle's parameters, a file
+    /// File with the store of the vehicle's parameters
     #[arg(long, value_name = "FILE")]
     store: Option<PathBuf>,
 }
@@ -105,7 +106,7 @@ fn act(action: &ParamsAction, vehicle: &Vehicle) -> Result<(), CommandError> {
             }
         }
         ParamsAction::Import { file, of } => {
-            let Some(path) = &of.store else { return Err("--store: missing; name the file to import into".into()) };
+            let Some(path) = &of.store else { return Err("--store is missing; name the file to import into".into()) };
             // First on a copy of the table, so that a rejected file neither creates nor changes a store.
             let changes = take(&mut table.clone(), file)?;
             let mut store = open(path, vehicle, FlashFile::open)?;
@@ -181,7 +182,9 @@ fn take(table: &mut ParameterTable, file: &Path) -> Result<Vec<RecordName>, Comm
         table.put(known, value).map_err(|reason| FileError::at(source, at, "", reason.as_str()))?;
         names.push(known);
     }
-    table.check().map_err(|error| FileError::whole(&shown, format!("{}; it could not fly", out_of_range(&error))))?;
+    table
+        .check()
+        .map_err(|error| FileError::whole(&shown, format!("{}; the vehicle could not fly", out_of_range(&error))))?;
     Ok(names)
 }
 

@@ -39,7 +39,7 @@ impl PlanFlight {
         if let Some((place, altitude_m)) = plan.home
             && !vehicle.move_origin(place, altitude_m.unwrap_or(0.0))
         {
-            return Err(format!("{file}: plannedHomePosition: it is at a pole; plan elsewhere").into());
+            return Err(format!("{file}: plannedHomePosition: the home is at a pole; plan elsewhere").into());
         }
         let mcap = FlightMcap::plan(self.mcap, &mut self.ulog)?;
         interrupt::ends_it()?;
@@ -55,13 +55,13 @@ impl PlanFlight {
         let converted = mcap.map(FlightMcap::finish);
         let end = end.map_err(|problem| format!("{file}: {problem}"))?;
         let how = match (end.complete || end.reached.contains(&last(&plan)), end.disarmed) {
-            (true, _) if end.fell => "not landed: it has fallen after its last item",
-            (false, _) if end.fell => "not complete: it has fallen",
+            (true, _) if end.fell => "not landed: the vehicle has fallen after its last item",
+            (false, _) if end.fell => "not complete: the vehicle has fallen",
             (true, true) => "complete, on the ground",
             (true, false) => "complete, in hold",
-            (false, true) => "not complete: it has landed",
-            (false, false) if end.stopped => "not complete: stopped, in hold",
-            (false, false) => "not complete within the time; give it more by --duration",
+            (false, true) => "not complete: the vehicle has landed",
+            (false, false) if end.stopped => "not complete: the vehicle has stopped, in hold",
+            (false, false) => "not complete in time; give more time by --duration",
         };
         let (items, reached) = (plan.mission.len(), end.reached.len());
         let fence = plan.fence.len();

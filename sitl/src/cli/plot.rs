@@ -16,20 +16,20 @@ const POINT_MM: f64 = INCH_MM / 72.0;
 
 /// Draw a figure for a paper from logs: CSV, Parquet, ULog or MCAP
 ///
-/// A panel for each --y, over time or --x. Logs of the same name are seeds of one law: the figure shows their median
-/// and a band around it, and so it does for a campaign's results.parquet, over any quantity that it draws. See
+/// Draws a panel for each --y, over time or --x. Logs of the same name count as seeds of one law: the figure shows
+/// their median with a band. A campaign's results.parquet gives median and band over any drawn quantity. See
 /// docs/papers.md.
 #[derive(Args, Debug)]
 pub(crate) struct PlotArgs {
-    /// Logs, each with its name for the legend before an equals sign [default: the file's name]
+    /// Logs, as FILE or NAME=FILE; NAME is for the legend [default: the file's name]
     #[arg(required = true, value_name = "[NAME=]FILE")]
     logs: Vec<String>,
 
-    /// Columns of a panel; once for each panel. Of ULog and MCAP, topic.field
+    /// Columns of a panel; give --y once for each panel. For ULog and MCAP, write topic.field
     #[arg(long, required = true, value_name = "COLUMN,...")]
     y: Vec<String>,
 
-    /// Column that they are drawn over [default: the time]
+    /// Column for the x-axis [default: the time]
     #[arg(long, value_name = "COLUMN")]
     x: Option<String>,
 
@@ -37,7 +37,7 @@ pub(crate) struct PlotArgs {
     #[arg(long, value_name = "FILE", default_value = "figure.pdf")]
     out: PathBuf,
 
-    /// Replace the file if it is there
+    /// Replace an existing file
     #[arg(long)]
     force: bool,
 
@@ -49,19 +49,19 @@ pub(crate) struct PlotArgs {
     #[arg(long, value_name = "LENGTH", default_value = "34mm", value_parser = length)]
     height: f64,
 
-    /// Size of the type
+    /// Font size
     #[arg(long, value_name = "LENGTH", default_value = "8pt", value_parser = length)]
     font: f64,
 
-    /// Width of the lines
+    /// Line width
     #[arg(long, value_name = "LENGTH", default_value = "0.9pt", value_parser = length)]
     line: f64,
 
-    /// Pixels to the inch of a .png
+    /// Pixels per inch of a .png
     #[arg(long, value_name = "N", default_value = "300", value_parser = clap::value_parser!(u32).range(30..=2400))]
     dpi: u32,
 
-    /// Share of the seeds, or of a campaign's rows, within the band, in percent
+    /// Percentage of the seeds, or of a campaign's rows, within the band
     #[arg(long, value_name = "PERCENT", default_value = "80", value_parser = percent)]
     band: f64,
 
@@ -81,7 +81,7 @@ pub(crate) struct PlotArgs {
     #[arg(long, value_name = "TEXT")]
     x_title: Option<String>,
 
-    /// Title of a panel's y-axis, in the order of --y [default: likewise]
+    /// Title of a panel's y-axis, in the order of --y [default: the columns' names, with their unit]
     #[arg(long, value_name = "TEXT")]
     y_title: Vec<String>,
 }
@@ -92,11 +92,14 @@ fn length(text: &str) -> Result<f64, String> {
     let number = units.iter().find_map(|(unit, mm)| Some(text.strip_suffix(unit)?.trim().parse::<f64>().ok()? * mm));
     number
         .filter(|mm| (0.01..=2000.0).contains(mm))
-        .ok_or_else(|| "it must be a length up to 2000 mm, such as 88mm, 3.5in or 8pt".into())
+        .ok_or_else(|| "a length must be at most 2000 mm, such as 88mm, 3.5in or 8pt".into())
 }
 
 fn percent(text: &str) -> Result<f64, &'static str> {
-    text.parse().ok().filter(|percent| (0.0..=100.0).contains(percent)).ok_or("it must be from 0 to 100, such as 80")
+    text.parse()
+        .ok()
+        .filter(|percent| (0.0..=100.0).contains(percent))
+        .ok_or("the percentage must be from 0 to 100, such as 80")
 }
 
 /// Log and its name in the legend.
@@ -119,7 +122,7 @@ impl PlotArgs {
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let out = self.out.display();
         let Some(format) = FigureFormat::of(&self.out, self.dpi.into()) else {
-            return Err(format!("--out {out}: the end of the name says the format; use .pdf, .svg or .png").into());
+            return Err(format!("--out {out}: the name's ending selects the format; use .pdf, .svg or .png").into());
         };
         let output = OutputFile::forcible(&self.out, "--out", self.force)?;
         let logs = self.logs()?;

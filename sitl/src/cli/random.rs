@@ -21,30 +21,30 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Description of the suite, in one line.
-pub(super) const DESCRIPTION: &str = "drawn from --seed: paths, speeds, wind, payloads, faults, on every vehicle";
+pub(super) const DESCRIPTION: &str = "drawn from --seed: paths, speeds, wind, payloads and faults, on every vehicle";
 
 /// Options of the suite.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Options of `--suite random` and `--suite rough-estimate`")]
 pub(super) struct RandomArgs {
-    /// First seed that flights are drawn from; --seeds takes those after it, too [default: 1]
+    /// First seed from which flights are drawn; --seeds sets the number of consecutive seeds [default: 1]
     #[arg(long, value_name = "N", requires = "suite", value_parser = clap::value_parser!(u64).range(..1 << 53))]
     pub(super) seed: Option<u64>,
 
-    /// Number of flights of each vehicle and seed, and class of rough-estimate [default: 12; 1 for rough-estimate]
+    /// Number of flights per vehicle and seed; for rough-estimate, also per class [default: 12; 1 for rough-estimate]
     #[arg(long, value_name = "K", requires = "suite", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     pub(super) flights: Option<u64>,
 
-    /// Length of every flight of rough-estimate [s] [default: 60, one in ten 600]
+    /// Length of every flight of rough-estimate [s] [default: 60, and 600 for one flight in ten]
     #[arg(long, value_name = "S", requires = "suite", value_parser = duration)]
     pub(super) duration: Option<f64>,
 
-    /// Fly on the vehicle's own estimate, by the instruments of this built-in scenario, instead of the truth
+    /// Fly on the vehicle's own estimate instead of the true state, with the instruments of this built-in scenario
     #[arg(long, value_name = "SCENARIO", requires = "suite", num_args = 0..=1, default_missing_value = "mocap")]
     on_estimate: Option<InstrumentsArg>,
 
-    /// Fly the contenders of this scenario, with their own gains scaled by rule to each vehicle; laws only if named by
-    /// --controllers
+    /// Fly the contenders of this scenario, with their gains scaled by rule to each vehicle; laws only fly if
+    /// --controllers names them
     #[arg(long, value_name = "SCENARIO", requires = "suite")]
     from: Option<TargetArg>,
 }
@@ -61,7 +61,7 @@ enum InstrumentsArg {
 fn duration(text: &str) -> Result<f64, String> {
     let range = afbc_scenario::DURATION;
     let seconds = text.parse().ok().filter(|seconds: &f64| range.check(*seconds).is_ok());
-    seconds.ok_or_else(|| format!("it must lie within {} to {} seconds", range.min, range.max))
+    seconds.ok_or_else(|| format!("the time must lie within {} to {} seconds", range.min, range.max))
 }
 
 /// True if `path` is the name of this suite.
@@ -96,7 +96,9 @@ impl RandomArgs {
             (self.from.is_some(), "--from", NAME),
         ];
         match all.into_iter().find(|(given, _, of)| *given && *of != name) {
-            Some((_, option, of)) => Err(format!("{option}: only --suite {of} takes it; leave it out").into()),
+            Some((_, option, of)) => {
+                Err(format!("{option}: only --suite {of} has this option; leave {option} out").into())
+            }
             None => Ok(()),
         }
     }

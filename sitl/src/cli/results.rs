@@ -11,10 +11,10 @@ use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Fly the paper's experiment in every reading and print the results as a Markdown table
+/// Fly the paper's experiment in every interpretation, and print the results as a Markdown table
 #[derive(Args, Debug)]
 pub(crate) struct ResultsArgs {
-    /// Write the table into this page instead, between its two markers
+    /// Write the table into this page instead, between the page's two markers
     #[arg(long, value_name = "PAGE", conflicts_with = "json")]
     write: Option<PathBuf>,
 

@@ -16,7 +16,8 @@ use std::path::Path;
 use std::process::ExitCode;
 
 /// Description of the suite, in one line.
-pub(super) const DESCRIPTION: &str = "drawn from --seed: sensors that do what no vehicle is told, on every vehicle";
+pub(super) const DESCRIPTION: &str =
+    "drawn from --seed, with sensor errors that the estimator does not expect, on every vehicle";
 
 /// True if `path` is the name of this suite.
 pub(super) fn is_named(path: &Path) -> bool {
@@ -37,7 +38,7 @@ pub(super) fn run(
     output: &ComparisonOutputArgs,
 ) -> Result<ExitCode, CommandError> {
     let [contender] = contenders else {
-        return Err("--controllers: the estimate of one law at a time is judged; name one".into());
+        return Err("--controllers: this suite judges the estimate with one law at a time; name one law".into());
     };
     let seed = options.seed.unwrap_or(1);
     let rough = RoughFlights {

@@ -57,12 +57,12 @@ pub(crate) struct CheckArgs {
     /// Name of a built-in scenario, campaign or vehicle, or path of a file
     scenario: TargetArg,
 
-    /// Also write the polynomials of a scenario's minimum-snap path, or of a path from a file, into this file, as the
-    /// Crazyflie's tools do
+    /// Also write the polynomials of the scenario's path to this file, in the format of the Crazyflie's tools; the path
+    /// must be minimum-snap or from a file
     #[arg(long, value_name = "FILE")]
     polynomials: Option<PathBuf>,
 
-    /// Replace the file of --polynomials if it is there
+    /// Replace an existing file of --polynomials
     #[arg(long, requires = "polynomials")]
     force: bool,
 
@@ -76,7 +76,7 @@ impl CheckArgs {
         if let Some(path) = self.polynomials {
             let scenario = self.scenario.scenario()?;
             let Trajectory::Polynomials(pieces) = &scenario.trajectory else {
-                let cure = "a trajectory of kind \"minimum-snap\" or \"file\" has some";
+                let cure = "only a trajectory of kind \"minimum-snap\" or \"file\" has polynomials";
                 return Err(format!("--polynomials: {} has none; {cure}", scenario.name).into());
             };
             let text = polynomial::written(pieces);

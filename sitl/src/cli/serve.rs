@@ -25,26 +25,26 @@ const MOST: i64 = VEHICLES_MAX as i64;
 
 /// Serve a simulated vehicle to ground stations and companion computers, by MAVLink
 ///
-/// It stands on the ground, outdoors in a breeze, until somebody arms and flies it. The firmware's own code flies it,
-/// on its own sensors. Lines on stdin change weather and faults; `help` lists them. See docs/serve.md.
+/// The vehicle stands on the ground, outdoors in a breeze, until somebody arms it. The firmware's own code flies it
+/// with simulated sensors. Lines on stdin change weather and faults; `help` lists them. See docs/serve.md.
 #[derive(Args, Debug)]
 pub(crate) struct ServeArgs {
-    /// Name of a built-in scenario, or path of a scenario file: place, weather, instruments and faults come from it
+    /// Name of a built-in scenario, or path of a scenario file, which sets place, weather, instruments and faults
     #[arg(long, value_name = "SCENARIO", default_value = "outdoor")]
     scenario: TargetArg,
 
-    /// Indoors, with a motion-capture system: --scenario mocap
+    /// Fly indoors with a motion-capture system; the same as --scenario mocap
     #[arg(long, conflicts_with = "scenario")]
     indoors: bool,
 
     #[command(flatten)]
     on: VehicleArgs,
 
-    /// Number of vehicles, side by side
+    /// Number of vehicles, which stand side by side
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u8).range(1..=MOST))]
     vehicles: u8,
 
-    /// MAVLink system id of the first vehicle, unless its parameters say another (MAV_SYS_ID); the others count up
+    /// MAVLink system id of the first vehicle, unless its parameter MAV_SYS_ID sets another; further vehicles count up
     #[arg(long, value_name = "ID", default_value_t = 1, value_parser = value_parser!(u8).range(1..=150))]
     system: u8,
 
@@ -52,68 +52,67 @@ pub(crate) struct ServeArgs {
     #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(0..=1_000_000_000))]
     seed: Option<u64>,
 
-    /// Address of this machine to serve at; 0.0.0.0 for whoever reaches it, without any protection
+    /// Address of this machine to serve at; 0.0.0.0 serves everybody on the network, without any protection
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
     bind: IpAddr,
 
-    /// UDP port of the first vehicle; the others count up; 0 for any free one
+    /// UDP port of the first vehicle; further vehicles count up; 0 for any free port
     #[arg(long, value_name = "PORT", default_value_t = Addresses::default().udp)]
     port: u16,
 
-    /// Serve by TCP too, at 5760 for the first vehicle and every tenth port after it, or from this port on
+    /// Also serve by TCP, from this port on, or from 5760 if no port is given; each further vehicle is 10 ports higher
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "5760")]
     tcp: Option<u16>,
 
-    /// Where ground stations listen: gets heartbeats unasked; `none` for nobody; may be repeated
+    /// Address at which a ground station listens for heartbeats; `none` for no address; may be repeated
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:14550")]
     station: Vec<String>,
 
-    /// Where the first vehicle's companion computer listens; the others' ports count up; `none` for nobody; may be
-    /// repeated
+    /// Address at which the first vehicle's companion computer listens; ports of further vehicles count up; `none` for
+    /// no address; may be repeated
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:14540")]
     companion: Vec<String>,
 
-    /// Keep the parameters in this file, which is made if there is none; of several vehicles each has its own, which
-    /// ends in its system id
+    /// Keep the parameters in this file, which is created if missing; with several vehicles, each has a file that ends
+    /// in its system id
     #[arg(long, value_name = "FILE")]
     parameters: Option<PathBuf>,
 
-    /// Keep the exact log, for `sitl replay --exact`, in this file, which must not exist; of several vehicles each has
-    /// its own, which ends in its system id
+    /// Write the exact log to this new file, for `sitl replay --exact`; with several vehicles, each has a file that
+    /// ends in its system id
     #[arg(long, value_name = "FILE")]
     exact_log: Option<PathBuf>,
 
-    /// Keep the black box, PX4's ULog, in this file, which must not exist; of several vehicles each has its own, with
-    /// its system id before the extension; after a restart in another one, with the number of the start. In a folder,
-    /// each start has the next file, log001.ulg and so on; of several vehicles each has a folder in it. Stations
-    /// download them
+    /// Write the black box, PX4's ULog, to this new file. Several vehicles have a file each, with the system id before
+    /// the extension, and a restart begins another file, with the number of the start. If a folder is given, each start
+    /// writes the next file, log001.ulg and so on, in a folder for each of several vehicles, and stations can download
+    /// the logs
     #[arg(long, value_name = "FILE|FOLDER")]
     ulog: Option<PathBuf>,
 
-    /// Serve a page to watch the first vehicle in a browser and to command it, at this address of this machine; any
-    /// other than 127.0.0.1 needs a token, which is printed unless --web-token gives one
+    /// Serve a page at this address of this machine, to watch and command the first vehicle in a browser; any address
+    /// but 127.0.0.1 needs a token, which is printed unless --web-token sets one
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8590",
         value_parser = web_address)]
     web: Option<SocketAddr>,
 
-    /// Clients of the page must tell the token in this file
+    /// File with the token that browsers must send
     #[arg(long, value_name = "FILE", requires = "web")]
     web_token: Option<PathBuf>,
 
-    /// Times real time; 0 for as fast as possible
+    /// Speed of time relative to real time; 0 for as fast as possible
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed, allow_negative_numbers = true)]
     speed: f64,
 
-    /// As fast as possible: --speed 0
+    /// Run as fast as possible; the same as --speed 0
     #[arg(long, conflicts_with = "speed")]
     fast: bool,
 
-    /// Time stands still; `step N` on stdin lets N milliseconds go by, after what has arrived until then, and answers
-    /// when they are over
+    /// Let time stand still; `step N` on stdin takes in what has arrived, lets N milliseconds pass, and then answers
     #[arg(long, conflicts_with_all = ["speed", "fast"])]
     lockstep: bool,
 
-    /// A line as on stdin, before it starts, as in --do 'at 20 wind 5 0 0'; may be repeated
+    /// Command line as on stdin, run before the start, as in --do 'at 20 wind 5 0 0'; may be repeated
     #[arg(long = "do", value_name = "LINE")]
     lines: Vec<String>,
 }
@@ -149,9 +148,10 @@ impl ServeArgs {
                 return Err(format!("--do '{line}': {problem}").into());
             }
             if reply.action != ServerAction::Nothing {
-                return Err(
-                    format!("--do '{line}': it has no effect before the start; add a time, as in 'at 60 ...'").into()
-                );
+                return Err(format!(
+                    "--do '{line}': this command has no effect before the start; add a time, as in 'at 60 ...'"
+                )
+                .into());
             }
         }
         let addresses = self.addresses()?;
@@ -237,7 +237,7 @@ impl ServeArgs {
     /// Creates the file of a black box.
     fn black_box(&self, path: &Path) -> Result<UlogFiles, String> {
         if self.ulog.as_ref().is_some_and(|ulog| ulog.is_dir()) {
-            let cure = "choose another one for --ulog";
+            let cure = "choose another file for --ulog";
             create_dir_all(path).map_err(|error| format!("{}: cannot be made ({error}); {cure}", path.display()))?;
         }
         UlogFiles::create(path)
@@ -260,7 +260,7 @@ impl ServeArgs {
 
 /// Returns the message for an exact log that cannot be written.
 pub(super) fn unwritten(path: &Path, error: &io::Error) -> String {
-    format!("{}: cannot be written ({error}); choose another file for --exact-log", path.display())
+    format!("{}: the file cannot be written ({error}); choose another file for --exact-log", path.display())
 }
 
 /// Returns the file of one vehicle. With several vehicles, its name ends in the system id.
@@ -289,7 +289,8 @@ fn address(text: &str, option: &str, bind: IpAddr) -> Result<SocketAddr, Command
         format!("{option} {text}: no such address ({error}); write HOST:PORT, as in 127.0.0.1:14550, or none")
     })?;
     let same = found.into_iter().find(|address| address.is_ipv4() == bind.is_ipv4());
-    Ok(same.ok_or_else(|| format!("{option} {text}: it cannot be reached from {bind}; choose another --bind"))?)
+    Ok(same
+        .ok_or_else(|| format!("{option} {text}: the address cannot be reached from {bind}; choose another --bind"))?)
 }
 
 /// Parses the address of the page: an IP address with or without a port, or a port.
@@ -302,6 +303,6 @@ fn web_address(text: &str) -> Result<SocketAddr, String> {
 }
 
 fn speed(text: &str) -> Result<f64, String> {
-    let speed: f64 = text.parse().map_err(|_| "it must be a number".to_owned())?;
-    if (0.0..=1000.0).contains(&speed) { Ok(speed) } else { Err("it must lie within 0 to 1000".into()) }
+    let speed: f64 = text.parse().map_err(|_| "the speed must be a number".to_owned())?;
+    if (0.0..=1000.0).contains(&speed) { Ok(speed) } else { Err("the speed must lie within 0 to 1000".into()) }
 }

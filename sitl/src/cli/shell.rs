@@ -14,10 +14,10 @@ const NAME: &str = "sitl";
 /// Environment variable by which a shell requests completions, clap's default.
 const VARIABLE: &str = "COMPLETE";
 
-/// Print completions for a shell
+/// Print the completion script for a shell
 ///
-/// The shell asks the program then for commands, options and the names of scenarios, campaigns, suites, vehicles and
-/// laws, so `sitl` must be in its path. bash: `sitl completions bash >~/.local/share/bash-completion/completions/sitl`;
+/// The script calls `sitl` for commands, options and the names of scenarios, campaigns, suites, vehicles and laws, so
+/// `sitl` must be in the shell's path. bash: `sitl completions bash >~/.local/share/bash-completion/completions/sitl`;
 /// zsh: `sitl completions zsh >~/.zfunc/_sitl`; fish: `sitl completions fish >~/.config/fish/completions/sitl.fish`.
 #[derive(Args, Debug)]
 pub(crate) struct CompletionsArgs {
@@ -30,14 +30,16 @@ impl CompletionsArgs {
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let (shell, mut script) = (self.shell.to_string(), Vec::new());
         let shells = Shells::builtins();
-        let shell = shells.completer(&shell).ok_or_else(|| format!("{shell}: cannot be completed; use another"))?;
+        let shell = shells
+            .completer(&shell)
+            .ok_or_else(|| format!("{shell}: there is no completion for this shell; use another shell"))?;
         shell.write_registration(VARIABLE, NAME, NAME, NAME, &mut script)?;
         print(&String::from_utf8(script)?)?;
         Ok(ExitCode::SUCCESS)
     }
 }
 
-/// Write the manual into a folder, a page for each command
+/// Write the manual pages into a folder, one for each command
 ///
 /// `sitl man ~/.local/share/man/man1`, then `man sitl` and `man sitl-fly`.
 #[derive(Args, Debug)]
@@ -46,7 +48,7 @@ pub(crate) struct ManArgs {
     #[arg(value_name = "FOLDER")]
     folder: PathBuf,
 
-    /// Replace pages that are there
+    /// Replace existing pages
     #[arg(long)]
     force: bool,
 }

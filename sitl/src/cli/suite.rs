@@ -29,7 +29,9 @@ impl SuitesArgs {
         match self.name {
             Some(name) if [NAME, ROUGH].contains(&name.as_str()) => {
                 let cure = format!("fly it with `sitl compare --suite {name} --seed N`");
-                let problem = format!("drawn from a seed, not a file; {cure}; docs/suites.md says what is drawn");
+                let problem = format!(
+                    "this suite is drawn from a seed, so it has no file; {cure}; docs/suites.md says what is drawn"
+                );
                 return Err(FileError::whole(&name, problem).into());
             }
             Some(name) => print(BuiltIn::named(&SUITES, &name).ok_or_else(|| suite::unknown(&name))?.text)?,

@@ -31,7 +31,7 @@ pub(crate) fn columns() -> usize {
 pub(crate) fn print(text: &str) -> Result<(), CommandError> {
     match io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            Err(format!("stdout: cannot be written ({error}); send it elsewhere").into())
+            Err(format!("stdout cannot be written ({error}); redirect it elsewhere").into())
         }
         _ => Ok(()),
     }

@@ -18,17 +18,18 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Search for gains, with the same flights, cost, search and number of tries for every law
+/// Search for gains, by the same flights, cost, method and number of tries for every law
 ///
-/// Prints a [[contender]] for a scenario file or, with --vehicle, [gains] for that vehicle's file, with the cost before
-/// and after as comments. Ctrl-C ends the search early and keeps the best gains so far. With --fleet, every law on
-/// every vehicle: after Ctrl-C finished searches are kept, and the same command does what is missing. See
+/// Prints a [[contender]] for a scenario file or, with --vehicle, [gains] for that vehicle's file. Comments give the
+/// cost before and after. Ctrl-C ends the search early and keeps the best gains so far. With --fleet, the command tunes
+/// every law on every vehicle; after Ctrl-C finished searches are kept, and the same command resumes. See
 /// docs/tuning.md.
 #[derive(Args, Debug)]
 pub(crate) struct TuneArgs {
-    /// A law, to start from hand-tuned gains, or a contender of --from or the first --scenario, to start from its gains
+    /// Law, which starts from hand-tuned gains, or contender of --from or the first --scenario, which starts from its
+    /// own gains
     ///
-    /// With --fleet, any number of laws; all but backstepping, which flies with AFBC's gains, if none is given.
+    /// With --fleet, any number of laws [default: all but backstepping, which flies with AFBC's gains].
     #[arg(value_name = "CONTROLLER", required_unless_present = "fleet")]
     contenders: Vec<String>,
 
@@ -44,24 +45,24 @@ pub(crate) struct TuneArgs {
     #[arg(long = "scenario", value_name = "SCENARIO")]
     scenarios: Vec<TargetArg>,
 
-    /// Start from a contender of this scenario, on the training flights, as to continue a search
+    /// Start from a contender of this scenario, on the training flights, for example to continue a search
     #[arg(long, value_name = "SCENARIO", conflicts_with = "scenarios")]
     from: Option<TargetArg>,
 
-    /// Start from the gains that fly: the profile's or, with --vehicle, those in its file
+    /// Start from the present flight gains: the profile's or, with --vehicle, those in the vehicle's file
     #[arg(long, conflicts_with_all = ["scenarios", "from"])]
     flying: bool,
 
-    /// Fly this vehicle: name of a built-in one, or path of a vehicle file; with --fleet, may be given more than once,
-    /// and is every built-in one otherwise
+    /// Fly this vehicle: name of a built-in vehicle, or path of a vehicle file; with --fleet, may be given more than
+    /// once [default with --fleet: every built-in vehicle]
     #[arg(long = "vehicle", value_name = "VEHICLE")]
     vehicles: Vec<PathBuf>,
 
-    /// Number of sets of gains to try
+    /// Number of gain sets to try
     #[arg(long, value_name = "N", default_value = "1000", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     budget: u32,
 
-    /// Initial step size, in the natural logarithm of every gain; a tenth or so to improve gains that are good already
+    /// Initial step size, in the natural logarithm of every gain; about 0.1 improves gains that are already good
     #[arg(long, value_name = "SIZE", default_value_t = tune::STEP, value_parser = step)]
     step: f64,
 
@@ -73,7 +74,7 @@ pub(crate) struct TuneArgs {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Replace the file if it is there
+    /// Replace an existing file
     #[arg(long, requires = "out")]
     force: bool,
 
@@ -93,11 +94,11 @@ impl TuneArgs {
             return FleetArgs { folder, laws, vehicles, course, flying: self.flying, write }.run();
         }
         let [contender] = self.contenders.as_slice() else {
-            return Err("more than one controller; name one, or a folder with --fleet".into());
+            return Err("more than one controller is named; name one, or a folder with --fleet".into());
         };
         let vehicle = vehicles.pop();
         if !vehicles.is_empty() {
-            return Err("more than one --vehicle; name one, or a folder with --fleet".into());
+            return Err("more than one --vehicle is named; name one, or a folder with --fleet".into());
         }
         let mut start = start(contender, from.as_ref().or(scenarios.first()), vehicle.as_ref())?;
         if self.flying {

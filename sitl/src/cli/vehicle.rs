@@ -12,10 +12,10 @@ use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Of every command that flies.
+/// Vehicle option of every command that flies.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct VehicleArgs {
-    /// Fly this instead of the scenario's vehicle, with its gains of the profile `flight`: name of a built-in vehicle,
+    /// Fly this vehicle, with its gains of the profile `flight`, instead of the scenario's: name of a built-in vehicle,
     /// or path of a vehicle file
     #[arg(long, value_name = "VEHICLE")]
     vehicle: Option<PathBuf>,

@@ -279,10 +279,10 @@ impl Checker {
             "ordered" => accepted.iter().any(asked),
             "done" => matches!(self.mode, FlightMode::Takeoff | FlightMode::Mission) && mode == FlightMode::Hold,
             "by the mission" => self.mode == FlightMode::Mission && lands,
-            "has not left the ground" => matches!(mode, FlightMode::Hold | FlightMode::Land),
+            "take-off failed: still on the ground" => matches!(mode, FlightMode::Hold | FlightMode::Land),
             "disarmed" => mode == FlightMode::Hold && !self.armed && time_ms - self.disarmed_ms <= 2,
             "station lost" => silent_ms + SOON_MS > self.station_lost_ms,
-            "the state is back" => self.mode == FlightMode::Land && self.descends.is_some(),
+            "the state estimate is back" => self.mode == FlightMode::Land && self.descends.is_some(),
             "no targets" => self.mode == FlightMode::Offboard && targetless_ms + SOON_MS > TARGETS_MS,
             // The safety net may select these modes. The tests that provoke it check which one.
             _ => matches!(mode, FlightMode::Hold | FlightMode::Return | FlightMode::Land),

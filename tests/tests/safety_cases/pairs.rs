@@ -15,7 +15,7 @@ pub(super) fn cases() -> Vec<Case> {
             .offboard(velocity(5.0, 0.0, 0.0))
             .at(5.0, silent())
             .lasts(30.0)
-            .hears(&["hold: at the geofence", "return: station lost", "no longer: at the geofence"])
+            .hears(&["hold: at the geofence", "return: station lost", "cleared: at the geofence"])
             .bound(|bounds| bounds.radius_m = 16.5)
             .lands()
             .near(0.0, 0.0, 0.7),
@@ -108,7 +108,7 @@ pub(super) fn cases() -> Vec<Case> {
             .at(3.0, line("fault tracker lost 2"))
             .at(3.0, Do::Stream(None))
             .lasts(9.0)
-            .hears(&["hold: no targets", "sensor fault", "no longer: sensor fault"]),
+            .hears(&["hold: no targets", "sensor fault", "cleared: sensor fault"]),
         case("tracker-and-battery", "the tracker is lost, and the battery critical")
             .watched()
             .at(0.5, line("fault tracker lost"))
@@ -121,7 +121,7 @@ pub(super) fn cases() -> Vec<Case> {
             .at(1.0, line("fault imu dead"))
             .at(2.0, silent())
             .lasts(26.0)
-            .hears(&["inertial sensor failed: flying on tracker's poses", "return: station lost", "on the ground"])
+            .hears(&["IMU failed: flying on the tracker's poses alone", "return: station lost", "on the ground"])
             // When it turns back on poses alone, whose velocity is late, the vehicle tilts more than its acceleration
             // needs.
             .bound(|bounds| bounds.tilt_rad = 0.7)
@@ -171,7 +171,7 @@ pub(super) fn cases() -> Vec<Case> {
         case("tracker-back-descending", "the tracker comes back while it descends")
             .at(0.5, line("fault tracker lost 7"))
             .lasts(24.0)
-            .hears(&[DESCENDS, "hold: the state is back"])
+            .hears(&[DESCENDS, "hold: the state estimate is back"])
             .near(0.0, 0.0, 0.3),
         case("tracker-back-and-orders", "the tracker comes back while it descends in a mission; then an order to hold")
             .on(Start::Air(5.0))
@@ -181,7 +181,7 @@ pub(super) fn cases() -> Vec<Case> {
             .bound(|bounds| bounds.tilt_rad = 0.9)
             .lasts(16.0)
             .hears(&[DESCENDS, "hold: ordered"])
-            .never(&["refused", "mission: the state is back"]),
+            .never(&["refused", "mission: the state estimate is back"]),
         case("tracker-back-and-land", "the tracker comes back while it descends in a mission; then an order to land")
             .on(Start::Air(5.0))
             .mission(&[[9.0, 0.0, 5.0], [9.0, 9.0, 5.0]])
@@ -190,7 +190,7 @@ pub(super) fn cases() -> Vec<Case> {
             .bound(|bounds| bounds.tilt_rad = 0.9)
             .lasts(26.0)
             .hears(&[DESCENDS, "on the ground: disarming"])
-            .never(&["refused", "the state is back"])
+            .never(&["refused", "the state estimate is back"])
             .lands(),
         case("gnss-back", "GNSS lost for 5.5 s in a mission")
             .outdoors()
@@ -199,7 +199,7 @@ pub(super) fn cases() -> Vec<Case> {
             .at(2.0, line("fault gnss lost 5.5"))
             .bound(|bounds| (bounds.tilt_rad, bounds.radius_m) = (0.9, 45.0))
             .lasts(30.0)
-            .hears(&[DESCENDS, "mission: the state is back", "hold: done"])
+            .hears(&[DESCENDS, "mission: the state estimate is back", "hold: done"])
             .near(0.0, 0.0, 5.0),
         case("rotor-and-gust", "a rotor with 80 %, and a gust of 6 m/s")
             .outdoors()

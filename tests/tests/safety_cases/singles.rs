@@ -45,7 +45,7 @@ fn station() -> Vec<Case> {
             .at(1.0, silent())
             .at(6.0, Do::Back(STATION))
             .lasts(24.0)
-            .hears(&["return: station lost", "no longer: station lost", "on the ground: disarming"])
+            .hears(&["return: station lost", "cleared: station lost", "on the ground: disarming"])
             .lands()
             .near(0.0, 0.0, 0.7),
         case("station-lost-on-the-ground", "the station falls silent before the take-off")
@@ -291,7 +291,7 @@ fn battery() -> Vec<Case> {
             .on(Start::PowerUp)
             .at(0.0, say(VehicleCommand::Arm))
             .lasts(1.0)
-            .hears(&["arming refused: battery low or not known"])
+            .hears(&["arming refused: battery low or unknown"])
             .lands(),
         case("battery-wrong-cells", "the battery has fewer cells than it is said to have")
             .watched()
@@ -299,7 +299,7 @@ fn battery() -> Vec<Case> {
             .on(Start::PowerUp)
             .at(0.0, say(VehicleCommand::Arm))
             .lasts(1.0)
-            .hears(&["arming refused: battery low or not known"])
+            .hears(&["arming refused: battery low or unknown"])
             .lands(),
     ]
 }
@@ -321,7 +321,7 @@ fn sensors() -> Vec<Case> {
         fails("gnss-short", "GNSS lost for 3 s", "fault gnss lost 3")
             .outdoors()
             .lasts(7.0)
-            .hears(&["sensor fault", "no longer: sensor fault"]),
+            .hears(&["sensor fault", "cleared: sensor fault"]),
         fails("gnss-lost-land", "GNSS lost for good", "fault gnss lost")
             .outdoors()
             .bound(|bounds| bounds.tilt_rad = ON_GROUND_RAD)
@@ -354,7 +354,7 @@ fn sensors() -> Vec<Case> {
             .set("COM_SENS_ACT", 2.0)
             .mission(&AWAY)
             .lasts(9.0)
-            .hears(&["hold: sensor fault", "no longer: sensor fault"]),
+            .hears(&["hold: sensor fault", "cleared: sensor fault"]),
         fails("barometer-stuck", "barometer stuck", "fault barometer stuck").outdoors().lasts(8.0),
         case("barometer-lost-before", "barometer lost before arming")
             .outdoors()
@@ -375,12 +375,12 @@ fn sensors() -> Vec<Case> {
             .lands(),
         fails("tracker-jumped", "tracker's frame jumps by 0.5 m", "fault tracker jumped 0.5 0 0 0").near(0.0, 0.0, 0.3),
         fails("imu-dead", "inertial sensor dead", "fault imu dead")
-            .hears(&["inertial sensor failed: flying on tracker's poses"])
+            .hears(&["IMU failed: flying on the tracker's poses alone"])
             .near(0.0, 0.0, 0.3),
         fails("imu-stuck", "inertial sensor stuck, then a landing", "fault imu stuck")
             .at(3.0, lands())
             .lasts(14.0)
-            .hears(&["inertial sensor failed: flying on tracker's poses", "on the ground: disarming"])
+            .hears(&["IMU failed: flying on the tracker's poses alone", "on the ground: disarming"])
             .lands()
             .near(0.0, 0.0, 0.5),
         fails("imu-noisy", "noise of 0.2 rad/s and 3 m/s2 on the inertial sensor", "fault imu noisy 0.2 3")
@@ -433,7 +433,7 @@ fn airframe() -> Vec<Case> {
             .at(0.2, Do::Line("payload 1.2 0.02"))
             .at(0.5, say(take_off(3.0)))
             .lasts(23.0)
-            .hears(&["land: has not left the ground", "on the ground: disarming"])
+            .hears(&["land: take-off failed: still on the ground", "on the ground: disarming"])
             .lands(),
     ]
 }
@@ -477,17 +477,17 @@ fn link() -> Vec<Case> {
             .at(5.0, Do::Back(COMPANION))
             .at(5.1, other(select(FlightMode::Hold)))
             .lasts(9.0)
-            .hears(&["return: station lost", "no longer: station lost", "hold: ordered"]),
+            .hears(&["return: station lost", "cleared: station lost", "hold: ordered"]),
         case("second-station-disarms", "a second station orders to disarm in flight")
             .at(0.0, Do::Back(COMPANION))
             .at(0.5, other(VehicleCommand::Disarm))
-            .hears(&["disarming refused: in flight; force it to stop"])
+            .hears(&["disarming refused: in flight; force to override"])
             .near(0.0, 0.0, 0.5),
         case("disarm-in-flight", "an order to disarm in flight, thrice")
             .at(0.5, say(VehicleCommand::Disarm))
             .at(1.0, say(VehicleCommand::Disarm))
             .at(1.5, say(VehicleCommand::Disarm))
-            .hears(&["disarming refused: in flight; force it to stop"])
+            .hears(&["disarming refused: in flight; force to override"])
             .near(0.0, 0.0, 0.5),
         case("kill", "an order to stop the motors by force")
             .at(0.5, say(VehicleCommand::Kill))

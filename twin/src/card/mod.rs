@@ -68,7 +68,7 @@ fn formatted(room: Option<u64>) -> MemoryCard {
     let mut bytes = vec![0; BLOCKS * 512];
     let options = fatfs::FormatVolumeOptions::new().fat_type(fatfs::FatType::Fat16).bytes_per_cluster(CLUSTER);
     let volume = &mut Cursor::new(&mut bytes[VOLUME * 512..]);
-    fatfs::format_volume(volume, options).expect("it is large enough");
+    fatfs::format_volume(volume, options).expect("the card is large enough");
     if let Some(room) = room {
         fill(&mut bytes[VOLUME * 512..], room).expect("it has room");
     }

@@ -84,7 +84,7 @@ impl<'a> BaseVehicle<'a> {
             scenario.realism.rotors.start = RotorStart::Idle;
         }
         change.put(&mut scenario).map_err(|error: OutOfRange| {
-            let problem = format!("it cannot fly with {}; fly it with other seeds", out_of_range(&error));
+            let problem = format!("the vehicle cannot fly with {}; choose other seeds", out_of_range(&error));
             FileError::whole(&vehicle.name, problem)
         })?;
         let vehicle = vehicle.name.clone();

@@ -162,14 +162,14 @@ impl ModelMismatch {
 impl fmt::Display for ModelMismatch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            ModelMismatch::Nothing => f.write_str("as its file says"),
+            ModelMismatch::Nothing => f.write_str("unchanged, as in its file"),
             ModelMismatch::Wind(wind_m_s) => write!(f, "in a wind of {:.1} m/s", wind_m_s.norm()),
             ModelMismatch::Turbulence(_) => f.write_str("in light turbulence"),
             ModelMismatch::Payload { share, .. } => write!(f, "with a payload of {:.0} %", 100.0 * share),
             ModelMismatch::Mass(factor) => write!(f, "mass {:+.0} %", 100.0 * (factor - 1.0)),
             ModelMismatch::Rotor { rotor, efficiency } => write!(f, "rotor {rotor} at {:.0} %", 100.0 * efficiency),
             ModelMismatch::Drag(factor) => write!(f, "drag times {factor:.2}"),
-            ModelMismatch::Older(age_s) => write!(f, "its state {:.0} ms older", 1e3 * age_s),
+            ModelMismatch::Older(age_s) => write!(f, "with its state delayed by {:.0} ms", 1e3 * age_s),
         }
     }
 }

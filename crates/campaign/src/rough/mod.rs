@@ -112,7 +112,8 @@ impl RoughFlights {
         parts.iter().for_each(|part| part.put(&mut drawing));
         let parts: Vec<&str> = parts.iter().map(|part| part.name).collect();
         let unfit = |error: OutOfRange| {
-            let problem = format!("it cannot fly {class} with {}; fly it with other seeds", out_of_range(&error));
+            let problem =
+                format!("the vehicle cannot fly the class {class} with {}; choose other seeds", out_of_range(&error));
             FileError::whole(vehicle, problem)
         };
         drawing.finish().and_then(|()| scenario.check()).map_err(unfit)?;

@@ -375,7 +375,7 @@ impl Comms {
             }
             ServiceRequest::Origin => {
                 // Stations cannot move the origin: the shell sets it, or there is none.
-                self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, "the origin is not set by stations");
+                self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, "stations cannot set the origin");
                 self.streams.request(Requested { message: id::GPS_GLOBAL_ORIGIN, index: 0 });
                 return;
             }

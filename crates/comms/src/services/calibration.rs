@@ -40,7 +40,7 @@ pub struct Calibrator {
 }
 
 #[derive(Debug)]
-#[expect(clippy::large_enum_variant, reason = "there is one, and no heap")]
+#[expect(clippy::large_enum_variant, reason = "only one procedure exists at a time, and there is no heap")]
 enum Procedure {
     Gyroscope(GyroscopeCalibration),
     Accelerometer(AccelerometerCalibration),
@@ -210,7 +210,7 @@ fn pending(sides: Sides) -> Words {
 fn reason(failure: CalibrationFailure) -> &'static str {
     match failure {
         CalibrationFailure::Moving => "vehicle moved",
-        CalibrationFailure::TimedOut => "no side in time",
+        CalibrationFailure::TimedOut => "no side held in time",
         CalibrationFailure::NotRotated => "not rotated in time",
         CalibrationFailure::NoField => "no magnetometer readings",
         CalibrationFailure::NotLevel => "tilted above 15 degrees",

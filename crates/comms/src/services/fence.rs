@@ -53,7 +53,7 @@ pub fn check_item(item: &MissionItem) -> Result<(), Invalid> {
     }
     let [first, ..] = item.parameters;
     if circle && !(0.0..=FAR_M).contains(&first) {
-        return refuse(MissionResult::INVALID_PARAM1, "radius is not 0 to 20000 m");
+        return refuse(MissionResult::INVALID_PARAM1, "radius must be 0 to 20000 m");
     }
     if !circle && first < 3.0 {
         return refuse(MissionResult::INVALID_PARAM1, "less than three vertices");
@@ -84,14 +84,14 @@ pub fn check(
         let included = is_inclusion(item);
         let number = |item: &MissionItem| or_zero(item.parameters[1]);
         if included && number(item) != *group.get_or_insert(number(item)) {
-            return refuse(item, MissionResult(7), "one group of inclusions only");
+            return refuse(item, MissionResult(7), "only one inclusion group allowed");
         }
         if let Some(count) = vertices(item) {
             let same = |other: &MissionItem| {
                 other.command == item.command && vertices(other) == Some(count) && number(other) == number(item)
             };
             if let Some(other) = area.iter().find(|other| !same(other)) {
-                return refuse(other, MissionResult::INVALID_PARAM1, "vertices do not belong together");
+                return refuse(other, MissionResult::INVALID_PARAM1, "vertices of two polygons are mixed");
             }
             if area.len() != usize::from(count) {
                 return refuse(last, MissionResult::INVALID_PARAM1, "vertices are missing");
@@ -108,14 +108,14 @@ pub fn check(
             if let Err(fault) = check_polygon(area.len(), vertex) {
                 let reason = match fault {
                     PolygonFault::TooFew => "less than three vertices",
-                    PolygonFault::Degenerate => "vertices at one place, or on one line",
+                    PolygonFault::Degenerate => "vertices coincide or are in line",
                     PolygonFault::Crossing => "edges cross each other",
                 };
                 return refuse(item, MissionResult::INVALID_PARAM1, reason);
             }
         }
         if here_m.is_some_and(|here_m| !allows(area, chart, here_m)) {
-            return refuse(item, MissionResult::DENIED, "the vehicle is outside");
+            return refuse(item, MissionResult::DENIED, "the vehicle is outside this fence");
         }
     }
     Ok(())

@@ -23,7 +23,7 @@ pub(super) const JUMP: u16 = MavCmd::MAV_CMD_DO_JUMP as u16;
 const SPEED: u16 = MavCmd::MAV_CMD_DO_CHANGE_SPEED as u16;
 const LOOK: u16 = MavCmd::MAV_CMD_DO_SET_ROI_LOCATION as u16;
 const LOOK_NOWHERE: u16 = MavCmd::MAV_CMD_DO_SET_ROI_NONE as u16;
-#[allow(deprecated, reason = "stations still send it")]
+#[allow(deprecated, reason = "ground stations still send it")]
 const OLD_LOOK: u16 = MavCmd::MAV_CMD_DO_SET_ROI as u16;
 const RALLY_POINT: u16 = MavCmd::MAV_CMD_NAV_RALLY_POINT as u16;
 
@@ -109,7 +109,7 @@ pub fn check(item: &MissionItem) -> Result<(), Invalid> {
             return match item.parameters {
                 [0.0 | 1.0, ..] if !speed_known => refuse(MissionResult(7), "speed is out of range"),
                 [0.0 | 1.0, _, throttle, _] if !(is_neutral(throttle) || KEPT.contains(&throttle)) => {
-                    refuse(MissionResult(8), "a throttle is not set")
+                    refuse(MissionResult(8), "throttle is not supported")
                 }
                 [0.0 | 1.0, ..] => Ok(()),
                 _ => refuse(MissionResult::INVALID_PARAM1, "kind of speed is not supported"),
@@ -117,9 +117,9 @@ pub fn check(item: &MissionItem) -> Result<(), Invalid> {
         }
         DELAY if (0.0..=86_400.0).contains(&first) => {
             let clock = [second, third, fourth].into_iter().any(|part| !(is_neutral(part) || part == -1.0));
-            return if clock { refuse(MissionResult(7), "a time of day is not known") } else { Ok(()) };
+            return if clock { refuse(MissionResult(7), "time of day is not supported") } else { Ok(()) };
         }
-        DELAY if first < 0.0 => return refuse(MissionResult::INVALID_PARAM1, "a time of day is not known"),
+        DELAY if first < 0.0 => return refuse(MissionResult::INVALID_PARAM1, "time of day is not supported"),
         DELAY => return refuse(MissionResult::INVALID_PARAM1, "delay is out of range"),
         YAW => {
             return match item.parameters {
@@ -128,15 +128,15 @@ pub fn check(item: &MissionItem) -> Result<(), Invalid> {
                     refuse(MissionResult::INVALID_PARAM1, "angle is out of range")
                 }
                 [_, _, -1.0 | 0.0 | 1.0, 0.0 | 1.0] => Ok(()),
-                [_, _, -1.0 | 0.0 | 1.0, _] => refuse(MissionResult(9), "neither absolute nor relative"),
-                _ => refuse(MissionResult(8), "direction is not -1, 0 or 1"),
+                [_, _, -1.0 | 0.0 | 1.0, _] => refuse(MissionResult(9), "choose absolute or relative angle"),
+                _ => refuse(MissionResult(8), "direction must be -1, 0 or 1"),
             };
         }
         JUMP => {
             return if whole(first, f32::from(u8::MAX)).is_none() {
-                refuse(MissionResult::INVALID_PARAM1, "there is no such item")
+                refuse(MissionResult::INVALID_PARAM1, "the jump's target does not exist")
             } else if second != -1.0 && whole(second, REPEATS_MAX).is_none() {
-                refuse(MissionResult(7), "repetitions are not -1, 0 to 1000")
+                refuse(MissionResult(7), "repetitions must be -1 to 1000")
             } else {
                 Ok(())
             };
@@ -167,7 +167,7 @@ pub fn check(item: &MissionItem) -> Result<(), Invalid> {
             return refuse(MissionResult::INVALID_PARAM1, "number of turns is out of range");
         }
         if !(third.is_nan() || third == 0.0 || (1.0..=1000.0).contains(&third.abs())) {
-            return refuse(MissionResult(8), "radius is not 1 to 1000 m");
+            return refuse(MissionResult(8), "radius must be 1 to 1000 m");
         }
     }
     if [WAYPOINT, LOITER, LOITER_TIME].contains(&item.command) && !(fourth.is_nan() || fourth.abs() <= 3600.0) {
@@ -279,7 +279,7 @@ pub(super) fn check_jumps(items: &[MissionItem]) -> Result<(), (u16, Invalid)> {
         let [target, ..] = item.parameters;
         // The target is a whole number and not negative, as `check` ensures.
         if target as usize >= items.len() || target as usize == place {
-            return refuse(MissionResult::INVALID_PARAM1, "there is no such item");
+            return refuse(MissionResult::INVALID_PARAM1, "the jump's target does not exist");
         }
         // Jumps with a limited number of repetitions end at some time.
         let mut next = place;
@@ -291,7 +291,7 @@ pub(super) fn check_jumps(items: &[MissionItem]) -> Result<(), (u16, Invalid)> {
             false
         });
         if !ends {
-            return refuse(MissionResult::INVALID_PARAM1, "goes around for ever without a flight");
+            return refuse(MissionResult::INVALID_PARAM1, "jump loops without a waypoint");
         }
     }
     Ok(())

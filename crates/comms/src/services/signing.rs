@@ -27,7 +27,7 @@ const KEPT_EVERY_S: u32 = 120;
 const LINK: u8 = 0;
 
 /// Text of a vehicle without a key.
-const OFF: &str = "signing: off, no key";
+const OFF: &str = "signing: off, key removed";
 
 /// Names of the records: check value of the key, clock \[s\], words of the key.
 const CHECK: &str = "_SIGN_CHECK";
@@ -198,10 +198,10 @@ impl Signing {
     /// Sets or removes the key. The frame must have been accepted.
     pub fn set(&mut self, now_us: u64, setup: &SetupSigning, armed: bool) -> SetupOutcome {
         if armed {
-            return SetupOutcome::Refused("signing key not changed: armed");
+            return SetupOutcome::Refused("signing key not changed: disarm first");
         }
         if setup.time_10us > LATEST_10US {
-            return SetupOutcome::Refused("signing key not changed: its time is wrong");
+            return SetupOutcome::Refused("signing key not changed: invalid timestamp");
         }
         let lock = setup.key.map_or(Lock::Open, Lock::Signed);
         if lock == Lock::Open && !self.is_on() {

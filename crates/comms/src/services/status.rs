@@ -152,7 +152,7 @@ mod tests {
             assert_eq!(status.flight_mode(), reported);
         }
         status.state = Some(State::default());
-        assert_eq!(status.flight_mode(), FlightMode::Mission, "chosen since the state is back");
+        assert_eq!(status.flight_mode(), FlightMode::Mission, "chosen since the state estimate is back");
         for airborne in [true, false] {
             status.guided.airborne = airborne;
             assert_eq!(status.is_airborne(), airborne);

@@ -87,9 +87,9 @@ pub(crate) fn reason(declined: OrderRefusal) -> &'static str {
         OrderRefusal::InFlight => "refused: in flight",
         OrderRefusal::NoTargets => "refused: no fresh targets",
         OrderRefusal::NoSticks => "refused: no fresh sticks",
-        OrderRefusal::NoMission => "refused: no mission, or no such item",
+        OrderRefusal::NoMission => "refused: no mission, or item does not exist",
         OrderRefusal::OutsideFence => "refused: outside the geofence",
-        OrderRefusal::OutOfRange => "refused: out of range",
+        OrderRefusal::OutOfRange => "refused: target or value out of range",
         OrderRefusal::Failsafe => "refused: a failsafe is active",
         _ => "refused",
     }

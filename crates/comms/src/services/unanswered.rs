@@ -18,10 +18,10 @@ impl Unanswered {
         }
         self.0 = Some((wish, now_us));
         Some(match wish {
-            UnansweredRequest::Corrections => "refused: RTK corrections are not used",
-            UnansweredRequest::Tune => "refused: there is no buzzer",
-            UnansweredRequest::Follow => "refused: targets are not followed",
-            UnansweredRequest::Shell => "refused: there is no shell",
+            UnansweredRequest::Corrections => "refused: RTK corrections are not supported",
+            UnansweredRequest::Tune => "refused: the vehicle has no buzzer",
+            UnansweredRequest::Follow => "refused: follow-me is not supported",
+            UnansweredRequest::Shell => "refused: the vehicle has no shell",
         })
     }
 }

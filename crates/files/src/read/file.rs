@@ -28,12 +28,12 @@ pub fn text(path: &Path, kind: &str) -> Result<String, FileError> {
     read().map_err(|error: io::Error| {
         let problem = match error.kind() {
             io::ErrorKind::NotFound => format!("no such file; `sitl {kind}s` lists the built-in ones"),
-            io::ErrorKind::IsADirectory => format!("it is a folder; name a {kind} file in it"),
-            io::ErrorKind::InvalidData => "it is not UTF-8 text; save it as UTF-8".into(),
+            io::ErrorKind::IsADirectory => format!("this is a folder; name a {kind} file in it"),
+            io::ErrorKind::InvalidData => "the file is not UTF-8 text; save it as UTF-8".into(),
             io::ErrorKind::FileTooLarge => {
-                format!("it is larger than 1 MiB, too large for a {kind}; name another file")
+                format!("the file is larger than 1 MiB, too large for a {kind}; name another file")
             }
-            _ => format!("it cannot be read ({error}); check its permissions"),
+            _ => format!("the file cannot be read ({error}); check its permissions"),
         };
         FileError::whole(&path.display().to_string(), problem)
     })
@@ -111,12 +111,14 @@ fn parsed<'t>(source: SourceFile<'t>, sample: Example) -> Result<DeTable<'t>, Fi
 pub fn title(root: &mut Table<'_>, name: &str) -> Result<[String; 2], FileError> {
     let name = root.text("name")?.unwrap_or(name).to_owned();
     if !is_file_name(&name) {
-        let cure = "it must be 1 to 64 letters, digits, '-' or '_', since file names come from it";
+        let cure = "a name must be 1 to 64 letters, digits, '-' or '_', since file names are made from it";
         return Err(root.fault_at("name", format!("\"{name}\" cannot be a name; {cure}")));
     }
     let description = root.text("description")?.unwrap_or_default().to_owned();
     if description.chars().any(char::is_control) {
-        return Err(root.fault_at("description", "it has line breaks or control characters; make it one plain line"));
+        return Err(
+            root.fault_at("description", "the text has line breaks or control characters; make it one plain line")
+        );
     }
     Ok([name, description])
 }

@@ -50,7 +50,7 @@ pub fn read(file: &str, text: &str) -> Result<Vec<ParameterEntry>, FileError> {
             return fault(name, format!("\"{value}\" is no number"));
         };
         if entries.iter().any(|entry| entry.name == name) {
-            return fault(name, "a second value; take one of them out".into());
+            return fault(name, "the parameter has two values; delete one of them".into());
         }
         entries.push(ParameterEntry { name: name.into(), value: number, at: start });
     }

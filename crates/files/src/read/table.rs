@@ -162,15 +162,17 @@ impl<'a> Table<'a> {
         };
         match array.iter().collect::<Vec<_>>().as_slice() {
             [low, high] => match [number(low)?, number(high)?] {
-                [low, high] if low > high => {
-                    Err(self.refuse(value, range.name, format!("{low} is above {high}; write the smaller end first")))
-                }
+                [low, high] if low > high => Err(self.refuse(
+                    value,
+                    range.name,
+                    format!("{low} is above {high}; write the smaller number first"),
+                )),
                 ends => Ok(Some(ends)),
             },
             other => Err(self.refuse(
                 value,
                 range.name,
-                format!("{} values; it must be one number, or two: [low, high]", other.len()),
+                format!("{} values; write one number, or two as in [low, high]", other.len()),
             )),
         }
     }
@@ -183,7 +185,7 @@ impl<'a> Table<'a> {
         match array.map(|array| array.iter().collect::<Vec<_>>()).as_deref() {
             Some(&[x, y, z]) => Ok(Some(Vector3::new(number(x, rx)?, number(y, ry)?, number(z, rz)?))),
             Some(other) => {
-                Err(self.refuse(value, key, format!("{} values; it must hold three: [x, y, z]", other.len())))
+                Err(self.refuse(value, key, format!("{} values; write three, as in [x, y, z]", other.len())))
             }
             None => Err(self.wrong_type(value, key, "three numbers", "[x, y, z]")),
         }
@@ -275,7 +277,7 @@ impl<'a> Table<'a> {
             return Err(wrong);
         }
         if chosen.is_empty() {
-            return Err(self.refuse(value, key, format!("the list is empty; it must hold {}", one_of(options, name))));
+            return Err(self.refuse(value, key, format!("the list is empty; add {}", one_of(options, name))));
         }
         Ok(Some(chosen))
     }
@@ -306,7 +308,9 @@ impl<'a> Table<'a> {
     pub fn few_tables(&mut self, key: &'static str) -> Result<Vec<Table<'a>>, FileError> {
         let tables = self.tables(key)?;
         if tables.len() > MOST {
-            return Err(self.fault_at(key, format!("{} of them; keep {MOST} at most", tables.len())));
+            return Err(
+                self.fault_at(key, format!("the file has {} of these tables; keep at most {MOST}", tables.len()))
+            );
         }
         Ok(tables)
     }
@@ -483,7 +487,7 @@ impl<'a> Table<'a> {
             DeValue::Array(_) => "a list",
             DeValue::Table(_) => "a table",
         };
-        self.refuse(value, key, format!("it is {found} and must be {wanted}; write {cure}"))
+        self.refuse(value, key, format!("the value is {found} and must be {wanted}; write {cure}"))
     }
 
     fn refuse(&self, value: &Spanned<DeValue<'_>>, key: &str, problem: String) -> FileError {

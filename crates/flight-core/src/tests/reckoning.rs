@@ -371,7 +371,7 @@ proptest! {
         let then = was.iter().rev().nth(late_ms as usize).expect("recorded");
         observer.correct(&pose_of(then, (now_ms - late_ms) * 1000), now_ms * 1000);
         let after = observer.state().expect("plausible");
-        // The tolerance covers the acceleration's rotation with the vehicle within 50 ms, which is neglected.
+        // The prediction neglects that the acceleration turns with the vehicle within 50 ms; the tolerance covers this.
         prop_assert!((after.position_m - before.position_m).amax() < 2e-3, "{after:?}, not {before:?}");
         prop_assert!((after.velocity_m_s - before.velocity_m_s).amax() < 0.02, "{after:?}, not {before:?}");
         prop_assert!(angle_between(&before, &after.quaternion()) < 2e-3, "{after:?}, not {before:?}");

@@ -32,17 +32,17 @@ impl fmt::Display for Error {
             ),
             Error::Nonsense(bytes) => write!(
                 f,
-                "the board sends {bytes} bytes and no MAVLink heartbeat among them: check the baud rate, and that this \
-                 firmware is flashed"
+                "the board sends {bytes} bytes but no MAVLink heartbeat: check the baud rate, and that this firmware \
+                 is flashed"
             ),
             Error::Stranger => {
-                write!(f, "what answers speaks MAVLink, but is not this firmware: no health array within 5 s")
+                write!(f, "the board speaks MAVLink but does not run this firmware: no health array within 5 s")
             }
             Error::Armed => write!(f, "the vehicle is armed: disarm it, and take the propellers off"),
             Error::Signed => write!(
                 f,
-                "the vehicle has a key of signatures and hears nothing without it: take the key back first, by a \
-                 station's SETUP_SIGNING"
+                "the vehicle has a signing key and ignores unsigned messages: remove the key first, by SETUP_SIGNING \
+                 from a station"
             ),
             Error::Connection(error) => error.fmt(f),
         }

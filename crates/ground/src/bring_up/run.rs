@@ -48,9 +48,9 @@ pub fn bring_up(
     tell("reading parameters");
     add(steps::parameters(&mut talk)?);
     add(steps::sensors(&mut talk)?);
-    tell("self-tests of the sensors: leave it at rest");
+    tell("self-tests of the sensors: leave the board at rest");
     add(steps::self_tests(&mut talk)?);
-    tell(&format!("leave it at rest, level, for {} s", options.rest_s));
+    tell(&format!("leave the board at rest, level, for {} s", options.rest_s));
     steps::at_rest(&mut talk, options.rest_s, &mut add)?;
     turns::turns(&mut talk, options.is_attended, tell, &mut add)?;
     add(steps::warmth(&mut talk, options.is_attended, tell)?);

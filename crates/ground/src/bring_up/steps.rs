@@ -49,7 +49,7 @@ pub(crate) fn version(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error>
             step.found("firmware", format!("{major}.{minor}.{patch}"));
             step.found("capabilities", format!("{:#x}", version.capabilities));
             if version.uid != 0 {
-                step.found("number of the board", format!("{:#x}", version.uid));
+                step.found("serial number of the board", format!("{:#x}", version.uid));
             }
         }
         None => step.check(false, "no AUTOPILOT_VERSION"),
@@ -64,7 +64,7 @@ pub(crate) fn parameters(talk: &mut Conversation<'_>) -> Result<BringUpStep, Err
     let parameters = talk.client.parameters();
     let (known, count) = (parameters.values().len(), parameters.count().unwrap_or(0));
     step.found("read", format!("{known} of {count}"));
-    step.check(parameters.are_complete() && count > 0, "not all could be read");
+    step.check(parameters.are_complete() && count > 0, "some parameters could not be read");
     Ok(step)
 }
 
@@ -106,7 +106,7 @@ pub(crate) fn self_tests(talk: &mut Conversation<'_>) -> Result<BringUpStep, Err
     let answer = talk.command(VehicleCommand::SelfTest)?;
     match answer {
         Some((CommandResult::Accepted, _)) => (),
-        Some((CommandResult::Unsupported, _)) => return Ok(step.skipped("this vehicle has none")),
+        Some((CommandResult::Unsupported, _)) => return Ok(step.skipped("this vehicle has no self-tests")),
         Some((answer, _)) => return Ok(step.skipped(format_args!("refused: {answer:?}"))),
         None => {
             step.check(false, "no answer");
@@ -120,7 +120,7 @@ pub(crate) fn self_tests(talk: &mut Conversation<'_>) -> Result<BringUpStep, Err
     }
     let results = results(talk);
     if results.is_empty() {
-        return Ok(step.skipped("no sensor has told of one"));
+        return Ok(step.skipped("no sensor reported a self-test"));
     }
     for (number, text) in (1..).zip(&results) {
         step.found(&format!("result {number}"), text);
@@ -145,12 +145,12 @@ pub(crate) fn at_rest(talk: &mut Conversation<'_>, rest_s: u32, add: &mut dyn Fn
     let elapsed_s = after.time_us.saturating_sub(before.time_us) as f64 * 1e-6;
     ticks.found("measured for", format!("{elapsed_s:.1} s of the board's clock"));
     ticks.found("rate", format!("{:.0} Hz", after.rate_hz));
-    ticks.found("duration of the last", format!("{:.1} us", after.tick_us));
+    ticks.found("duration of the last tick", format!("{:.1} us", after.tick_us));
     ticks.found("longest since power-up", format!("{:.1} us", after.tick_max_us));
-    ticks.found("late or early meanwhile", after.late_ticks.wrapping_sub(before.late_ticks));
-    ticks.found("late or early since power-up", after.late_ticks);
+    ticks.found("ticks late or early meanwhile", after.late_ticks.wrapping_sub(before.late_ticks));
+    ticks.found("ticks late or early since power-up", after.late_ticks);
     ticks.found("attitudes", format!("{:.1} Hz", rate(talk.latest.attitudes - attitudes, elapsed_s)));
-    ticks.found("stack", "not told by telemetry; computed: docs/budgets.md");
+    ticks.found("stack", "not in telemetry; docs/budgets.md has the computed size");
     ticks.check(talk.latest.restarts == restarts, "the board has restarted");
     ticks.check((997.0..=1003.0).contains(&after.rate_hz), "the rate is not 1000 Hz");
     ticks.check(after.late_ticks == before.late_ticks, "ticks late or early");
@@ -159,7 +159,7 @@ pub(crate) fn at_rest(talk: &mut Conversation<'_>, rest_s: u32, add: &mut dyn Fn
     add(ticks);
 
     let mut noise = BringUpStep::new("noise at rest");
-    noise.found("temperature", "not told by telemetry");
+    noise.found("temperature", "not in telemetry");
     if !senses {
         add(noise.skipped("no inertial sensor"));
         return Ok(());
@@ -215,7 +215,7 @@ fn inertial_noise(step: &mut BringUpStep, samples: &[InertialSample], elapsed_s:
         [("gyroscope", rates.deviation(), RATES_MAX_RAD_S), ("accelerometer", force.deviation(), FORCE_MAX_M_S2)]
     {
         step.check(deviation.iter().all(|it| *it > 0.0), format_args!("{name}: an axis is stuck"));
-        step.check(deviation.max() < most, format_args!("{name}: more than {most}; did it move?"));
+        step.check(deviation.max() < most, format_args!("{name}: noise above {most}; leave the board at rest"));
     }
     step.check(rates.mean().norm() < BIAS_MAX_RAD_S, "the gyroscope's offset is above 0.2 rad/s: calibrate it");
 }
@@ -228,8 +228,14 @@ fn level(samples: &[InertialSample]) -> BringUpStep {
     let tilt_rad = force.angle(&Vector3::z());
     step.found("specific force", format!("{:.2} m/s2", force.norm()));
     step.found("tilt", format!("{:.1} degrees", tilt_rad.to_degrees()));
-    step.check((force.norm() - GRAVITY_M_S2).abs() < 0.5, "it is not 9.81 m/s2: calibrate the accelerometer");
-    step.check(tilt_rad < TILT_MAX_RAD, "it does not stand level, or its alignment or IMU_ATT_* is wrong");
+    step.check(
+        (force.norm() - GRAVITY_M_S2).abs() < 0.5,
+        "the specific force is not 9.81 m/s2: calibrate the accelerometer",
+    );
+    step.check(
+        tilt_rad < TILT_MAX_RAD,
+        "the board does not stand level, or the sensor's alignment or IMU_ATT_* is wrong",
+    );
     step
 }
 
@@ -246,7 +252,10 @@ fn field(samples: &[InertialSample]) -> BringUpStep {
     step.found("strength", format!("{:.1} uT", field.mean().norm()));
     step.found("deviation [uT]", three(field.deviation()));
     // The earth's field is 22 to 67 uT strong.
-    step.check((15.0..=80.0).contains(&field.mean().norm()), "not the earth's: take it away from iron, and calibrate");
+    step.check(
+        (15.0..=80.0).contains(&field.mean().norm()),
+        "the field is not the earth's: move the board away from iron, and calibrate the magnetometer",
+    );
     step
 }
 
@@ -265,7 +274,7 @@ pub(crate) fn warmth(
     const DRIFT_MAX_RAD_S: f64 = 0.02;
     let step = BringUpStep::new("warmth");
     if !is_attended || !senses(talk) {
-        return Ok(step.skipped("nobody to warm it, or nothing to be warmed"));
+        return Ok(step.skipped("nobody is there to warm the sensors, or there is no inertial sensor"));
     }
     let mean = |talk: &mut Conversation<'_>| -> Result<_, Error> {
         talk.latest.samples.clear();
@@ -274,7 +283,7 @@ pub(crate) fn warmth(
         Ok(VectorStatistics::of(samples.iter().map(|sample| sample.rates_rad_s)).mean())
     };
     let mut step = step;
-    tell("leave it at rest, level");
+    tell("leave the board at rest, level");
     talk.listen(5_000)?;
     let cold = mean(talk)?;
     tell(&format!("warm the sensors by a finger on the chip, without moving the board, for {WARMED_S} s"));
@@ -283,7 +292,7 @@ pub(crate) fn warmth(
     talk.listen(3_000)?;
     let drift = mean(talk)? - cold;
     step.found("gyroscope, change of the offset [rad/s]", three(drift));
-    step.check(drift.norm() < DRIFT_MAX_RAD_S, "the offset moves by more than 0.02 rad/s");
+    step.check(drift.norm() < DRIFT_MAX_RAD_S, "the gyroscope's offset moves by more than 0.02 rad/s");
     Ok(step)
 }
 
@@ -305,13 +314,13 @@ pub(crate) fn position(
         let [horizontal_mm, vertical_mm] = fix.sigma_mm;
         step.found("kind of fix", fix.kind);
         step.found("satellites", fix.satellites);
-        step.found("uncertainty", format!("{horizontal_mm} mm across, {vertical_mm} mm in height"));
+        step.found("uncertainty", format!("{horizontal_mm} mm horizontally, {vertical_mm} mm vertically"));
         step.found("waited", format!("{:.0} s", (talk.now_ms() - began_ms) as f64 * 1e-3));
     }
     if !is_fixed && !is_attended {
-        return Ok(step.skipped("no fix, and nobody to take it outside"));
+        return Ok(step.skipped("no fix, and nobody is there to take the board outside"));
     }
-    step.check(is_fixed, "no fix in three dimensions");
+    step.check(is_fixed, "no 3D fix");
     Ok(step)
 }
 
@@ -319,7 +328,7 @@ pub(crate) fn position(
 pub(crate) fn battery(talk: &Conversation<'_>) -> BringUpStep {
     let mut step = BringUpStep::new("battery");
     let Some(battery) = talk.latest.battery else { return step.skipped("no reading of a battery") };
-    step.found("voltage, to be compared with a meter", format!("{:.2} V", f64::from(battery.voltage_mv) * 1e-3));
+    step.found("voltage; compare it with a meter", format!("{:.2} V", f64::from(battery.voltage_mv) * 1e-3));
     if battery.current_ca >= 0 {
         step.found("current", format!("{:.2} A", f64::from(battery.current_ca) * 1e-2));
     }
@@ -333,7 +342,7 @@ pub(crate) fn motors(talk: &Conversation<'_>) -> BringUpStep {
         Some(outputs) => {
             let throttles: Vec<_> = outputs.throttles.iter().take(outputs.active as usize).collect();
             step.found("outputs", outputs.active);
-            step.check(throttles.iter().all(|throttle| **throttle == 0.0), "a throttle is not zero");
+            step.check(throttles.iter().all(|throttle| **throttle == 0.0), "a motor's throttle is not zero");
         }
         None => step.check(false, "no ACTUATOR_OUTPUT_STATUS"),
     }
@@ -372,7 +381,7 @@ pub(crate) fn link(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
     step.found("messages here", format!("{}, {} lost, {} corrupt", latest.received, latest.lost, latest.bad_checksum));
     if let Some(there) = talk.latest.health.map(|health| health.link) {
         let counts = format!("{}, {} lost, {} corrupt", there.received, there.lost, there.bad_checksum);
-        step.found("messages there, on one of its links", counts);
+        step.found("messages at the board, on one of its links", counts);
         step.check(there.bad_checksum == 0, "corrupt messages there");
     }
     let heartbeats = talk.client.vehicle().heartbeats;

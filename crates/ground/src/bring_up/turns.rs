@@ -27,20 +27,26 @@ struct TurnCheck {
 const TURNS: [TurnCheck; 4] = [
     TurnCheck {
         name: "right side down",
-        order: "turn it onto its right side",
+        order: "turn the board onto its right side",
         up: [0.0, 1.0, 0.0],
         axis: 0,
         sign: 1.0,
     },
     TurnCheck {
         name: "left side down",
-        order: "turn it onto its left side",
+        order: "turn the board onto its left side",
         up: [0.0, -1.0, 0.0],
         axis: 0,
         sign: -1.0,
     },
-    TurnCheck { name: "nose down", order: "turn its nose straight down", up: [-1.0, 0.0, 0.0], axis: 1, sign: 1.0 },
-    TurnCheck { name: "nose up", order: "turn its nose straight up", up: [1.0, 0.0, 0.0], axis: 1, sign: -1.0 },
+    TurnCheck {
+        name: "nose down",
+        order: "turn the board's nose straight down",
+        up: [-1.0, 0.0, 0.0],
+        axis: 1,
+        sign: 1.0,
+    },
+    TurnCheck { name: "nose up", order: "turn the board's nose straight up", up: [1.0, 0.0, 0.0], axis: 1, sign: -1.0 },
 ];
 
 /// Runs all turns.
@@ -53,13 +59,13 @@ pub(crate) fn turns(
     for turn in &TURNS {
         let mut step = BringUpStep::new(turn.name);
         if !is_attended || !senses(talk) {
-            add(step.skipped("nobody to turn it, or nothing that feels it"));
+            add(step.skipped("nobody is there to turn the board, or there is no inertial sensor"));
             continue;
         }
         tell("hold it level");
         let mut level = TurnProgress::default();
         let is_level = talk.wait(PATIENCE_MS, |talk| level.follow(&mut talk.latest, &Vector3::z()))?;
-        step.check(is_level, "it was not held level");
+        step.check(is_level, "the board was not held level");
         tell(turn.order);
         // Start anew, so that the angle counts from level.
         let mut turned = TurnProgress::default();
@@ -68,12 +74,15 @@ pub(crate) fn turns(
         let attitude_rad = talk.latest.attitude_rad.and_then(|attitude_rad| attitude_rad.get(turn.axis).copied());
         let attitude_rad = f64::from(attitude_rad.unwrap_or_default()) * turn.sign;
         step.found("specific force, forward, left, up [m/s2]", three(turned.force_m_s2));
-        step.found("turned by the gyroscope, expected 90", format!("{:.0} degrees", angle_rad.to_degrees()));
-        step.found("by the estimate, expected 90", format!("{:.0} degrees", attitude_rad.to_degrees()));
-        step.check(is_done, "the accelerometer has not shown that side up which should be");
+        step.found("angle turned by the gyroscope, 90 expected", format!("{:.0} degrees", angle_rad.to_degrees()));
+        step.found("angle turned by the estimate, 90 expected", format!("{:.0} degrees", attitude_rad.to_degrees()));
+        step.check(is_done, "the accelerometer does not show the requested side facing up; check the IMU's rotation");
         // Between half and one and a half right angles.
-        step.check((0.78..2.36).contains(&angle_rad), "the gyroscope has not shown this turn");
-        step.check(attitude_rad > 0.5, "the attitude has not shown this turn");
+        step.check(
+            (0.78..2.36).contains(&angle_rad),
+            "the gyroscope does not show this turn; check the IMU's rotation",
+        );
+        step.check(attitude_rad > 0.5, "the estimated attitude does not show this turn");
         add(step);
     }
     Ok(())

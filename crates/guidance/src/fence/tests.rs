@@ -168,7 +168,7 @@ fn what_is_no_area_is_refused() {
     assert_eq!(check(&[]), Some(PolygonFault::TooFew));
     assert_eq!(check(&[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]), None);
     assert_eq!(check(&[[0.0, 0.0], [9.0, 0.0], [9.0, 0.05]]), Some(PolygonFault::Degenerate));
-    // An edge that folds back.
+    // One edge folds back onto another.
     assert_eq!(check(&[[0.0, 0.0], [9.0, 0.0], [4.0, 0.0]]), Some(PolygonFault::Degenerate));
     // A vertex on another edge, and a bow tie.
     let touching = [[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [4.0, 0.0], [0.0, 9.0]];

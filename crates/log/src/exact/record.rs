@@ -137,6 +137,7 @@ mod name {
     }
 
     pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<RecordName, D::Error> {
-        RecordName::new(<&str>::deserialize(from)?).ok_or_else(|| D::Error::custom("no name of a parameter"))
+        RecordName::new(<&str>::deserialize(from)?)
+            .ok_or_else(|| D::Error::custom("the record has no valid parameter name"))
     }
 }

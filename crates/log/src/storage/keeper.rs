@@ -64,8 +64,8 @@ impl StorageState {
             StorageState::Unknown => None,
             StorageState::Ready => Some("Log: ready"),
             StorageState::Absent => Some("Log: no card"),
-            StorageState::Foreign => Some("Log: no FAT16 or FAT32 on the card"),
-            StorageState::Full => Some("Log: full until logs are erased"),
+            StorageState::Foreign => Some("Log: the card has no FAT16 or FAT32"),
+            StorageState::Full => Some("Log: storage full, erase logs"),
             StorageState::Failed => Some("Log: storage has failed"),
         }
     }

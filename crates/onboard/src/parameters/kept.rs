@@ -52,13 +52,13 @@ impl Kept {
     ) -> Result<(), Error<F::Error>> {
         let found = store.found();
         if found.foreign {
-            notice(Reason::new("parameters", "store unreadable, all at defaults"));
+            notice(Reason::new("parameters", "store unreadable, using defaults"));
         }
         if found.of_another {
-            notice(Reason::new("parameters", "stored for another vehicle, not used"));
+            notice(Reason::new("parameters", "stored for another vehicle, ignored"));
         }
         if found.damaged > 0 {
-            notice(Reason::new("parameters", "a write was cut off, left out"));
+            notice(Reason::new("parameters", "power failed in a write, one value lost"));
         }
         let read = store.visit(|name, edition, bits| {
             let put = self.read(name, edition, bits).and_then(|(name, value)| table.put(name, value));
@@ -137,6 +137,10 @@ impl Kept {
         let renamed = self.renamed.iter().find(|(former, _)| *former == name.as_str());
         let now = renamed.and_then(|(_, now)| RecordName::new(now)).unwrap_or(name);
         let is_changed = self.changed.iter().any(|(name, since)| *name == now.as_str() && edition < *since);
-        if is_changed { Err(Reason::on(now, "has changed, set it again")) } else { Ok((now, f32::from_bits(bits))) }
+        if is_changed {
+            Err(Reason::on(now, "its meaning changed, set it again"))
+        } else {
+            Ok((now, f32::from_bits(bits)))
+        }
     }
 }

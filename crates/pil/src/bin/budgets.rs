@@ -67,7 +67,7 @@ fn run() -> Result<bool, Error> {
     for chain in &tick.doubles {
         println!("computes in double precision: {}", chain.join(" > "));
     }
-    println!("calls through a pointer, taken for the executor's waker: {}", tick.indirect.join(", "));
+    println!("calls through a pointer, assumed to be the executor's waker: {}", tick.indirect.join(", "));
 
     // The deepest call chain of start-up, plus one interrupt of each level.
     let start_up = flight.reach("main")?;
@@ -75,7 +75,9 @@ fn run() -> Result<bool, Error> {
         start_up.indirect.iter().map(String::as_str).filter(|name| !BOOT_LOADER.contains(name)).collect();
     if !callers.is_empty() {
         let callers = callers.join(", ");
-        return Err(Error::Protocol(format!("start-up calls through a pointer, which no proof follows, in {callers}")));
+        return Err(Error::Protocol(format!(
+            "start-up calls through a pointer in {callers}; the proof does not follow these calls"
+        )));
     }
     // Stack of start-up before the links' task exists, and afterwards.
     let before = start_up.stack_bytes;
@@ -111,7 +113,7 @@ fn run() -> Result<bool, Error> {
         println!("stops the motors: {}", chain.join(" > "));
     }
     for chain in &dispensable {
-        println!("ends a task without which the vehicle flies on: {}", chain.join(" > "));
+        println!("panics in a task that the flight does not need: {}", chain.join(" > "));
     }
 
     let check = std::env::args().any(|argument| argument == "--check");
@@ -132,18 +134,23 @@ fn run() -> Result<bool, Error> {
         line("DSHOT frames of four motors", "instructions", background.dshot.into(), Some(1_500)),
         line("SysTick's interrupt", "instructions", background.systick.into(), Some(200)),
         line("USART1's interrupt, for a byte", "instructions", background.byte.into(), Some(250)),
-        line("link's task, woken once, most seen", "instructions", background.wake.into(), None),
+        line("link's task per wake-up, most seen", "instructions", background.wake.into(), None),
         line("control tick, mean", "instructions", mean, None),
         line("control tick, least", "instructions", min, None),
         line("stack of the control tick, worst case", "bytes", tick.stack_bytes.into(), Some(4_608)),
         line("stack of everything, worst case", "bytes", nested.into(), Some(64 * 1024)),
         line("stack of everything, deepest seen in the pil image", "bytes", stack, None),
-        line("panics that the control tick can reach", "", tick.panics.len() as u64, Some(0)),
-        line("double arithmetic that the control tick can reach", "", tick.doubles.len() as u64, Some(0)),
-        line("panics that other interrupts needed in flight can reach", "", vital.len() as u64, Some(VITAL_PANICS)),
-        line("panics that link, housekeeping and USB can reach, contained", "", dispensable.len() as u64, None),
+        line("panics reachable from the control tick", "", tick.panics.len() as u64, Some(0)),
+        line("double-precision arithmetic reachable from the control tick", "", tick.doubles.len() as u64, Some(0)),
+        line(
+            "panics reachable from other interrupts that the flight needs",
+            "",
+            vital.len() as u64,
+            Some(VITAL_PANICS),
+        ),
+        line("panics reachable from link, housekeeping and USB, contained", "", dispensable.len() as u64, None),
         line("flash", "bytes", flight.flash_bytes, Some(464 * 1024)),
-        line("static RAM without the stack", "bytes", flight.ram_bytes, Some(48 * 1024)),
+        line("static RAM, without the stack", "bytes", flight.ram_bytes, Some(48 * 1024)),
     ];
     let table = table(&budgets);
     print!("{table}");

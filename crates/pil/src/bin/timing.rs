@@ -31,13 +31,13 @@ fn run() -> Result<bool, Error> {
     if !std::env::args().any(|argument| argument == "--check") {
         std::fs::write(path, written)?;
     } else if written != text {
-        wrong.push(format!("{DOCUMENT} has other tables; cargo run --release -p pil --bin timing writes them"));
+        wrong.push(format!("{DOCUMENT} has other tables; `cargo run --release -p pil --bin timing` updates them"));
     }
     for wrong in &wrong {
         eprintln!("timing: {wrong}");
     }
     if wrong.is_empty() {
-        println!("timing: {} kinds of boards, every response in time or known not to be", reports.len());
+        println!("timing: {} kinds of boards; every task is in time or listed in known.rs as late", reports.len());
     }
     Ok(wrong.is_empty())
 }

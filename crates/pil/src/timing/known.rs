@@ -15,11 +15,11 @@ pub struct KnownLateness {
     pub reason: &'static str,
 }
 
-const LINKS: &str = "every line full in both directions, and no fetch of any task a hit. Results of ticks are not \
-     reported then; nothing above this task waits for it";
+const LINKS: &str = "every serial line is full in both directions, and every fetch of every task misses the cache. The \
+     board then reports no results of ticks; no task of higher priority waits for this one";
 
-const FULL: &str = "no fetch of any task a hit, while two links are full in both directions. With `SER_TEL1_BAUD` = \
-     230400 it is in time";
+const FULL: &str = "every fetch of every task misses the cache while two links are full in both directions. With \
+     `SER_TEL1_BAUD` = 230400 the task is in time";
 const LATE_LINKS: KnownLateness = late("links' task", None, LINKS);
 
 const fn late(row: &'static str, most_us: Option<u64>, reason: &'static str) -> KnownLateness {

@@ -120,7 +120,7 @@ impl InstructionCounts {
             dshot: cell("DSHOT frames of four motors", 2)?,
             systick: cell("SysTick's interrupt", 2)?,
             byte: cell("USART1's interrupt, for a byte", 2)?,
-            wake: cell("link's task, woken once, most seen", 2)?,
+            wake: cell("link's task per wake-up, most seen", 2)?,
         })
     }
 

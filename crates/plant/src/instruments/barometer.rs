@@ -33,11 +33,11 @@ parameters! {
         /// Correlation time of the drift.
         #[parameter(DRIFT_TIME, "s", 0.001..=1e5)]
         pub drift_time_s: f64 = 600.0,
-        /// Error by the pressure under the rotors on the ground at a thrust of the weight, which makes the height too
-        /// low and grows with the thrust.
+        /// Height error on the ground caused by the pressure under the rotors, when thrust equals weight. The measured
+        /// height is too low, and the error grows with the thrust.
         #[parameter(WASH, "m", -100.0..=100.0)]
         pub wash_m: f64 = 0.0,
-        /// Height at which that error is down to 1/e.
+        /// Height at which the error by the rotors' pressure has fallen to 1/e.
         #[parameter(WASH_HEIGHT, "m", 0.01..=100.0)]
         pub wash_height_m: f64 = 0.3,
         /// Step of the output; 0 for none.

@@ -31,7 +31,7 @@ parameters! {
         /// coordinate.
         #[parameter(HORIZONTAL, "m", 0.0..=1000.0)]
         pub horizontal_m: f64 = 0.0,
-        /// Likewise of the height.
+        /// Standard deviation of the height's slow error, a first-order Gauss-Markov process.
         #[parameter(VERTICAL, "m", 0.0..=1000.0)]
         pub vertical_m: f64 = 0.0,
         /// Correlation time of the slow errors.
@@ -43,7 +43,7 @@ parameters! {
         /// Standard deviation of the velocity's white noise, per coordinate.
         #[parameter(VEL, "m/s", 0.0..=100.0)]
         pub velocity_m_s: f64 = 0.0,
-        /// Reported standard deviations over the true ones; below 1 the receiver is too sure.
+        /// Reported standard deviations divided by the true ones; below 1 the receiver is overconfident.
         #[parameter(REPORTED, "1", 0.01..=100.0)]
         pub reported: f64 = 1.0,
         /// Intervals without fixes.

@@ -13,8 +13,8 @@ parameters! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct GyroscopeModel {
-        /// One-sided density of white noise, as in data sheets: its standard deviation in a sample is this times the
-        /// root of half the sampling rate, before the filter.
+        /// One-sided density of white noise, as in data sheets. Before the filter, the standard deviation of a sample
+        /// is this density times the square root of half the sampling rate.
         #[parameter(NOISE, "rad/s/rtHz", 0.0..=0.1)]
         pub noise_rad_s_rthz: f64 = 0.0,
         /// Standard deviation of the bias instability, a first-order Gauss-Markov process.
@@ -23,7 +23,8 @@ parameters! {
         /// Correlation time of the bias instability.
         #[parameter(INSTAB_T, "s", 0.001..=1e5)]
         pub instability_time_s: f64 = 100.0,
-        /// Random walk of the bias: its standard deviation after one second, which grows with the root of time.
+        /// Random walk of the bias, given by its standard deviation after one second, which grows with the square root
+        /// of time.
         #[parameter(WALK, "rad/s2/rtHz", 0.0..=0.1)]
         pub walk_rad_s2_rthz: f64 = 0.0,
         /// Standard deviation of a constant bias, drawn once per flight.
@@ -44,8 +45,8 @@ parameters! {
         /// Cut-off of the second-order anti-alias filter; 0 for none.
         #[parameter(CUTOFF, "Hz", 0.0..=10_000.0)]
         pub cutoff_hz: f64 = 0.0,
-        /// Amplitude of the vibration from one hovering rotor at its frequency, which grows with the square of the
-        /// speed.
+        /// Amplitude of the vibration from one hovering rotor, at the rotor's frequency. The amplitude grows with the
+        /// square of the speed.
         #[parameter(VIBR, "rad/s", 0.0..=10.0)]
         pub vibration_rad_s: f64 = 0.0,
     }
@@ -56,8 +57,8 @@ parameters! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct AccelerometerModel {
-        /// One-sided density of white noise, as in data sheets: its standard deviation in a sample is this times the
-        /// root of half the sampling rate, before the filter.
+        /// One-sided density of white noise, as in data sheets. Before the filter, the standard deviation of a sample
+        /// is this density times the square root of half the sampling rate.
         #[parameter(NOISE, "m/s2/rtHz", 0.0..=1.0)]
         pub noise_m_s2_rthz: f64 = 0.0,
         /// Standard deviation of the bias instability, a first-order Gauss-Markov process.
@@ -66,7 +67,8 @@ parameters! {
         /// Correlation time of the bias instability.
         #[parameter(INSTAB_T, "s", 0.001..=1e5)]
         pub instability_time_s: f64 = 100.0,
-        /// Random walk of the bias: its standard deviation after one second, which grows with the root of time.
+        /// Random walk of the bias, given by its standard deviation after one second, which grows with the square root
+        /// of time.
         #[parameter(WALK, "m/s3/rtHz", 0.0..=1.0)]
         pub walk_m_s3_rthz: f64 = 0.0,
         /// Standard deviation of a constant bias, drawn once per flight.
@@ -87,8 +89,8 @@ parameters! {
         /// Cut-off of the second-order anti-alias filter; 0 for none.
         #[parameter(CUTOFF, "Hz", 0.0..=10_000.0)]
         pub cutoff_hz: f64 = 0.0,
-        /// Amplitude of the vibration from one hovering rotor at its frequency, which grows with the square of the
-        /// speed.
+        /// Amplitude of the vibration from one hovering rotor, at the rotor's frequency. The amplitude grows with the
+        /// square of the speed.
         #[parameter(VIBR, "m/s2", 0.0..=1000.0)]
         pub vibration_m_s2: f64 = 0.0,
     }
@@ -108,10 +110,10 @@ parameters! {
         /// Amplitudes of the vibration at one, two and three times a rotor's frequency, relative to the first.
         #[parameter(HARMONICS, "1", 0.0..=10.0)]
         pub harmonics: Vector3<f64> = Vector3::new(1.0, 0.5, 0.25),
-        /// How far the sensor is from where its mounting says, body frame: flight software is told the mounting alone.
+        /// Offset of the true sensor position from its mounting, body frame. Flight software only knows the mounting.
         #[parameter(LEVER, "m", -0.2..=0.2)]
         pub lever_m: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0),
-        /// Place on the vehicle.
+        /// Position and orientation on the vehicle.
         pub mounting: Mounting<f64> = Mounting::DEFAULT,
     }
     together(imu) {

@@ -37,11 +37,11 @@ parameters! {
         /// Standard deviation of hard iron, a constant field in the body frame, per axis, drawn once per flight.
         #[parameter(HARD_IRON, "uT", 0.0..=1000.0)]
         pub hard_iron_ut: f64 = 0.0,
-        /// Standard deviation of soft iron: of each element of the matrix that distorts the field, less the identity,
-        /// drawn once per flight.
+        /// Standard deviation of soft iron, for each element of the distortion matrix minus the identity, drawn once
+        /// per flight.
         #[parameter(SOFT_IRON, "1", 0.0..=1.0)]
         pub soft_iron: f64 = 0.0,
-        /// Field of the motors' currents at a thrust of the weight, body frame; proportional to the thrust.
+        /// Field of the motors' currents when thrust equals weight, body frame; proportional to the thrust.
         #[parameter(MOTOR, "uT", -1000.0..=1000.0)]
         pub motor_ut: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0),
         /// Largest field that is measured, per axis; 0 for no limit.

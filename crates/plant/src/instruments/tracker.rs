@@ -45,7 +45,7 @@ parameters! {
         /// Standard deviation of an outlier's attitude, about each body axis.
         #[parameter(OUTLIER_ATT, "rad", 0.0..=10.0)]
         pub outlier_rad: f64 = 0.5,
-        /// Place of the earth frame's origin in the tracker's frame.
+        /// Position of the earth frame's origin in the tracker's frame.
         #[parameter(FRAME, "m", -1000.0..=1000.0)]
         pub frame_m: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0),
         /// Yaw of the earth frame in the tracker's frame.
@@ -54,7 +54,7 @@ parameters! {
         /// Intervals without fixes.
         #[group("loss")]
         pub loss: MeasurementDropouts = MeasurementDropouts::DEFAULT,
-        /// Intervals in which the last pose before is sent again and again, with new stamps.
+        /// Intervals in which the tracker repeats its last pose with new time stamps.
         #[group("freeze")]
         pub freeze: MeasurementDropouts = MeasurementDropouts::DEFAULT,
     }

@@ -22,7 +22,7 @@ impl FromStr for SettingChange {
 
     /// Reads `KEY=VALUE`: a parameter's name and a number, or `law` and a law's name.
     fn from_str(text: &str) -> Result<Self, String> {
-        let (key, value) = text.split_once('=').ok_or("it must be KEY=VALUE, as in MPC_XY_VEL_MAX=4 or law=pid")?;
+        let (key, value) = text.split_once('=').ok_or("write KEY=VALUE, as in MPC_XY_VEL_MAX=4 or law=pid")?;
         let (key, value) = (key.trim(), value.trim());
         if key == LAW {
             let kind = ControllerKind::named(value);

@@ -43,7 +43,7 @@ fn read(frame: &[u8]) -> Result<Record, FrameError> {
 pub(super) fn look(bytes: &[u8]) -> StartSearch {
     let refused = |problem: &str| StartSearch::Refused(problem.into());
     if bytes.is_empty() {
-        return refused("it is empty; was a log sent to the link that LOG_PORT names, and its baud rate set?");
+        return refused("the log is empty; check that LOG_PORT names the recorded link, and check its baud rate");
     }
     let mut records = 0_u64;
     for frame in bytes.split(|byte| *byte == 0).filter(|frame| !frame.is_empty()) {
@@ -52,16 +52,16 @@ pub(super) fn look(bytes: &[u8]) -> StartSearch {
             Ok(_) => records += 1,
             Err(FrameError::Foreign(Some(version))) => {
                 return StartSearch::Refused(format!(
-                    "it is of version {version} of the exact log, and this program reads version {VERSION}; replay it \
-                     with the program of the version that flew it"
+                    "the exact log has version {version}, but this program reads version {VERSION}; replay the log \
+                     with the program version that flew it"
                 ));
             }
             Err(_) => {}
         }
     }
     match records {
-        0 => refused("nothing in it is an exact log; give one, as of LOG_PORT or of --exact-log"),
-        _ => refused("it has no start; record from before the vehicle is powered up"),
+        0 => refused("the file is not an exact log; give a log recorded by LOG_PORT or --exact-log"),
+        _ => refused("the log has no start record; begin recording before the vehicle is powered up"),
     }
 }
 

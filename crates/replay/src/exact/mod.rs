@@ -36,8 +36,8 @@ pub fn replay(
 ) -> Result<ExactReplay, FileError> {
     let shown = path.display().to_string();
     let failed = |problem: String| FileError::whole(&shown, problem);
-    let mut bytes =
-        fs::read(path).map_err(|error| failed(format!("cannot be read ({error}); give the path of an exact log")))?;
+    let mut bytes = fs::read(path)
+        .map_err(|error| failed(format!("the log cannot be read ({error}); give the path of an exact log")))?;
     if ulog::is_ulog(&bytes) {
         return Err(failed("this is a PX4 ULog; replay it without --exact".into()));
     }
@@ -49,7 +49,7 @@ pub fn replay(
         Some(_) => None,
         None => Some(named(&start.vehicle).map_err(failed)??),
     };
-    let Some(vehicle) = vehicle.or(known.as_ref()) else { return Err(failed("it names no vehicle".into())) };
+    let Some(vehicle) = vehicle.or(known.as_ref()) else { return Err(failed("the log names no vehicle".into())) };
     let players = player::TickPlayers::of(vehicle, &start, changes).map_err(|problem| problem.of(&shown))?;
     run::run(&mut bytes, start, players, &mut progress).map_err(failed)
 }
@@ -58,7 +58,7 @@ pub fn replay(
 fn named(name: &str) -> Result<Result<Vehicle, FileError>, String> {
     let known = built_in(name).ok_or_else(|| {
         format!(
-            "it was flown by the vehicle '{}', which is not built in; give its file by --vehicle",
+            "the log is from the vehicle '{}', which is not built in; give the vehicle's file by --vehicle",
             name.escape_debug()
         )
     })?;

@@ -49,12 +49,13 @@ impl TickPlayers {
         let Some(flown) = flown else {
             let law = start.law.escape_debug();
             return Err(PlayerError::Log(format!(
-                "it was flown under the law '{law}', which this program does not have; read it by one that has"
+                "the log was flown with the law '{law}', which this program does not have; replay the log with a \
+                 program that has this law"
             )));
         };
         if usize::from(start.rotors) != vehicle.rotors.len() {
             return Err(PlayerError::Log(format!(
-                "it was flown with {} rotors, and the vehicle {} has {}; give the vehicle's file by --vehicle",
+                "the log was flown with {} rotors, but the vehicle {} has {}; give the right vehicle file by --vehicle",
                 start.rotors,
                 vehicle.name,
                 vehicle.rotors.len()

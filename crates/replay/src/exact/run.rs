@@ -72,7 +72,8 @@ pub(super) fn run(
             Err(_) if run.out.starts == 0 => {}
             Err(FrameError::Foreign(_)) => {
                 return Err(format!(
-                    "byte {at}: a record of another version; replay each flight with the program that flew it"
+                    "byte {at}: the record has another version; replay each flight with the program version that flew \
+                     it"
                 ));
             }
             Err(FrameError::Damaged) => {
@@ -83,7 +84,7 @@ pub(super) fn run(
     }
     progress((length - told) as u64);
     if run.out.ticks == 0 {
-        return Err("it has a start and no tick; record for as long as the vehicle flies".into());
+        return Err("the log has a start record but no tick; record for as long as the vehicle flies".into());
     }
     Ok(run.out)
 }
@@ -118,7 +119,9 @@ impl ExactRun {
         let Some(changed) = &mut self.players.changed else { return Ok(()) };
         let other = match changed.take(record) {
             ReplayStep::Differs(ReplayDifference::Parameter, _) => {
-                return Err("--change: with it the vehicle cannot fly; change less, or other parameters with it".into());
+                return Err("--change: the vehicle cannot fly with this value; change it less, or change other \
+                     parameters too"
+                    .into());
             }
             ReplayStep::Same(report) | ReplayStep::Differs(_, Some(report)) => Some(report),
             ReplayStep::Nothing | ReplayStep::Differs(_, None) => None,
@@ -192,12 +195,12 @@ impl ExactRun {
 fn finding(difference: ReplayDifference) -> Result<ReplayFinding, String> {
     match difference {
         ReplayDifference::Start(StartRecord { rotors, parameters, vehicle, .. }) => Err(format!(
-            "it is of the vehicle {vehicle} with {rotors} rotors and {parameters} parameters, of which this program \
-             knows others; give the vehicle's file by --vehicle, or use the program of the version that flew it"
+            "the log is from the vehicle {vehicle} with {rotors} rotors and {parameters} parameters, but this program \
+             has other parameters; give the vehicle's file by --vehicle, or use the program version that flew it"
         )),
         ReplayDifference::Parameters(StartRecord { vehicle, .. }) => Err(format!(
-            "the vehicle {vehicle} is not what it was: its file has changed, it is another vehicle's, or parameters of \
-             the start are lost; give the file that flew by --vehicle"
+            "the vehicle {vehicle} differs from the one that flew: its file has changed, the file is another \
+             vehicle's, or parameters of the start record are lost; give the file that flew by --vehicle"
         )),
         ReplayDifference::Parameter => Ok(ReplayFinding::Parameter),
         ReplayDifference::Configuration(_) => Ok(ReplayFinding::Configuration),

@@ -38,9 +38,10 @@ pub struct McapSummary {
 /// One line, if the log cannot be read, is not a ULog, or `to` cannot be written.
 pub fn convert(path: &Path, to: impl Write + Seek) -> Result<McapSummary, FileError> {
     let failed = |problem: String| FileError::whole(&path.display().to_string(), problem);
-    let bytes = fs::read(path).map_err(|error| failed(format!("cannot be read ({error}); give the path of a log")))?;
+    let bytes =
+        fs::read(path).map_err(|error| failed(format!("the log cannot be read ({error}); give the path of a log")))?;
     if !is_ulog(&bytes) {
-        return Err(failed("this is not a ULog; give a log of --ulog or of PX4".into()));
+        return Err(failed("this is not a ULog; give a log written by --ulog or by PX4".into()));
     }
     write(&bytes, to).map_err(failed)
 }
@@ -96,7 +97,7 @@ fn times_us(bytes: &[u8]) -> Result<Vec<u64>, String> {
 }
 
 fn unwritten(error: McapError) -> String {
-    format!("the MCAP file cannot be written ({error}); make room")
+    format!("the MCAP file cannot be written ({error}); free some space")
 }
 
 /// A conversion in progress: what was read so far, and the file being written.
@@ -165,7 +166,7 @@ impl<W: Write + Seek> Conversion<W> {
             return Err(unwritten(failure));
         }
         if output.messages == 0 {
-            let why = if damaged == 0 { "it ends before the first" } else { "what is in it is damaged" };
+            let why = if damaged == 0 { "the log ends before the first message" } else { "all messages are damaged" };
             return Err(format!("no message can be read: {why}; copy it from the vehicle again"));
         }
         for (name, metadata) in [("parameters", parameters), ("information", information)] {

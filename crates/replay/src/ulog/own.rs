@@ -26,8 +26,8 @@ pub(super) fn recording(tables: &TopicTables) -> Result<Option<Recording>, Strin
     }
     // A damaged log may have lost its IMU samples: that is reported with the damage, below.
     if tables.first(SENSOR_COMBINED).is_empty() && tables.notes.is_empty() {
-        return Err("no samples of an inertial sensor: the vehicle flew on states from outside; log one that has an \
-                    inertial sensor, as in sitl fly mocap"
+        return Err("the log has no samples of an inertial sensor: the vehicle flew on states from outside; log a \
+             vehicle that has an inertial sensor, as in sitl fly mocap"
             .into());
     }
     let settings = settings(tables);

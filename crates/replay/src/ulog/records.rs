@@ -72,7 +72,7 @@ const APPENDED: u64 = 1;
 /// # Errors
 /// A message, if the file is too short or its flags say that this reader does not know its format.
 fn parts(bytes: &[u8]) -> Result<Vec<usize>, String> {
-    let after = bytes.get(HEADER..).ok_or("cut within the first 16 bytes; copy it from the vehicle again")?;
+    let after = bytes.get(HEADER..).ok_or("the log ends within its first 16 bytes; copy it from the vehicle again")?;
     let mut parts = vec![HEADER];
     // Logs of version 0 have no flags.
     if let RecordCut::Record(b'B', content, _) = cut(after) {
@@ -81,8 +81,8 @@ fn parts(bytes: &[u8]) -> Result<Vec<usize>, String> {
         let incompatible = words.nth(1).unwrap_or_default();
         if incompatible & !APPENDED != 0 {
             return Err(format!(
-                "in a newer format than this program knows: its incompatible flags are {incompatible:#x}; read it with \
-                 the tools of the program that wrote it, or with a newer version of this one"
+                "the log's format is newer than this program: its incompatible flags are {incompatible:#x}; read the \
+                 log with the tools of the program that wrote it, or with a newer version of this program"
             ));
         }
         for place in words.take(3).filter(|_| incompatible & APPENDED != 0) {

@@ -307,7 +307,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<TopicTables, String> {
     tables.announced = wanted.announced;
     match end {
         RecordsEnd::Whole => {}
-        RecordsEnd::Cut(at) => tables.notes.push(format!("The file ends within the record at byte {at}: it is cut.")),
+        RecordsEnd::Cut(at) => tables.notes.push(format!("The file is cut off within the record at byte {at}.")),
         RecordsEnd::Lost(at) => tables.notes.push(format!("Nothing can be read from byte {at} on.")),
     }
     if let Some(first) = first {

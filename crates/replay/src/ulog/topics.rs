@@ -85,12 +85,12 @@ pub(super) fn imu(tables: &TopicTables, samples: &mut Vec<ImuSample>) -> Result<
     if kept.is_empty() {
         let damage = tables.notes.join(" ");
         let cure = match damage.is_empty() {
-            true => "log it (SDLOG_PROFILE with the default topics), or give another log".to_owned(),
+            true => "log that topic (SDLOG_PROFILE with the default topics), or give another log".to_owned(),
             false => format!("copy the log from the vehicle again ({damage})"),
         };
         return Err(match rows.len() {
-            0 => format!("no samples of an inertial sensor: topic {topic} is missing; {cure}"),
-            count => format!("no usable sample of an inertial sensor among {count} of topic {topic}; {cure}"),
+            0 => format!("the log has no samples of an inertial sensor: topic {topic} is missing; {cure}"),
+            count => format!("none of the {count} samples of the inertial sensor in topic {topic} is usable; {cure}"),
         });
     }
     *samples = kept;
@@ -130,7 +130,7 @@ impl ReceiverFixes {
             if !best.fixes.is_empty() {
                 if instances.len() > 1 {
                     let count = instances.len();
-                    notes.push(format!("Of {count} receivers in {}, the one with the number {used} is used.", topic.0));
+                    notes.push(format!("{} has {count} receivers; receiver number {used} is used.", topic.0));
                 }
                 break;
             }

@@ -45,7 +45,7 @@ pub(super) fn flights(summary: &CampaignSummary) -> u64 {
 /// Explains the columns in a few sentences.
 pub(super) fn legend(summary: &CampaignSummary) -> String {
     let lost = summary.tallies.iter().any(|tally| tally.count.kept < tally.count.flights);
-    let worse = " A lost flight ranks last; \"lost\" is a percentile that is one.";
+    let worse = " A lost flight ranks last; \"lost\" marks a percentile that falls on a lost flight.";
     let (worse, of) = if lost { (worse, ", of flights that were not lost") } else { ("", "") };
     format!(
         "Distances from the reference, from {SETTLED_S} s to the end.{worse} |ΔU₄|: mean absolute change of the thrust \
@@ -59,8 +59,8 @@ pub(super) fn bad(target: &str, tally: &ContenderSummary, bad: &WorstFlight) -> 
     let how = match &bad.lost {
         Some((time_s, reason)) => format!("lost at t = {time_s:.3} s: {reason}"),
         None => match bad.rmse_position_m {
-            Some(rmse_m) => format!("{rmse_m:.5} m from the reference, root mean square"),
-            None => format!("over before {SETTLED_S} s, from which errors count"),
+            Some(rmse_m) => format!("root mean square distance from the reference {rmse_m:.5} m"),
+            None => format!("the flight ended before {SETTLED_S} s, from which on errors count"),
         },
     };
     let quoted = |text: &str| if text.contains(' ') { format!("\"{text}\"") } else { text.to_owned() };

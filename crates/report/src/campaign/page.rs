@@ -24,7 +24,7 @@ pub(super) fn page(summary: &CampaignSummary, figures: &[Picture]) -> String {
             @for figure in figures { (picture(figure)) }
             h3 { "Not lost, by trajectory" }
             div.scroll { (by_trajectory(summary)) }
-            p.quiet { "Below each share: its 95 % interval." }
+            p.quiet { "The 95 % interval stands below each share." }
             h3 { "Worst flights" }
             div.scroll { (worst(summary)) }
             @if !manifest.drawn.is_empty() {

@@ -39,7 +39,7 @@ pub(super) fn grids(comparison: &Comparison) -> Vec<Grid> {
     let heads: Vec<String> = ["law"].into_iter().chain(heads(comparison)).map(String::from).collect();
     rows.iter_mut().for_each(|(_, cells)| cells.resize(heads.len() - 1, "".into()));
     let caption = format!("{}: {}", comparison.scenario.name, words::conditions(&comparison.scenario));
-    let note = legend(core::slice::from_ref(comparison)).replace(" *: best of its column.", "");
+    let note = legend(core::slice::from_ref(comparison)).replace(" *: best of the column.", "");
     [Grid { caption, heads, rows, note }].into_iter().chain(differences::grid(comparison)).collect()
 }
 
@@ -80,7 +80,7 @@ pub(super) fn legend(comparisons: &[Comparison]) -> String {
     if comparisons.iter().any(has_ratio) {
         words += " Ratio: root mean square distance from the reference, divided by backstepping's.";
     }
-    words += " *: best of its column.";
+    words += " *: best of the column.";
     if comparisons.iter().any(Comparison::is_repeated) {
         words += " Medians over all seeds.";
     }

@@ -64,16 +64,16 @@ pub(super) fn contents(replay: &ExactReplay) -> Vec<String> {
     )];
     let (first, later): (Vec<_>, Vec<_>) = parameters.iter().partition(|parameter| parameter.at_s.is_none());
     if !first.is_empty() {
-        said.push(format!("Parameters not as in the image: {}.", listed(&first)));
+        said.push(format!("Parameters that differ from the image: {}.", listed(&first)));
     }
     if !later.is_empty() {
         said.push(format!("Parameters changed later: {}.", listed(&later)));
     }
     if let (count, Some(at)) = damaged {
-        said.push(format!("{} cannot be read, the first at byte {at}.", counted(*count, "frame")));
+        said.push(format!("{} cannot be read; the first is at byte {at}.", counted(*count, "frame")));
     }
     if *cut_bytes > 0 {
-        said.push(format!("The log ends within a frame, {cut_bytes} bytes of which are left."));
+        said.push(format!("The log ends within a frame; {cut_bytes} bytes of that frame are left."));
     }
     said
 }
@@ -88,7 +88,7 @@ fn listed(parameters: &[&LoggedParameter]) -> String {
         let what = parameter
             .name
             .as_ref()
-            .map_or("all as in the image".into(), |name| format!("{name} = {}", parameter.value));
+            .map_or("all parameters are as in the image".into(), |name| format!("{name} = {}", parameter.value));
         parameter.at_s.map_or(what.clone(), |at_s| format!("{what} at {at_s:.1} s"))
     };
     let all: Vec<_> = parameters.iter().take(LISTED_MAX).map(one).collect();
@@ -101,11 +101,11 @@ fn listed(parameters: &[&LoggedParameter]) -> String {
 pub(super) fn verdict(replay: &ExactReplay) -> String {
     match &replay.first_difference {
         None if replay.damaged.0 > 0 => {
-            format!("All {} ticks that can be read give the same again, to the last bit.", replay.same_ticks)
+            format!("All {} readable ticks give the same results again, to the last bit.", replay.same_ticks)
         }
-        None => format!("All {} ticks give the same again, to the last bit.", replay.same_ticks),
+        None => format!("All {} ticks give the same results again, to the last bit.", replay.same_ticks),
         Some(first) => {
-            let same = format!("{} ticks give the same again, to the last bit", replay.same_ticks);
+            let same = format!("{} ticks give the same results again, to the last bit", replay.same_ticks);
             format!("{same}; then {}.", different(replay, first))
         }
     }
@@ -119,14 +119,14 @@ fn different(replay: &ExactReplay, first: &FirstDifference) -> String {
     match finding {
         ReplayFinding::Given(signals) => {
             let signals: Vec<_> = signals.iter().map(signal).collect();
-            format!("{place} at {at_s:.3} s (byte {byte}) gives something else: {}", signals.join(", "))
+            format!("{place} at {at_s:.3} s (byte {byte}) gives another result: {}", signals.join(", "))
         }
         ReplayFinding::Missing => format!("{place}, after {at_s:.3} s (byte {byte}), is missing"),
         ReplayFinding::Configuration => {
-            format!("{place} at {at_s:.3} s (byte {byte}) flies parameters that are missing")
+            format!("{place} at {at_s:.3} s (byte {byte}) flies with parameters that the log lacks")
         }
         ReplayFinding::Parameter => {
-            format!("a parameter before {place} (byte {byte}) is not known, or does not make a vehicle that flies")
+            format!("a parameter before {place} (byte {byte}) is unknown, or the vehicle cannot fly with its value")
         }
     }
 }
@@ -148,17 +148,17 @@ pub fn problem(log: &ReplayedLog<'_>) -> Option<String> {
     let cure = match &replay.first_difference {
         None if damaged == 0 => return None,
         Some(FirstDifference { finding: ReplayFinding::Given(_), .. }) if damaged == 0 => {
-            "replay it with the program of the version that flew it; if that differs too, it is a defect"
+            "replay the log with the program version that flew it; if the result still differs, this is a bug"
         }
         Some(FirstDifference { finding: ReplayFinding::Parameter, .. }) => {
-            "replay it with the program of the version that flew it"
+            "replay the log with the program version that flew it"
         }
         _ => "the log has lost bytes: copy it again, or raise the baud rate of its link",
     };
     let damage = at.map_or(String::new(), |at| format!("byte {at}: {} damaged; ", counted(damaged, "frame")));
     let what = match &replay.first_difference {
         Some(first) => different(replay, first),
-        None => "what they said is not known".into(),
+        None => "the content of the damaged frames is unknown".into(),
     };
     Some(format!("{damage}{what}; {cure}"))
 }
@@ -167,12 +167,15 @@ pub fn problem(log: &ReplayedLog<'_>) -> Option<String> {
 pub(super) fn changed(comparison: &ChangeComparison) -> Vec<String> {
     let changes: Vec<_> = comparison.changes.iter().map(SettingChange::to_string).collect();
     let mut said = vec![format!(
-        "With {}, from the same inputs. The vehicle did not fly so: its readings are those of what was flown.",
+        "With {}, from the same inputs. The vehicle did not fly with these settings; its readings come from the flight \
+         as flown.",
         changes.join(" and ")
     )];
     if let Some(at_s) = comparison.other_mode_s {
         let for_s = comparison.other_mode as f64 / RATE_HZ;
-        said.push(format!("The flight core is in another mode for {for_s:.1} s, from {at_s:.3} s on."));
+        said.push(format!(
+            "With the changed settings, the flight core is in another mode for {for_s:.1} s, from {at_s:.3} s on."
+        ));
     }
     said
 }

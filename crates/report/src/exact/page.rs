@@ -26,8 +26,8 @@ pub(super) fn page(log: &ReplayedLog<'_>, pictures: &[Picture]) -> String {
                     }
                 }
             } }
-            p.quiet { "Differences of the ticks in which the vehicle is armed under both settings." }
-            (space(figures::exact::space(replay), "The estimates, as flown and under the changed settings."))
+            p.quiet { "Differences in ticks during which the vehicle is armed with both settings." }
+            (space(figures::exact::space(replay), "The estimates, as flown and with the changed settings."))
             @for figure in pictures { (picture(figure)) }
         },
     )

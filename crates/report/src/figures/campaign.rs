@@ -51,7 +51,7 @@ pub(crate) fn draw(summary: &CampaignSummary) -> Vec<Picture> {
         values: |tally| &tally.mean_abs_du4_n,
     };
     let figure = |name, caption, svg: Option<String>| svg.map(|svg| Picture { name, caption, svg, explorable: None });
-    let interval = "Pale: 95 % interval of the share. Mark: end of a curve.";
+    let interval = "Pale band: 95 % interval of the share. Mark: end of a curve.";
     let not_lost = if lost { " of the flights that were not lost" } else { " of the flights" };
     let spread = summary.manifest.drawn.iter().any(is_spread) && flights > 0;
     let figures = [

@@ -70,7 +70,7 @@ pub(crate) fn draw(replay: &ExactReplay) -> Vec<Picture> {
     let mut pictures = Vec::new();
     for (name, title, caption, panes) in [
         ("motors", "Rotor speeds", "Rotor speeds, commanded.", MOTORS.get(..replay.rotors).unwrap_or(&MOTORS)),
-        ("demands", "Demands", "Attitude that the law wants, heading, and its inputs before rotor limits.", &DEMANDS),
+        ("demands", "Demands", "Desired attitude and heading, and the law's inputs before rotor limits.", &DEMANDS),
         ("estimate", "Estimate", "Estimated position and attitude.", &ESTIMATE),
     ] {
         let panels: Vec<ChartPanel> = panes.iter().filter_map(panel).collect();
@@ -81,7 +81,7 @@ pub(crate) fn draw(replay: &ExactReplay) -> Vec<Picture> {
             comparison.other_mode_s.map(|at_s| ("other mode".to_owned(), at_s)).into_iter(),
             end_s,
             PLOT_PX,
-            " Thin line: the flight core is in another mode.",
+            " Thin line: the flight core changes to another mode.",
         );
         let legend = vec![("as flown".to_owned(), REFERENCE), ("changed".to_owned(), own)];
         let chart = TimeChart { title, conditions: &conditions, marks, end_s, legend, panels };

@@ -140,8 +140,8 @@ pub(crate) fn draw(recording: &Recording, replayed: &Replayed) -> Vec<Picture> {
     let panels: Vec<ChartPanel> =
         panels.into_iter().filter(|panel| panel.lines.iter().any(|line| line.points.len() > 1)).collect();
     if lines_drawn(&panels) {
-        let caption = "Log less estimate where both are valid, and three times the estimate's standard deviation \
-                       (pale); rotations are about the axes of the earth frame.";
+        let caption = "Log minus estimate while both are valid, and three times the estimate's standard deviation \
+             (pale). Rotations are about the axes of the earth frame.";
         let legend = [("log less estimate", own), ("3σ", band)];
         pictures.push(chart("difference", caption, "Difference", &legend, panels));
     }

@@ -314,7 +314,7 @@ fn stale_files_are_removed_and_foreign_ones_kept() {
 
     // A folder of another command; and a marker file with any single bit flipped.
     let refused = || Folder::open(&scratch.0, "other", "that", false).unwrap_err().to_string();
-    assert!(refused().contains("holds what `sitl test` made of it;"), "{}", refused());
+    assert!(refused().contains("the folder holds the results of `sitl test` for it;"), "{}", refused());
     let marker = scratch.0.join(".sitl.json");
     let bytes = fs::read(&marker).unwrap();
     for (at, bit) in (0..bytes.len()).flat_map(|at| (0..8).map(move |bit| (at, bit))) {

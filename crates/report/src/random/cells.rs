@@ -57,7 +57,7 @@ pub(super) fn notes(judged: &RandomResults<'_>, group: &VehicleGroup<'_>) -> Vec
     let baseline = judged.baseline();
     [
         (&group.lost_by_all, "Every law loses".into()),
-        (&group.lost_alone, format!("{baseline} loses, another law keeps")),
+        (&group.lost_alone, format!("{baseline} loses the vehicle, another law does not")),
     ]
     .into_iter()
     .filter(|(flights, _)| !flights.is_empty())

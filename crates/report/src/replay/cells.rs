@@ -64,14 +64,14 @@ pub(super) fn sentences(replay: &ReplayedRecording<'_>) -> Vec<String> {
         said.push(format!("Missing: {}.", listed(missing)));
     }
     if !unusable.is_empty() {
-        said.push(format!("In the log, but never valid: {}.", listed(unusable)));
+        said.push(format!("Logged, but never valid: {}.", listed(unusable)));
     }
     said.extend(recording.notes.iter().cloned());
     let rate_hz = recording.imu_rate_hz();
     if rate_hz < 90.0 {
         said.push(format!(
-            "The inertial sensor was logged at {rate_hz:.0} Hz; the estimator needs 100 Hz, so take these figures for \
-             what the log lost."
+            "The inertial sensor was logged at {rate_hz:.0} Hz, but the estimator needs 100 Hz; these figures also \
+             show what the log lost."
         ));
     }
     said.push(start(replay));
@@ -84,8 +84,8 @@ pub(super) fn sentences(replay: &ReplayedRecording<'_>) -> Vec<String> {
     }
     let Resets { position, velocity, heading, height, tilt, covariance, restarts } = replayed.resets;
     said.push(format!(
-        "Set anew by the estimator: position {position}, velocity {velocity}, heading {heading}, barometer's offset \
-         {height}, tilt doubted {tilt}, covariance {covariance}, restarts {restarts} times."
+        "Number of resets by the estimator: position {position}, velocity {velocity}, heading {heading}, barometer's \
+         offset {height}, tilt variance {tilt}, covariance {covariance}, restarts {restarts}."
     ));
     let rejected = AIDS.iter().filter_map(|(name, aid)| {
         let record = replayed.aids.of(*aid);
@@ -97,7 +97,10 @@ pub(super) fn sentences(replay: &ReplayedRecording<'_>) -> Vec<String> {
     }
     let dropped = &replayed.dropped;
     if dropped.disturbed > 0 {
-        said.push(format!("{} magnetic fields were not those of the start, and not used.", dropped.disturbed));
+        said.push(format!(
+            "{} magnetic field measurements differ from the field at the start, and were not used.",
+            dropped.disturbed
+        ));
     }
     if !recording.resets.is_empty() {
         let first_us = recording.imu.first().map_or(0, |sample| sample.at_us);
@@ -108,7 +111,10 @@ pub(super) fn sentences(replay: &ReplayedRecording<'_>) -> Vec<String> {
         let all: Vec<_> = recording.resets.iter().take(RESETS_MAX).map(one).collect();
         let more = recording.resets.len() - all.len();
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        said.push(format!("The log's own estimate was reset: {}{more}. The differences contain that.", all.join(", ")));
+        said.push(format!(
+            "The log's own estimate was reset: {}{more}. The differences include these resets.",
+            all.join(", ")
+        ));
     }
     said
 }
@@ -125,14 +131,19 @@ pub(super) const AIDS: [(&str, AidSource); 5] = [
 fn start(replay: &ReplayedRecording<'_>) -> String {
     let from_s = replay.replayed.from_s;
     match replay.replayed.start {
-        EstimatorStart::AtRest(at_s) => format!("Started at rest after {at_s:.1} s; compared from {from_s:.1} s on."),
+        EstimatorStart::AtRest(at_s) => {
+            format!("The estimator started at rest after {at_s:.1} s; compared from {from_s:.1} s on.")
+        }
         EstimatorStart::FromLog(at_s, None) => format!(
-            "The vehicle was in the air: started at {at_s:.1} s in the log's own state; compared from {from_s:.1} s on."
+            "The vehicle was in the air, so the estimator started at {at_s:.1} s from the log's own state; compared \
+             from {from_s:.1} s on."
         ),
         EstimatorStart::FromLog(at_s, Some(why)) => format!(
-            "Did not start by itself ({why}): started at {at_s:.1} s in the log's own state; compared from \
-             {from_s:.1} s on."
+            "The estimator did not start by itself ({why}). It was started at {at_s:.1} s from the log's own state; \
+             compared from {from_s:.1} s on."
         ),
-        EstimatorStart::Never(why) => format!("Never started: {why}; and the log has no attitude to start from."),
+        EstimatorStart::Never(why) => {
+            format!("The estimator never started ({why}), and the log has no attitude to start from.")
+        }
     }
 }

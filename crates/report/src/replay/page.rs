@@ -21,11 +21,12 @@ pub(super) fn page(replay: &ReplayedRecording<'_>, pictures: &[Picture]) -> Stri
                 }
             } }
             p.quiet {
-                "Log less estimate. Within 3σ: share of the coordinates within three of the estimator's standard \
-                 deviations. Valid: share of the log's times at which the estimate was valid; only these are compared."
+                "Differences: log minus estimate. Within 3σ: share of the coordinates within three of the estimator's \
+                 standard deviations. Valid: share of the log's times at which the estimate was valid; only these \
+                 times are compared."
             }
             @for sentence in cells::sentences(replay) { p { (sentence) } }
-            (space(figures::replay::space(replay.replayed), "Both estimates where they are valid."))
+            (space(figures::replay::space(replay.replayed), "Both estimates, while they are valid."))
             @for figure in pictures { (picture(figure)) }
         },
     )

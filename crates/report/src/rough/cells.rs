@@ -64,12 +64,13 @@ pub(super) fn words(results: &RoughResults<'_>) -> String {
 /// Explains the columns.
 pub(super) fn legend() -> String {
     format!(
-        "known: what data sheets, stamps or silence tell the vehicle. Of the estimate while it was valid, from \
-         {SETTLED_S} s to the end or until the motors stop: NEES, the normalised estimation error squared of rotation, \
-         velocity and position, mean over the flights, 9 if the estimate is consistent; none if a covariance was not \
-         positive. worst: that of the worst flight. within 3 sigma: share of the nine errors. valid: share of the \
-         time. Number of flights in which the flight core flew without a fresh state (coasted), descended, or the \
-         monitor handed the vehicle over; and of vehicles lost."
+        "known: the vehicle knows of the error from data sheets, time stamps or missing data. Figures of the estimate \
+         count while the estimate was valid, from {SETTLED_S} s to the end or until the motors stop: NEES, the \
+         normalised estimation error squared of rotation, velocity and position, mean over the flights, 9 if the \
+         estimate is consistent; none if a covariance was not positive. worst: NEES of the worst flight. within 3 \
+         sigma: share of the nine errors within three standard deviations. valid: share of the time. coasted, \
+         descended, fell back, lost: numbers of flights in which the flight core flew without a fresh state, in which \
+         it descended, in which the monitor switched to the fallback law, and in which the vehicle was lost."
     )
 }
 

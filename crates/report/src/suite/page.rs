@@ -17,7 +17,7 @@ pub(super) fn page(flown: FlownSuite<'_>, drawn: Vec<FlightFigures>) -> String {
             p { (suite.description) "." }
             p.quiet {
                 "Every contender flies the same vehicle through the same noise and weather, with gains tuned for it by "
-                "the vehicle's rule. Figures are evaluated from " (SETTLED_S) " s to the end. *: best of its flight."
+                "the vehicle's rule. Figures are evaluated from " (SETTLED_S) " s to the end. *: best of the flight."
             }
             h2 { "Where they stand" }
             p.quiet {

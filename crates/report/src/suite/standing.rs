@@ -53,10 +53,11 @@ pub(super) fn grid(flown: FlownSuite<'_>) -> Grid {
     let heads = ["law", "best or level", "lost", &over].into_iter().chain(TEST).map(String::from).collect();
     let flights = flown.comparisons.len();
     let note = format!(
-        "Of the root mean square distance from the reference, by each flight's median over the seeds. best or level: \
-         flights in which a law is best, or within 5 % or 0.2 mm of the best. lost: flights that are lost by most \
-         seeds. over {baseline}: geometric mean of the law's distance over that of {baseline} in the flights that both \
-         keep, with its 95 % interval (bootstrap over the flights, {RESAMPLES} resamples). {TEST_LEGEND}"
+        "Figures of the root mean square distance from the reference, each flight by its median over the seeds. best \
+         or level: flights in which a law is best, or within 5 % or 0.2 mm of the best. lost: flights in which most \
+         seeds lose the vehicle. over {baseline}: the law's distance divided by {baseline}'s, geometric mean over the \
+         flights that neither loses, with its 95 % interval (bootstrap over the flights, {RESAMPLES} resamples). \
+         {TEST_LEGEND}"
     );
     Grid {
         caption: format!("Suite {}: how the laws stand in {flights} flights", flown.suite.name),

@@ -29,7 +29,7 @@ pub fn table(flown: FlownSuite<'_>) -> String {
     let mut lines: Vec<String> = parts(&rows).join(&String::new());
     lines.push(String::new());
     trips.iter().for_each(|trip| wrap(&mut lines, "", trip));
-    let words = format!("{}, from {SETTLED_S} s to the end. *: best of its flight.", rms.title);
+    let words = format!("{}, from {SETTLED_S} s to the end. *: best of the flight.", rms.title);
     wrap(&mut lines, "", &words);
     let standing = standing::grid(flown);
     lines.push(String::new());

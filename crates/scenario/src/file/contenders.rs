@@ -90,10 +90,10 @@ pub(super) fn read(root: &mut Table<'_>, flown: FlownVehicle<'_>) -> Result<Vec<
 }
 
 fn contender(mut table: Table<'_>, file: Defaults<'_>, others: &[Contender]) -> Result<Contender, FileError> {
-    let name = table.need_text("name", "give it one, such as \"gentle\"")?.to_owned();
+    let name = table.need_text("name", "give the contender a name, such as \"gentle\"")?.to_owned();
     let is_known = table.knows("name");
     if !(1..=NAME_LENGTH).contains(&name.chars().count()) || name.chars().any(char::is_control) {
-        let problem = format!("it cannot be a name; make it one plain line of 1 to {NAME_LENGTH} characters");
+        let problem = format!("this cannot be a name; write one plain line of 1 to {NAME_LENGTH} characters");
         return Err(table.fault_at("name", problem));
     }
     if is_known && others.iter().any(|other| other.name == name) {

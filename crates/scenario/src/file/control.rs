@@ -12,7 +12,7 @@ pub(super) fn settings(parent: &mut Table<'_>, default: Settings, with_step: boo
         if with_step {
             table.declared(&mut settings)?;
         } else {
-            table.forbid(step, "one step serves all contenders; set it in the file's own [settings]")?;
+            table.forbid(step, "all contenders share one time step; set it in the file's own [settings]")?;
             table.declared_but(step, &mut settings)?;
         }
         table.finish()?;

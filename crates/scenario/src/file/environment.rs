@@ -48,7 +48,11 @@ pub(super) fn read(root: &mut Table<'_>, truth: Parameters<f64>) -> Result<Envir
         match Environment::new(truth, changes, environment.gusts().to_vec()) {
             Ok(changed) => environment = changed,
             Err(error) => {
-                table.clash(FACTOR.name, ALL, format!("it makes {}; change the factor", out_of_range(&error)))?;
+                table.clash(
+                    FACTOR.name,
+                    ALL,
+                    format!("the factor causes {}; change the factor", out_of_range(&error)),
+                )?;
             }
         }
     }
@@ -59,7 +63,7 @@ pub(super) fn read(root: &mut Table<'_>, truth: Parameters<f64>) -> Result<Envir
         match environment.clone().with_payloads(payloads.clone()) {
             Ok(laden) => environment = laden,
             Err(error) => {
-                let problem = format!("it makes {}; change the payload", out_of_range(&error));
+                let problem = format!("the payload causes {}; change the payload", out_of_range(&error));
                 table.clash(PAYLOAD_MASS.name, ALL, problem)?;
                 payloads.pop();
             }
@@ -97,7 +101,7 @@ fn gust(mut table: Table<'_>) -> Result<Gust, FileError> {
     let [start_s, end_s] = interval(&mut table)?;
     table.finish()?;
     match (by, of) {
-        (Some(_), Some(_)) => table.clash(force.name, &[], format!("a second size; {sizes}, not both"))?,
+        (Some(_), Some(_)) => table.clash(force.name, &[], format!("the gust has two sizes; {sizes}, not both"))?,
         (None, None) => table.clash(acceleration.name, &[], format!("missing; {sizes}"))?,
         _ => {}
     }

@@ -17,7 +17,7 @@ pub(super) fn read(table: Option<Table<'_>>) -> Result<InstrumentSuite, FileErro
     // First, since an unknown key may be a misspelt `imu`.
     table.finish()?;
     if suite.imu.is_none() {
-        table.clash("imu", &[], "missing; add it, since the other instruments have no effect without it")?;
+        table.clash("imu", &[], "missing; add an imu, since the other instruments have no effect without one")?;
     }
     Ok(suite)
 }
@@ -46,7 +46,7 @@ pub(super) fn told(
         root.clash(
             KEY,
             &["instruments"],
-            "there are no instruments to be told of; add [instruments], or leave it out",
+            "the scenario has no instruments that [told] could describe; add [instruments], or leave [told] out",
         )?;
     }
     if !root.holds_table(KEY) {
@@ -62,7 +62,13 @@ pub(super) fn told(
         ("magnetometer", instruments.magnetometer.is_some()),
     ];
     for (key, _) in there.into_iter().filter(|(_, there)| !there) {
-        table.forbid(key, &format!("there is no {key} to be told of; add it to [instruments], or leave it out"))?;
+        table.forbid(
+            key,
+            &format!(
+                "the scenario has no {key} that [told] could describe; add it to [instruments], or leave it out of \
+                 [told]"
+            ),
+        )?;
     }
     let base = stated(instruments, vehicle);
     let told = suite(&mut table, &base)?;
@@ -115,7 +121,7 @@ fn fault(mut table: Table<'_>, suite: &InstrumentSuite) -> Result<InstrumentFaul
     let [start_s, end_s] = interval(&mut table)?;
     let rise_s = table.number(&limits::RISE)?.unwrap_or(0.0);
     if rise_s > 0.0 && failure.scaled(1.0).is_none() {
-        let problem = format!("{} has no size that could grow; leave it out", failure.name());
+        let problem = format!("the failure {} has no size that could grow; leave rise_s out", failure.name());
         table.clash(limits::RISE.name, &["failure"], problem)?;
     }
     table.finish()?;
@@ -128,7 +134,7 @@ fn fault(mut table: Table<'_>, suite: &InstrumentSuite) -> Result<InstrumentFaul
         _ => suite.magnetometer.is_some(),
     };
     if !there {
-        let problem = format!("there is no {instrument} to fail; add it to [instruments]");
+        let problem = format!("the scenario has no {instrument} that could fail; add it to [instruments]");
         table.clash("failure", &["instruments"], problem)?;
     }
     Ok(InstrumentFault { failure, start_s, end_s, rise_s })

@@ -91,7 +91,8 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
     let instrument_faults = instruments::faults(&mut root, &instruments)?;
     if instruments.imu.is_some() && (sensing != Sensing::default() || !sensor_faults.is_empty()) {
         let key = if sensor_faults.is_empty() { "sensors" } else { "sensor_fault" };
-        let problem = "it has no effect on a vehicle that estimates its state; leave it out, or the inertial sensor";
+        let problem = "this table has no effect on a vehicle that estimates its state; leave out the table, or the \
+             inertial sensor";
         root.clash(key, &["instruments", "sensors", "sensor_fault"], problem)?;
     }
     let outages = environment::outages(&mut root)?;
@@ -123,7 +124,10 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
     root.finish()?;
     // Checked separately and first, so that the error can name leaving out `flight_core` as a cure.
     if let Err(error) = scenario.check_flight_core() {
-        let problem = format!("it cannot fly with {}; change that, or leave flight_core out", out_of_range(&error));
+        let problem = format!(
+            "the vehicle cannot fly with {}; change that parameter, or leave flight_core out",
+            out_of_range(&error)
+        );
         let with = &["initial", "trajectory", "settings", "contender", "controllers", "profile", "vehicle"];
         root.clash("flight_core", with, problem)?;
     }

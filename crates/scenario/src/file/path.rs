@@ -42,7 +42,7 @@ pub(super) fn read(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let path = Path::new(table.file()).parent().unwrap_or(Path::new("")).join(named);
     let shown = path.display().to_string();
     let text = std::fs::read_to_string(&path)
-        .map_err(|error| table.fault_at(FILE, format!("{shown} cannot be read ({error}); name a file of text")))?;
+        .map_err(|error| table.fault_at(FILE, format!("{shown} cannot be read ({error}); name a text file")))?;
     let file = PathLines { source: SourceFile { file: &shown, text: &text } };
     let mut pieces = file.pieces().map_err(|error| table.through(FILE, error))?;
     let first_s = pieces.first().map_or(0.0, |piece| piece.start_s);
@@ -51,7 +51,7 @@ pub(super) fn read(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
         *piece = paced(piece, first_s, start_s, pace);
     }
     if start_s < 0.0 {
-        return Err(table.fault_at(FILE, format!("it begins at {start_s} s; set start_s, such as 0")));
+        return Err(table.fault_at(FILE, format!("the path begins at {start_s} s; set start_s to 0 or later")));
     }
     let path = Trajectory::Polynomials(pieces);
     flyable(table, FILE, &path)?;
@@ -89,7 +89,7 @@ impl PathLines<'_> {
         for record in reader.records() {
             let record = record.map_err(|error| self.broken(&error))?;
             if rows.len() >= LINES {
-                return Err(self.fault(&record, "", format!("more than {LINES} lines; keep fewer")));
+                return Err(self.fault(&record, "", format!("the path has more than {LINES} lines; remove some")));
             }
             rows.push(record);
         }
@@ -104,7 +104,9 @@ impl PathLines<'_> {
         let place = |names: &[&str]| head.iter().position(|column| names.contains(&column));
         let need = |names: &[&str]| {
             let first = names.first().copied().unwrap_or_default();
-            place(names).ok_or_else(|| self.whole(format!("no column {first}; it needs time_s, x_m, y_m and z_m")))
+            place(names).ok_or_else(|| {
+                self.whole(format!("the column {first} is missing; a path needs time_s, x_m, y_m and z_m"))
+            })
         };
         let time = need(&["time_s"])?;
         let mut samples = PathSamples { time_s: self.column(rows, time, head)?, ..PathSamples::default() };
@@ -112,10 +114,14 @@ impl PathLines<'_> {
         if let Some((before, (time_s, row))) =
             samples.time_s.iter().zip(later).find(|(before, (time_s, _))| before >= time_s)
         {
-            return Err(self.fault(row, "time_s", format!("{time_s} is not after {before}; make times rise")));
+            return Err(self.fault(
+                row,
+                "time_s",
+                format!("{time_s} is not later than {before}; make the times increase"),
+            ));
         }
         if samples.time_s.len() < 2 {
-            return Err(self.whole("fewer than two lines of numbers; a path needs two"));
+            return Err(self.whole("the path has fewer than two lines of numbers; add lines"));
         }
         for (axis, [value, rate, acceleration]) in COLUMNS.into_iter().enumerate() {
             let known = |names| place(names).map(|place| self.column(rows, place, head)).transpose();
@@ -160,7 +166,7 @@ impl PathLines<'_> {
             pieces.push(piece);
         }
         if pieces.is_empty() {
-            return Err(self.whole("no line of numbers; a path needs one"));
+            return Err(self.whole("the path has no line of numbers; add one"));
         }
         Ok(pieces)
     }
@@ -173,7 +179,7 @@ impl PathLines<'_> {
         let turn_rad = (end.yaw_rad - begin.yaw_rad).abs();
         if jump_m > 0.01 || jump_m_s > 0.1 || turn_rad > 0.1 {
             let jump = format!("{jump_m:.3} m, {jump_m_s:.3} m/s and {turn_rad:.3} rad");
-            let problem = format!("it begins {jump} from the end of the piece before");
+            let problem = format!("the piece begins {jump} from the end of the piece before");
             return Err(self.fault(row, DURATION, format!("{problem}; pieces must join")));
         }
         Ok(())
@@ -193,7 +199,7 @@ impl PathLines<'_> {
         let number = self.form().number(text).filter(|number| number.is_finite() && number.abs() <= 1e3 * LARGEST);
         let number = number.filter(|number| !column.ends_with("_m") || number.abs() <= LARGEST);
         number.ok_or_else(|| {
-            self.fault(row, column, format!("\"{}\" is no number that a path may have", text.escape_debug()))
+            self.fault(row, column, format!("\"{}\" is no number, or too large for a path", text.escape_debug()))
         })
     }
 
@@ -210,7 +216,7 @@ impl PathLines<'_> {
         let at = error.position().map_or(0, |position| position.byte() as usize);
         let problem = match error.kind() {
             csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-                format!("{len} values, where the first line names {expected_len} columns")
+                format!("the line has {len} values, but the first line names {expected_len} columns")
             }
             _ => "not comma-separated values".into(),
         };

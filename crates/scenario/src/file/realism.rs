@@ -38,7 +38,7 @@ pub(super) fn read(
         None => Wind::default(),
     };
     if drag.is_none() && wind != Wind::default() {
-        root.clash("wind", &["drag", "vehicle"], "wind acts through drag, and there is none; add [drag]")?;
+        root.clash("wind", &["drag", "vehicle"], "wind only acts through drag, and the vehicle has none; add [drag]")?;
     }
     let (contact, ground_effect) = match root.table("ground")? {
         Some(table) => {
@@ -57,7 +57,9 @@ pub(super) fn read(
 fn fault(mut table: Table<'_>, count: usize) -> Result<RotorFault, FileError> {
     let rotor = table.need_number(&Range { max: count as f64, ..ROTOR })?;
     if rotor.fract() != 0.0 {
-        return Err(table.fault_at(ROTOR.name, format!("{rotor} is no rotor; it must be a whole number, 1 to {count}")));
+        return Err(
+            table.fault_at(ROTOR.name, format!("there is no rotor {rotor}; write a whole number, 1 to {count}"))
+        );
     }
     let fault = RotorFault {
         rotor: rotor as u8,

@@ -25,7 +25,11 @@ pub(super) fn flyable(table: &Table<'_>, key: &str, trajectory: &Trajectory) -> 
     let end_s = trajectory.end_s().unwrap_or_default();
     if DURATION.max < end_s {
         let longest = format!("no flight lasts longer than {} s", DURATION.max);
-        return table.clash(key, &[], format!("it ends at {end_s:.3e} s, and {longest}; make it shorter or faster"));
+        return table.clash(
+            key,
+            &[],
+            format!("the trajectory ends at {end_s:.3e} s, and {longest}; make it shorter or faster"),
+        );
     }
     Ok(())
 }
@@ -39,10 +43,12 @@ fn excess(at: &Reference) -> String {
     if motion.setpoint().is_plausible() {
         let heading = format!("{yaw_rad:.3e} rad, {yaw_rate_rad_s:.3e} rad/s and {yaw_acceleration_rad_s2:.3e} rad/s2");
         let place = format!("{:.3e} m from the origin and a heading of {heading}", at.position_m.norm());
-        return format!("{place}, more than a controller accepts (1e5; 1e3 of each); stay nearer, or turn less");
+        return format!(
+            "{place}, more than a controller accepts (1e5 m, 1e3 of each heading unit); stay nearer, or turn less"
+        );
     }
     let [speed, acceleration, jerk, snap] =
         [velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4].map(|part| part.norm());
     let motion = format!("{speed:.3e} m/s, {acceleration:.3e} m/s2, {jerk:.3e} m/s3 and {snap:.3e} m/s4");
-    format!("{motion}, more than a controller accepts (1e3, 1e3, 1e5 and 1e7 of these); allow more time")
+    format!("{motion}, more than a controller accepts (1e3, 1e3, 1e5 and 1e7 of these units); allow more time")
 }

@@ -67,12 +67,12 @@ fn fault(mut table: Table<'_>) -> Result<SensorFault, FileError> {
     let mut misreadings = [factor, offset_by, frozen].into_iter().flatten();
     let (first, second) = (misreadings.next(), misreadings.next());
     if first.is_none() || second.is_some() {
-        let known = format!("it takes one of factor, {} and frozen = true, and no more", offset.name);
+        let known = format!("a sensor fault needs exactly one of factor, {} and frozen = true", offset.name);
         table.clash(FACTOR.name, &[], known)?;
     }
     let misreading = first.unwrap_or(SensorFaultKind::Frozen);
     if axis.is_none() && misreading != SensorFaultKind::Frozen {
-        table.clash("axis", &[], "missing; name the axis; only a frozen state may be the whole one")?;
+        table.clash("axis", &[], "missing; name the axis; only a frozen fault may affect the whole state")?;
     }
     Ok(SensorFault { axis, misreading, start_s, end_s })
 }

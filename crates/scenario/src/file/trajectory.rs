@@ -115,7 +115,7 @@ fn circle(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     table.finish()?;
     match (acceleration_m_s2, period_s) {
         (Some(_), Some(_)) => {
-            let problem = "a second pace; acceleration_m_s2 gives the period, so leave out one of them";
+            let problem = "period_s and acceleration_m_s2 both set the pace; leave out one of them";
             table.clash(PERIOD.name, &[], problem)?;
         }
         (None, None) => table.clash(PERIOD.name, &[], "missing; add it (seconds)")?,
@@ -177,7 +177,7 @@ fn waypoints(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
             let length_s = waypoint.time_s - before.time_s;
             if length_s <= 0.0 {
                 let problem = format!(
-                    "{} is not after the {} of the waypoint before; make times rise",
+                    "{} is not later than the {} of the waypoint before; make the times increase",
                     waypoint.time_s, before.time_s
                 );
                 table.clash(WAYPOINT_TIME.name, &[], problem)?;
@@ -210,7 +210,10 @@ fn through_places(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
         if let Some(length_m) = places.last().map(|before| distance_m(before, &place)).filter(|it| *it < LEG_MIN_M)
             && is_known
         {
-            let near = format!("{length_m} m from the waypoint before, nearer than {LEG_MIN_M} m; leave one out");
+            let near = format!(
+                "the waypoint is {length_m} m from the waypoint before, nearer than {LEG_MIN_M} m; leave one of the \
+                 two out"
+            );
             table.clash("position_m", &[], near)?;
         } else if is_known {
             places.push(place);
@@ -224,13 +227,15 @@ fn through_places(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let pieces = match minimum_snap(&places, start_s, limits) {
         Ok(pieces) => pieces,
         Err(error) => {
-            let cure = "make their distances more alike, or leave one of two near ones out";
+            let cure = "make the distances between waypoints more alike, or leave out one of two near waypoints";
             let problem = match error {
                 NoPath::Swings(leg) => {
-                    let swing = format!("swings away by more than {SWING_MAX} times the longest distance");
+                    let swing = format!("leaves the straight line by more than {SWING_MAX} times the longest distance");
                     format!("from waypoint {} to {} the smooth path {swing}", leg + 1, leg + 2)
                 }
-                NoPath::TooFew | NoPath::ShortLeg(_) | NoPath::Unsolvable => "no smooth path goes through them".into(),
+                NoPath::TooFew | NoPath::ShortLeg(_) | NoPath::Unsolvable => {
+                    "no smooth path goes through the waypoints".into()
+                }
             };
             table.clash("waypoint", &[], format!("{problem}; {cure}"))?;
             return Ok(Trajectory::Paper);

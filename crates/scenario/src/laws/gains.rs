@@ -29,7 +29,7 @@ fn group(mut table: Table<'_>, name: &str, gains: &mut impl Declared) -> Result<
     // Each gain is in its range by now; centre and width may still contradict each other.
     table.finish()?;
     gains.together().or_else(|error| {
-        let problem = format!("{}; change one of the two", out_of_range(&error));
+        let problem = format!("{}; change the centre or the width", out_of_range(&error));
         table.clash(Membership::CENTRE.range.name, &[], problem)
     })
 }

@@ -124,18 +124,18 @@ impl OwnLaw {
     fn check(&self, taken: &[&str]) -> Result<(), String> {
         let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "-_".contains(c);
         if !(1..=NAME_LENGTH).contains(&self.name.len()) || !self.name.chars().all(plain) {
-            return Err(format!("a name has 1 to {NAME_LENGTH} characters: a to z, 0 to 9, - and _"));
+            return Err(format!("the name must have 1 to {NAME_LENGTH} characters out of a to z, 0 to 9, - and _"));
         }
         if TAKEN.contains(&self.name) || taken.contains(&self.name) {
             return Err("a built-in law has this name; choose another".into());
         }
         if self.gains.len() > OWN_GAINS_MAX {
-            return Err(format!("it has {} gains; at most {OWN_GAINS_MAX} are possible", self.gains.len()));
+            return Err(format!("the law has {} gains; at most {OWN_GAINS_MAX} are possible", self.gains.len()));
         }
         for (index, OwnGain { declaration: Declaration { range, .. }, value }) in self.gains.iter().enumerate() {
             range.check(*value).map_err(|error| error.to_string())?;
             if self.gains.iter().take(index).any(|other| other.declaration.range.name == range.name) {
-                return Err(format!("two gains are called {}; rename one", range.name));
+                return Err(format!("two gains are called {}; rename one of them", range.name));
             }
         }
         Ok(())

@@ -181,7 +181,7 @@ impl PageBackend {
 
     fn go_to(&mut self, server: &mut Server, place_m: Vector3<f32>) -> PageReply {
         if !place_m.iter().all(|number| number.abs() <= FAR_M) {
-            return PageReply::refused("this place is too far away");
+            return PageReply::refused("the place is too far away");
         }
         let local_m = self.frame.local(&place_m);
         let origin = server.vehicles().first().and_then(|vehicle| vehicle.origin());
@@ -213,7 +213,7 @@ impl PageBackend {
         let fence = match origin {
             Some(origin) => fence_items(&corners_m, &origin),
             None if corners_m.is_empty() => Vec::new(),
-            None => return PageReply::refused("a fence needs a satellite receiver: fly outdoors"),
+            None => return PageReply::refused("a geofence needs a GNSS receiver; serve an outdoor scenario"),
         };
         // The fence comes first: the vehicle checks the mission against it.
         let mut plans = vec![(MissionType::FENCE, fence), (MissionType::MISSION, mission_items(&places_m))];
@@ -228,7 +228,7 @@ fn line(server: &mut Server, text: &str) -> PageReply {
     if let Ok(Some(line)) = parse(text)
         && matches!(line.command, ServerCommand::Quit | ServerCommand::Step(_))
     {
-        return PageReply::refused("quit and step are for whoever has started it");
+        return PageReply::refused("only the terminal that started sitl serve may quit and step");
     }
     let reply = server.line(text);
     let messages = reply.lines.iter().map(|line| json!({ "kind": "reply", "text": line }).to_string());

@@ -25,22 +25,24 @@ impl Admission {
     pub fn at(address: IpAddr, token: Option<Token>) -> Result<Self, String> {
         let loopback = address.is_loopback();
         if !loopback && token.is_none() {
-            return Err(format!("{address} is reached by others: a page there needs a token"));
+            return Err(format!(
+                "other machines can reach {address}, so the page needs a token; set one with --web-token"
+            ));
         }
         Ok(Admission { token, loopback })
     }
 
     /// Checks the request's host and, if a browser sends it, the origin: the page must come from this server.
     pub(crate) fn check_names(&self, head: &RequestHead) -> Result<(), HttpRefusal> {
-        let Some(host) = &head.host else { return Err(("400 Bad Request", "it names no host".into())) };
+        let Some(host) = &head.host else { return Err(("400 Bad Request", "the request names no host".into())) };
         if self.loopback && !is_own(host) {
             let cure = "open the address that was printed at the start";
-            return Err(("403 Forbidden", format!("this machine is not called so; {cure}")));
+            return Err(("403 Forbidden", format!("this server does not have the requested host name; {cure}")));
         }
         // Browsers send the origin of the page that makes the request.
         let origin = head.origin.as_ref().map(|origin| origin.split_once("://").map_or("", |(_, authority)| authority));
         if origin.is_some_and(|origin| !origin.eq_ignore_ascii_case(host)) {
-            return Err(("403 Forbidden", "it comes from a page of another site".into()));
+            return Err(("403 Forbidden", "the request comes from a page of another site".into()));
         }
         Ok(())
     }
@@ -49,7 +51,7 @@ impl Admission {
     pub(crate) fn check_token(&self, head: &RequestHead) -> Result<(), HttpRefusal> {
         match &self.token {
             Some(token) if !token.is_told(&head.query) => {
-                let cure = "open the whole address that was printed at the start, with ?token= and what follows";
+                let cure = "open the whole address that was printed at the start, including ?token=";
                 Err(("401 Unauthorized", format!("the token is missing or wrong; {cure}")))
             }
             _ => Ok(()),

@@ -33,7 +33,7 @@ const RATE_MAX: u32 = 60;
 
 /// WebSocket close code for a page that another page has replaced; such a page does not reconnect by itself.
 const TAKEN: u16 = 4000;
-const TAKEN_BY: &str = "too many pages are open, and another has taken the place of this one; reload to take it back";
+const TAKEN_BY: &str = "too many pages are open, so another page has replaced this one; reload to replace another page";
 
 /// An event of a client.
 pub(crate) enum ClientEvent {
@@ -80,7 +80,9 @@ pub(crate) fn serve(
     }
     match (head.method.as_str(), page) {
         ("GET", Some("socket")) => match &head.socket_key {
-            Some(_) if !slot.keep() => refuse(out, "503 Service Unavailable", "too many have come; come again"),
+            Some(_) if !slot.keep() => {
+                refuse(out, "503 Service Unavailable", "too many pages are open; try again later")
+            }
             Some(key) => {
                 switch(out, &derive_accept_key(key.as_bytes()))?;
                 converse(stream, rest, (number, slot), shared)
@@ -110,7 +112,7 @@ fn read_head(stream: &mut impl Read) -> io::Result<Result<(RequestHead, Vec<u8>)
                 return Ok(Ok((head, rest)));
             }
             Ok(None) if bytes.len() < HEAD_MAX => {}
-            Ok(None) => return Ok(Err("its head is too long")),
+            Ok(None) => return Ok(Err("the request's head is too long")),
             Err(problem) => return Ok(Err(problem)),
         }
     }

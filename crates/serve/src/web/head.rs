@@ -31,8 +31,8 @@ impl RequestHead {
         let length = match request.parse(bytes) {
             Ok(Status::Complete(length)) => length,
             Ok(Status::Partial) if bytes.len() < HEAD_MAX => return Ok(None),
-            Ok(Status::Partial) => return Err("its head is too long"),
-            Err(_) => return Err("it is no request of HTTP"),
+            Ok(Status::Partial) => return Err("the request's head is too long"),
+            Err(_) => return Err("this is no HTTP request"),
         };
         // A header must not appear twice: other programs might use a different one of the two.
         let only = |name: &str| {
@@ -41,8 +41,8 @@ impl RequestHead {
                 (None, _) => Ok(None),
                 (Some(line), None) => std::str::from_utf8(line.value)
                     .map(|value| Some(value.trim().to_owned()))
-                    .map_err(|_| "it is no text"),
-                _ => Err("a line is there twice"),
+                    .map_err(|_| "a header line is not text"),
+                _ => Err("a header line occurs twice"),
             }
         };
         let has = |value: Option<String>, word: &str| {

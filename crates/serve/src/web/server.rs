@@ -145,6 +145,6 @@ impl ServerHook for WebServer {
 
 /// Returns why the port cannot be opened.
 fn taken(address: SocketAddr, error: &io::Error) -> String {
-    let cure = "choose another one, as in --web 127.0.0.1:0 for any free port";
-    format!("--web {address}: it cannot be opened ({error}); {cure}")
+    let cure = "choose another address, as in --web 127.0.0.1:0 for any free port";
+    format!("--web {address}: the address cannot be opened ({error}); {cure}")
 }

@@ -19,7 +19,8 @@ impl Token {
     /// Fails if the system has no source of random numbers.
     pub fn random() -> Result<Self, String> {
         let mut bytes = [0; BYTES];
-        getrandom::fill(&mut bytes).map_err(|error| format!("no random numbers for a token ({error})"))?;
+        getrandom::fill(&mut bytes)
+            .map_err(|error| format!("the system gives no random numbers for a token ({error})"))?;
         Ok(Token(bytes.iter().map(|byte| format!("{byte:02x}")).collect()))
     }
 

@@ -69,7 +69,7 @@ fn park() -> ! {
     TASK_FAILED.store(true, Ordering::Relaxed);
     loop {
         // The task may have panicked with interrupts disabled.
-        #[expect(unsafe_code, reason = "it ends a critical section that is never returned to")]
+        #[expect(unsafe_code, reason = "it ends a critical section to which the code never returns")]
         // SAFETY: all data protected by critical sections is borrowed by try_borrow: the inbox, the ticks, the alarms.
         unsafe {
             cortex_m::interrupt::enable()

@@ -10,10 +10,10 @@ use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Fly the firmware on an emulated processor in lockstep, and compare every output of every tick with the host's
+/// Fly the firmware on an emulated processor in lockstep, and compare each tick's outputs with the host's
 ///
-/// QEMU runs the firmware's machine code (built by this command or `cargo fw-pil`). The plant runs on the host, and
-/// both exchange only the link's bytes. Exits with 0 only if no bit differs and the vehicle was not lost.
+/// QEMU runs the firmware's machine code (built by this command or `cargo fw-pil`). The plant runs on the host and
+/// exchanges only the link's bytes with QEMU. Exits with 0 only if no bit differs and the vehicle was not lost.
 #[derive(Args, Debug)]
 pub(crate) struct PilArgs {
     /// Name of a built-in scenario, or path of a scenario file
@@ -23,7 +23,7 @@ pub(crate) struct PilArgs {
     #[command(flatten)]
     flying: InTheLoopArgs,
 
-    /// Image to fly, instead of building the one of this source
+    /// Image to fly, instead of building one from this source
     #[arg(long, value_name = "ELF")]
     image: Option<PathBuf>,
 }
@@ -42,6 +42,6 @@ mod emulated {
     use afbc_scenario::Scenario;
 
     pub(super) fn fly(_: &Scenario, _: &InTheLoopArgs, _: Option<PathBuf>) -> Result<ExitCode, CommandError> {
-        Err("the emulator needs Unix, for its pipes and sockets; `sitl fly` flies the same scenario without it".into())
+        Err("the emulator needs Unix pipes and sockets; `sitl fly` flies the same scenario without the emulator".into())
     }
 }

@@ -174,7 +174,7 @@ proptest! {
         prop_assert_eq!(watch.view(), FenceStatus { leaves: !truth, outside: !truth });
         // The same fence is refused if the vehicle is outside.
         let refused = check(&items, Some(&chart), Some(here_m)).err().map(|(_, invalid)| invalid.reason);
-        prop_assert_eq!(refused, (!truth).then_some("the vehicle is outside"));
+        prop_assert_eq!(refused, (!truth).then_some("the vehicle is outside this fence"));
     }
 
     /// The chart agrees with the exact conversion.
@@ -222,7 +222,7 @@ proptest! {
         let (result, text) = upload(&mut missions, &items, &around(Some([0.0, 0.0])));
         prop_assert!(checked || result != MissionResult::ACCEPTED);
         prop_assert_eq!(text.is_some(), result != MissionResult::ACCEPTED);
-        // Nor does any fence of such items cause a panic.
+        // A fence of such items causes no panic either.
         let chart = origin().chart();
         let _ = contains(&items, &chart, Vector2::zeros());
         let (braking, none) = (MotionLimits::DEFAULT.braking(), Vector2::zeros());
@@ -256,17 +256,17 @@ fn a_fence_that_is_none_is_refused_by_name() {
     let twice = polygon(5001, &[[-9.0, -9.0], [-9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]]);
     let cases: &[(Vec<MissionItem>, Is, &str)] = &[
         (bow_tie, Is::INVALID_PARAM1, "fence item 0: edges cross each other"),
-        (twice, Is::INVALID_PARAM1, "fence item 0: vertices at one place, or on one line"),
+        (twice, Is::INVALID_PARAM1, "fence item 0: vertices coincide or are in line"),
         (missing, Is::INVALID_PARAM1, "fence item 2: vertices are missing"),
-        (mixed, Is::INVALID_PARAM1, "fence item 2: vertices do not belong together"),
-        (counts, Is::INVALID_PARAM1, "fence item 1: vertices do not belong together"),
-        (groups, MissionResult(7), "fence item 4: one group of inclusions only"),
+        (mixed, Is::INVALID_PARAM1, "fence item 2: vertices of two polygons are mixed"),
+        (counts, Is::INVALID_PARAM1, "fence item 1: vertices of two polygons are mixed"),
+        (groups, MissionResult(7), "fence item 4: only one inclusion group allowed"),
         (polygon(5001, &[[0.0, 0.0], [9.0, 9.0]]), Is::INVALID_PARAM1, "fence item 0: less than three vertices"),
         (vec![item(5001, 3.5, [0.0; 2])], Is::INVALID_PARAM1, "fence item 0: number of vertices is invalid"),
-        (square(5001, [100.0, 0.0], 20.0), Is::DENIED, "fence item 0: the vehicle is outside"),
-        (square(5002, [0.0, 0.0], 20.0), Is::DENIED, "fence item 0: the vehicle is outside"),
-        (with(&|item| item.parameters[0] = -1.0), Is::INVALID_PARAM1, "fence item 0: radius is not 0 to 20000 m"),
-        (with(&|item| item.parameters[0] = f32::NAN), Is::INVALID_PARAM1, "fence item 0: radius is not 0 to 20000 m"),
+        (square(5001, [100.0, 0.0], 20.0), Is::DENIED, "fence item 0: the vehicle is outside this fence"),
+        (square(5002, [0.0, 0.0], 20.0), Is::DENIED, "fence item 0: the vehicle is outside this fence"),
+        (with(&|item| item.parameters[0] = -1.0), Is::INVALID_PARAM1, "fence item 0: radius must be 0 to 20000 m"),
+        (with(&|item| item.parameters[0] = f32::NAN), Is::INVALID_PARAM1, "fence item 0: radius must be 0 to 20000 m"),
         (with(&|item| item.frame = 1), Is::UNSUPPORTED_FRAME, "fence item 0: frame is not supported"),
         (with(&|item| item.command = 5000), Is::UNSUPPORTED, "fence item 0: return point is not supported"),
         (with(&|item| item.command = 16), Is::UNSUPPORTED, "fence item 0: command 16 unsupported"),

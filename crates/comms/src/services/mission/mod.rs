@@ -136,7 +136,7 @@ impl Missions {
             upload::Reminder::GiveUp => {
                 self.upload = None;
                 self.acknowledge(MissionResult::CANCELLED, plan, from);
-                Some(Words::of(name(plan)).and(" upload given up: no answer"))
+                Some(Words::of(name(plan)).and(" upload given up: station does not answer"))
             }
         }
     }

@@ -11,7 +11,7 @@ message! {
     "vehicle_attitude" VehicleAttitude {
         timestamp_sample: u64 = "us",
         q: [f32; 4] = "w, x, y, z from body to earth",
-        quat_reset_counter: u8 = "jumps of the heading",
+        quat_reset_counter: u8 = "number of jumps of the heading",
     }
 }
 
@@ -36,7 +36,7 @@ message! {
         yaw_body: f32 = "rad",
         yaw_sp_move_rate: f32 = "rad/s",
         q_d: [f32; 4] = "w, x, y, z from body to earth",
-        thrust_body: [f32; 3] = "share of the largest",
+        thrust_body: [f32; 3] = "share of the largest thrust",
     }
 }
 

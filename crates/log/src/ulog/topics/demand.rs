@@ -8,7 +8,7 @@ message! {
     /// Thrust.
     "vehicle_thrust_setpoint" ThrustDemand {
         timestamp_sample: u64 = "us",
-        xyz: [f32; 3] = "share of the largest",
+        xyz: [f32; 3] = "share of the largest thrust",
     }
 }
 

@@ -66,8 +66,8 @@ message! {
         esc_online_flags: u8 = "a bit for each",
         esc_armed_flags: u8 = "a bit for each",
         _padding0: [u8; 2] = "",
-        esc: [EscReport; ESCS] = "of each its `timestamp`, `esc_rpm`, `esc_voltage`, `esc_current`, `esc_temperature` \
-            (deg C), `failures`, `actuator_function`; other fields of `esc_report` are 0",
+        esc: [EscReport; ESCS] = "for each ESC: `timestamp`, `esc_rpm`, `esc_voltage`, `esc_current`, \
+             `esc_temperature` (deg C), `failures`, `actuator_function`; the other fields of `esc_report` are 0",
     }
 }
 

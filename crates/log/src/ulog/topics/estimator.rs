@@ -17,7 +17,7 @@ message! {
     "estimator_states" EstimatorVector {
         timestamp_sample: u64 = "us",
         states: [f32; PX4_STATES] = "quaternion, velocity m/s, position m, biases rad/s and m/s2; then zeros",
-        covariances: [f32; PX4_COVARIANCES] = "variances in that order, the rotation's three first; then zeros",
+        covariances: [f32; PX4_COVARIANCES] = "variances in the order of `states`, rotation (three) first; then zeros",
         n_states: u8 = "",
     }
 }
@@ -100,14 +100,14 @@ message! {
     /// What it makes of each kind of measurement, in the order position and attitude of a tracker, position,
     /// height and velocity of a receiver, height, heading; whether it holds the vehicle at rest.
     "afbc_estimator" EstimatorFigures {
-        nis: [f32; AIDS] = "normalised innovation squared of the last one; a lower bound if rejected",
+        nis: [f32; AIDS] = "normalised innovation squared of the last measurement; a lower bound if it was rejected",
         accepted: [u32; AIDS] = "",
         rejected: [u32; AIDS] = "",
         heading_sigma_rad: f32 = "rad",
         height_offset_m: f32 = "m",
         vibration_m_s2: f32 = "m/s2",
-        scalars: [u8; AIDS] = "of the last one: expected normalised innovation squared",
-        on_ground: bool = "whether the motors could not carry the vehicle in this tick",
+        scalars: [u8; AIDS] = "scalars in the last measurement, the expected value of `nis`",
+        on_ground: bool = "whether the motors give too little thrust to lift the vehicle in this tick",
         at_rest: bool = "",
     }
 }
@@ -141,7 +141,7 @@ message! {
     /// A measurement as the estimator was offered it, in the local frame, in this project's frames.
     "afbc_aid" AidOffered {
         timestamp_sample: u64 = "us",
-        numbers: [f32; NUMBERS] = "as its kind has them",
+        numbers: [f32; NUMBERS] = "numbers of the measurement; their meaning depends on `kind`",
         kind: u8 = "1 pose, 2 position, 3 GNSS, 4 height, 5 magnetic field, 6 heading",
     }
 }

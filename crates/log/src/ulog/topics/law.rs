@@ -15,7 +15,7 @@ message! {
     "afbc_law" LawSignals of moment, norms: &PerAxis<[f32; 2]> {
         e1: [f32; AXES] = "rad, m" => errors(moment, |errors| errors.e1),
         e1_dot: [f32; AXES] = "rad/s, m/s" => errors(moment, |errors| errors.e1_dot),
-        e2: [f32; AXES] = "rad/s, m/s; 0 for laws without it" => errors(moment, |errors| errors.e2),
+        e2: [f32; AXES] = "rad/s, m/s; 0 for laws without e2" => errors(moment, |errors| errors.e2),
         inputs: [f32; 4] = "U1 to U4, N" => {
             let inputs = &moment.details.trace.inputs;
             [inputs.roll_n, inputs.pitch_n, inputs.yaw_n, inputs.thrust_n]

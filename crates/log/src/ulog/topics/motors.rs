@@ -11,7 +11,7 @@ message! {
     /// Thrust of each motor, in PX4's order on an X frame of four.
     "actuator_motors" ActuatorMotors {
         timestamp_sample: u64 = "us",
-        control: [f32; MOTORS] = "share of the largest; not a number while disarmed",
+        control: [f32; MOTORS] = "share of the largest thrust; not a number while disarmed",
     }
 }
 

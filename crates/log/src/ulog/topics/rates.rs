@@ -29,7 +29,7 @@ message! {
         roll: f32 = "rad/s",
         pitch: f32 = "rad/s",
         yaw: f32 = "rad/s",
-        thrust_body: [f32; 3] = "share of the largest",
+        thrust_body: [f32; 3] = "share of the largest thrust",
     }
 }
 

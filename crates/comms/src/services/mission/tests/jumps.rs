@@ -47,10 +47,10 @@ fn jumps_without_an_end_are_refused() {
         |number| MissionItem { command: 178, x: 0, y: 0, z: 0.0, parameters: [1.0, 2.0, 0.0, 0.0], ..waypoint(number) };
     let nine: List<_> = (0..10).map(|number| if number == 0 { waypoint(0) } else { jump(number, 0, 1.0) }).collect();
     let cases: &[(&[MissionItem], u16, &str)] = &[
-        (&[waypoint(0), jump(1, 2, 1.0)], 1, "there is no such item"),
-        (&[waypoint(0), jump(1, 1, 1.0), waypoint(2)], 1, "there is no such item"),
-        (&[waypoint(0), speed(1), jump(2, 1, -1.0)], 2, "goes around for ever without a flight"),
-        (&[jump(0, 2, -1.0), waypoint(1), jump(2, 0, -1.0)], 0, "goes around for ever without a flight"),
+        (&[waypoint(0), jump(1, 2, 1.0)], 1, "the jump's target does not exist"),
+        (&[waypoint(0), jump(1, 1, 1.0), waypoint(2)], 1, "the jump's target does not exist"),
+        (&[waypoint(0), speed(1), jump(2, 1, -1.0)], 2, "jump loops without a waypoint"),
+        (&[jump(0, 2, -1.0), waypoint(1), jump(2, 0, -1.0)], 0, "jump loops without a waypoint"),
         (&nine, 9, "more than 8 jumps"),
     ];
     for (items, number, reason) in cases {
