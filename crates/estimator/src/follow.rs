@@ -37,6 +37,7 @@ impl Estimator {
                 self.replace_motion(memory, part, horizon);
                 memory.knows.position = true;
                 if part.axes != FusedAxes::Level {
+                    memory.height_watch.forget();
                     // The barometer's offset belonged to the old height.
                     memory.covariance.forget(&ErrorVector { baro: 0.0, ..KEEP });
                     memory.covariance.hold();
@@ -49,6 +50,7 @@ impl Estimator {
             }
             ObservedQuantity::Height(height) => {
                 count(&mut memory.resets.height);
+                memory.height_watch.forget();
                 memory.height_offset = height - past.position.z;
                 memory.knows.height_offset = true;
                 if let Some((_, mut row)) = horizon.row(&part.target, VectorComponent::Z, &self.expected(memory)) {

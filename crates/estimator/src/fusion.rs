@@ -56,6 +56,11 @@ const FROZEN_VARIANCE: f32 = 0.01;
 /// raised: six times the mean's deviation for white innovations.
 const LEANS: f32 = 0.05;
 const LEANS_SIGMAS: f32 = 1.0;
+/// Mean innovation of a doubted magnetic field below which the field counts again.
+const UPRIGHT_SIGMAS: f32 = 0.1;
+/// Variance added to the direction of a doubted field, so that motion by a receiver's velocity outweighs it: at 50 Hz,
+/// 0.14 rad within a second \[rad2\].
+const DOUBTED_FIELD: f32 = 1.0;
 /// Additional mean that a slow error may cause, in its standard deviations.
 const SLOW_SIGMAS: f32 = 1.0;
 
@@ -119,9 +124,17 @@ impl Estimator {
             }
         }
         match (&measurement.value, &mut parts) {
-            (Measurement::Gnss { .. }, [Some(level), Some(height), _]) => {
-                self.divide(memory, level, at_us.saturating_sub(fix_us.unwrap_or(0)));
-                height.variance = level.variance;
+            (Measurement::Gnss { .. }, [Some(level), receiver_height @ Some(_), _]) => {
+                let since_us = at_us.saturating_sub(fix_us.unwrap_or(0));
+                let trusted = self.trusts_height(memory, level, at_us, since_us);
+                self.divide(memory, level, since_us);
+                if let Some(height) = receiver_height {
+                    height.variance = level.variance;
+                }
+                if !trusted {
+                    *receiver_height = None;
+                    memory.aids.gnss_height.reject(at_us);
+                }
             }
             // No heading from this field: the vehicle's own field may be as large as the earth's.
             (Measurement::MagneticField { .. }, _) if self.magnetic_variance >= VAGUE => {
@@ -276,6 +289,9 @@ impl Estimator {
                     baro: 0.0,
                     slow: SlowErrors::zeros(),
                 };
+                // A field that drifts looks like a gyroscope that drifts. Motion decides, if a receiver shows it.
+                let is_weak = memory.doubts_field && memory.aids.gnss_velocity.is_live(at_us, PRESENT_US);
+                let s = if is_weak { s + DOUBTED_FIELD } else { s };
                 let k = k.scaled(1.0 / s);
                 memory.covariance.fuse_with(&k, &y, s);
                 self.correct(memory, &k.scaled(innovation));
@@ -511,6 +527,9 @@ impl Memory {
         let now = before + LEANS * (sigmas - before);
         at.set(mean, now);
         let leans = now.abs();
+        if let Target::Field(_) = target {
+            self.doubts_field = leans > if self.doubts_field { UPRIGHT_SIGMAS } else { LEANS_SIGMAS };
+        }
         if leans > LEANS_SIGMAS && leans > LEANS_SIGMAS + SLOW_SIGMAS * sqrt(max(slow / all, 0.0)) {
             self.doubt_biases(turns);
         }

@@ -5,6 +5,7 @@ use crate::align::Alignment;
 use crate::covariance::Covariance;
 use crate::errors::PredictionInterval;
 use crate::estimate::{DroppedMeasurements, Resets};
+use crate::height_watch::HeightWatch;
 use crate::history::StateHistory;
 use crate::imu::{ImuMonitor, LowPassFilter2pMemory};
 use crate::inertial::InertialState;
@@ -67,6 +68,9 @@ pub struct Memory {
     pub(crate) aids: AidRecords,
     /// Mean innovations of motion and rotation along the earth's axes, in standard deviations.
     pub(crate) leaning: [Vector3<f32>; 2],
+    /// True while the magnetometer's innovations lean to one side: field or gyroscope bias drifts.
+    pub(crate) doubts_field: bool,
+    pub(crate) height_watch: HeightWatch,
     pub(crate) repeated: FrozenPoseDetector,
     pub(crate) repeated_field: FrozenPoseDetector,
     /// Time of the last zero-velocity fusion \[us\].
@@ -128,6 +132,8 @@ impl Default for Memory {
             field: None,
             aids: AidRecords::default(),
             leaning: [Vector3::zeros(); 2],
+            doubts_field: false,
+            height_watch: HeightWatch::default(),
             repeated: FrozenPoseDetector::default(),
             repeated_field: FrozenPoseDetector::default(),
             still_us: 0,

@@ -175,6 +175,8 @@ impl Memory {
         self.contradicted_us = None;
         self.carried_us = None;
         self.leaning = [NONE; 2];
+        self.doubts_field = false;
+        self.height_watch.forget();
         self.held_us = None;
         self.rest = RestDetector::default();
         self.covariance.hold();

@@ -2,7 +2,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
 use crate::common::checks::{at_rest, flown, position_error};
-use crate::common::{ICM, MOCAP, NOTHING, Noise, OUTDOOR, V3, double, eight, hover, settings, single};
+use crate::common::{
+    Flight, ICM, MOCAP, NOTHING, Noise, OUTDOOR, Path, Sensors, V3, double, eight, fly, hover, settings, single,
+};
 use afbc_estimator::{Estimator, ImuSample, Measurement, Memory, Settings, Stamped};
 use nalgebra::Vector3;
 
@@ -146,6 +148,102 @@ fn a_disturbed_field_turns_nothing() {
         },
     );
     assert!(disturbed > 350, "{disturbed}");
+}
+
+/// A field along body y that rises within 20 to 60 s to more than the earth's horizontal field looks like a gyroscope
+/// that drifts. A receiver's velocity shows which of them does.
+#[test]
+fn a_field_that_rises_slowly_turns_nothing() {
+    for (rise_ms, size) in [(20_000, 0.5), (40_000, -0.5), (60_000, 0.5)] {
+        flown(
+            eight,
+            OUTDOOR,
+            70,
+            |_, _| true,
+            |ms, measurement| {
+                if let Measurement::MagneticField { field, .. } = &mut measurement.value {
+                    field.y += size * (ms.saturating_sub(8000) as f32 / rise_ms as f32).min(1.0);
+                }
+                true
+            },
+            |ms, estimate, flight| {
+                let heading = flight.errors(estimate)[2].abs().to_degrees();
+                assert!(ms < 3000 || heading < 8.0, "{rise_ms} ms, {ms} ms: {heading} deg");
+                assert_eq!(estimate.resets.heading, 0);
+            },
+        );
+    }
+}
+
+/// A gyroscope that drifts is still followed by the magnetometer, whether the vehicle moves or hovers.
+#[test]
+fn a_gyroscope_that_drifts_is_told_from_a_field_that_rises() {
+    for path in [hover, eight] {
+        flown(
+            path,
+            OUTDOOR,
+            60,
+            |ms, sample| {
+                sample.rates_rad_s.z += 0.01 * (ms.saturating_sub(5000) as f32 / 50_000.0).min(1.0);
+                true
+            },
+            |_, _| true,
+            |ms, estimate, flight| {
+                let heading = flight.errors(estimate)[2].abs().to_degrees();
+                let most = if ms < 58_000 { 8.0 } else { 2.0 };
+                assert!(ms < 3000 || heading < most, "{ms} ms: {heading} deg");
+            },
+        );
+    }
+}
+
+/// Flies with a receiver whose height has a slow error, after changes of the measurements. Returns the largest error of
+/// the height \[m\], the error at the end, and the number of the receiver's heights that were rejected.
+fn heights(path: Path, seed: u64, change: impl Fn(usize, &mut Measurement)) -> (f64, f64, u32) {
+    let truth = fly(path, 90.0);
+    let sensors = Sensors { gnss: Some((0.4, 0.6, 0.05)), slow: Some((1.2, 120.0)), ..OUTDOOR };
+    let mut flight = Flight::with(&truth, ICM, sensors, seed, Settings { gnss_noise_m: 0.5, ..settings(&ICM) });
+    let (mut most_m, mut last_m, mut rejected) = (0.0_f64, 0.0, 0);
+    for ms in 0..90_000 {
+        let deliver = |measurement: &mut Stamped<Measurement>| {
+            change(ms, &mut measurement.value);
+            true
+        };
+        let estimate = flight.step_with(|_| true, deliver);
+        if ms > 5000 {
+            last_m = (f64::from(estimate.state.position_m.z) - flight.moment().p.z).abs();
+            most_m = most_m.max(last_m);
+            assert!(estimate.validity.position, "{ms} ms");
+        }
+        rejected = flight.memory.aids().gnss_height.rejected;
+    }
+    (most_m, last_m, rejected)
+}
+
+/// A receiver's height that creeps by 20 m is doubted: barometer and velocity agree without it.
+#[test]
+fn a_receivers_height_that_creeps_is_not_followed() {
+    for (seed, rise_ms, by_m) in [(1, 20_000, 20.0), (2, 40_000, -20.0), (3, 60_000, 20.0), (4, 60_000, -20.0)] {
+        let (most_m, last_m, _) = heights(if seed % 2 == 0 { hover } else { eight }, seed, |ms, measurement| {
+            if let Measurement::Gnss { position_m, .. } = measurement {
+                position_m.z += by_m * (ms.saturating_sub(10_000) as f32 / rise_ms as f32).min(1.0);
+            }
+        });
+        assert!(most_m < 9.0 && last_m < 5.0, "{rise_ms} ms, {by_m} m: {most_m} m, {last_m} m in the end");
+    }
+}
+
+/// A barometer that creeps moves its offset only, and a receiver whose height is right is never doubted.
+#[test]
+fn a_barometer_that_creeps_leaves_the_receivers_height_alone() {
+    for (seed, by_m) in [(1, 0.0), (2, 20.0), (3, -20.0), (4, 0.0)] {
+        let (most_m, _, rejected) = heights(if seed % 2 == 0 { hover } else { eight }, seed, |ms, measurement| {
+            if let Measurement::Height { height_m, .. } = measurement {
+                *height_m += by_m * (ms.saturating_sub(10_000) as f32 / 60_000.0).min(1.0);
+            }
+        });
+        assert!(most_m < 4.0 && rejected < 5, "{by_m} m: {most_m} m, {rejected} rejected");
+    }
 }
 
 #[test]

@@ -1,0 +1,108 @@
+//! Watches a GNSS receiver's height against the barometer and the vertical velocity.
+//!
+//! The filter follows a receiver's height within seconds, because its slow error counts as constant for so long. An
+//! error that creeps would take the height along, and the barometer's offset the other way. Then both corrections add
+//! up: the height has moved farther than the velocity says, and the offset has changed by as much. A barometer that
+//! drifts moves only its offset, and a wrong velocity only the height.
+
+use crate::aid::Aid;
+use crate::estimate::count;
+use crate::estimator::Estimator;
+use crate::memory::Memory;
+use crate::queue::Part;
+use crate::rotation::identity;
+use afbc_control::math::{max, min};
+use nalgebra::Vector3;
+
+/// Time in which the watch forgets corrections, like that of a receiver's slow error \[s\].
+const FORGETS_S: f32 = 100.0;
+/// Longest time between two fixes over which corrections are summed \[s\].
+const APART_S: f32 = 1.0;
+/// Share of the receiver's variance that its slow error usually changes by within [`FORGETS_S`], and the variance by
+/// which a barometer's drift does \[m2\].
+const CHANGES: f32 = 0.5;
+const DRIFTS_M2: f32 = 1.0;
+/// Corrections beyond this many standard deviations show that the receiver's height is wrong: while it is fused, and
+/// after its rejections for [`REJECTED_US`].
+const FAR_SIGMAS: f32 = 4.0;
+const FAR_REJECTED_SIGMAS: f32 = 2.0;
+const REJECTED_US: u64 = 3_000_000;
+/// A doubted height is fused again once it is within this many standard deviations of the estimate.
+const NEAR_SIGMAS: f32 = 2.0;
+/// Time since the last fusion within which barometer and velocity count as present \[us\].
+const PRESENT_US: u64 = 1_000_000;
+
+/// Recent corrections of the height.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct HeightWatch {
+    /// Sum of the recent corrections of the height, beyond what the velocity explains \[m\].
+    lifted: f32,
+    /// Sum of the recent changes of the barometer's offset \[m\].
+    offset: f32,
+    /// Height \[m\], climb rate \[m/s\] and barometer offset \[m\] at the last fix.
+    last: Option<(f32, f32, f32)>,
+    /// True while the receiver's height is not fused.
+    doubts: bool,
+}
+
+impl HeightWatch {
+    /// Forgets everything, after a reset of height or offset.
+    pub(crate) fn forget(&mut self) {
+        *self = HeightWatch::default();
+    }
+
+    /// Takes the state at a fix, `since_s` after the last one.
+    fn advance(&mut self, now: (f32, f32, f32), since_s: f32) {
+        let last = self.last.replace(now).filter(|_| since_s < APART_S);
+        let kept = max(1.0 - since_s * (1.0 / FORGETS_S), 0.0);
+        (self.lifted, self.offset) = (self.lifted * kept, self.offset * kept);
+        if let Some((height, climb, offset)) = last {
+            self.lifted += now.0 - height - 0.5 * (now.1 + climb) * since_s;
+            self.offset += now.2 - offset;
+        }
+    }
+
+    /// Returns the square of the error that both sums show \[m2\].
+    fn crept(&self) -> f32 {
+        if self.lifted * self.offset < 0.0 { min(self.lifted * self.lifted, self.offset * self.offset) } else { 0.0 }
+    }
+}
+
+impl Estimator {
+    /// Watches the height of a receiver's fix. Returns false if barometer and
+    /// velocity contradict it, and undoes what it has moved.
+    #[inline(never)]
+    pub(crate) fn trusts_height(&self, memory: &mut Memory, part: &Part, at_us: u64, since_us: u64) -> bool {
+        let crate::horizon::Target::Position(fix) = &part.target else { return true };
+        let (height, climb) = (memory.nominal.position.z, memory.nominal.velocity.z);
+        memory.height_watch.advance((height, climb, memory.height_offset), min(since_us as f32 * 1e-6, 1e3));
+        let live = |aid: Aid| memory.aids.of(aid).is_live(at_us, PRESENT_US);
+        let contradicted = live(Aid::GnssVelocity) && live(Aid::Height) && !live(Aid::TrackerPosition);
+        let watch = &mut memory.height_watch;
+        if !contradicted || !memory.knows.height_offset {
+            watch.doubts = false;
+            return true;
+        }
+        let rejected_us =
+            memory.aids.gnss_height.rejected_since_us.map_or(0, |since_us| at_us.saturating_sub(since_us));
+        let sigmas = if rejected_us > REJECTED_US { FAR_REJECTED_SIGMAS } else { FAR_SIGMAS };
+        let usual = CHANGES * part.variance.z + DRIFTS_M2;
+        if watch.crept() > sigmas * sigmas * usual {
+            let (lifted, offset) = (watch.lifted, watch.offset);
+            *watch = HeightWatch { doubts: true, ..HeightWatch::default() };
+            // A correction, not a reset: the vehicle has been taken along and has to come back.
+            let by = Vector3::new(0.0, 0.0, -lifted);
+            memory.nominal.move_by(&by);
+            memory.height_offset -= offset;
+            memory.history.correct(&identity(), &Vector3::zeros(), &Vector3::zeros(), &by);
+            count(&mut memory.resets.height);
+        }
+        let watch = &mut memory.height_watch;
+        if watch.doubts {
+            let off = fix.z - memory.nominal.position.z;
+            let variance = part.variance.z + memory.covariance.variances().position.z;
+            watch.doubts = off * off > NEAR_SIGMAS * NEAR_SIGMAS * variance;
+        }
+        !watch.doubts
+    }
+}
