@@ -527,7 +527,7 @@ impl Memory {
         let now = before + LEANS * (sigmas - before);
         at.set(mean, now);
         let leans = now.abs();
-        if let Target::Field(_) = target {
+        if let ObservedQuantity::Field(_) = target {
             self.doubts_field = leans > if self.doubts_field { UPRIGHT_SIGMAS } else { LEANS_SIGMAS };
         }
         if leans > LEANS_SIGMAS && leans > LEANS_SIGMAS + SLOW_SIGMAS * sqrt(max(slow / all, 0.0)) {

@@ -5,11 +5,11 @@
 //! up: the height has moved farther than the velocity says, and the offset has changed by as much. A barometer that
 //! drifts moves only its offset, and a wrong velocity only the height.
 
-use crate::aid::Aid;
+use crate::aid::AidSource;
 use crate::estimate::count;
 use crate::estimator::Estimator;
 use crate::memory::Memory;
-use crate::queue::Part;
+use crate::queue::AidObservation;
 use crate::rotation::identity;
 use afbc_control::math::{max, min};
 use nalgebra::Vector3;
@@ -72,12 +72,12 @@ impl Estimator {
     /// Watches the height of a receiver's fix. Returns false if barometer and
     /// velocity contradict it, and undoes what it has moved.
     #[inline(never)]
-    pub(crate) fn trusts_height(&self, memory: &mut Memory, part: &Part, at_us: u64, since_us: u64) -> bool {
-        let crate::horizon::Target::Position(fix) = &part.target else { return true };
+    pub(crate) fn trusts_height(&self, memory: &mut Memory, part: &AidObservation, at_us: u64, since_us: u64) -> bool {
+        let crate::horizon::ObservedQuantity::Position(fix) = &part.target else { return true };
         let (height, climb) = (memory.nominal.position.z, memory.nominal.velocity.z);
         memory.height_watch.advance((height, climb, memory.height_offset), min(since_us as f32 * 1e-6, 1e3));
-        let live = |aid: Aid| memory.aids.of(aid).is_live(at_us, PRESENT_US);
-        let contradicted = live(Aid::GnssVelocity) && live(Aid::Height) && !live(Aid::TrackerPosition);
+        let live = |aid: AidSource| memory.aids.of(aid).is_live(at_us, PRESENT_US);
+        let contradicted = live(AidSource::GnssVelocity) && live(AidSource::Height) && !live(AidSource::TrackerPosition);
         let watch = &mut memory.height_watch;
         if !contradicted || !memory.knows.height_offset {
             watch.doubts = false;
