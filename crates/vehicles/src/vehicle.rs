@@ -124,7 +124,7 @@ impl Vehicle {
     /// station's parameter file use it.
     ///
     /// # Errors
-    /// If it does not have four to eight rotors, which its file would not be read with.
+    /// If it does not have four to eight rotors. Does not occur, for a vehicle is checked when its file is read.
     pub fn configuration(&self) -> Result<Configuration, OutOfRange> {
         Ok(Configuration {
             parameters: self.parameters.to_f32(),
