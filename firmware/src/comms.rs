@@ -162,7 +162,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
                 // An uploaded mission or fence can yield inputs for the control tick without a byte received in this
                 // tick.
                 if comms.has_mail() {
-                    let news = hear::<B>(comms, black_box, &[]);
+                    let news = hear::<B>(comms, &mut decoder, black_box, &[]);
                     pass_on::<B>(&news, log);
                 }
                 if radio::is_possible::<B>()
