@@ -67,7 +67,8 @@ impl StickPilot for ClimbPilot {
                 self.armed_ms = Some(now_ms);
                 println!("{:7.3} s: armed by the switch", now_ms as f64 * 1e-3);
             }
-            return if now_ms > PATIENCE_MS { Err("the vehicle does not arm".to_owned()) } else { Ok(PilotDecision::GoesOn) };
+            let is_late = now_ms > PATIENCE_MS;
+            return if is_late { Err("the vehicle does not arm".to_owned()) } else { Ok(PilotDecision::GoesOn) };
         };
         let place_m = place_m(vehicle);
         let Some((up_ms, start_m)) = self.up else {

@@ -77,7 +77,8 @@ impl Estimator {
         let (height, climb) = (memory.nominal.position.z, memory.nominal.velocity.z);
         memory.height_watch.advance((height, climb, memory.height_offset), min(since_us as f32 * 1e-6, 1e3));
         let live = |aid: AidSource| memory.aids.of(aid).is_live(at_us, PRESENT_US);
-        let contradicted = live(AidSource::GnssVelocity) && live(AidSource::Height) && !live(AidSource::TrackerPosition);
+        let contradicted =
+            live(AidSource::GnssVelocity) && live(AidSource::Height) && !live(AidSource::TrackerPosition);
         let watch = &mut memory.height_watch;
         if !contradicted || !memory.knows.height_offset {
             watch.doubts = false;

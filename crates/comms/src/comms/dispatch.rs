@@ -31,7 +31,7 @@ use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 /// Most queued replies, besides answers to commands. Further replies are dropped, since stations repeat requests.
 pub(super) const REPLIES_MAX: usize = 16;
 /// Most parameter requests queued until the end of the tick. Further ones are dropped, since stations repeat them.
-pub(super) const PARAMETER_TASKS_MAX: usize = 32;
+pub(super) const PARAMETER_TASKS_MAX: usize = 24;
 /// Shortest time between two reports to the guidance that the station in control was heard \[us\].
 const HEARD_EVERY_US: u64 = 50_000;
 
