@@ -19,7 +19,7 @@ use nalgebra::Matrix3;
 /// A sensor counts as failed after this time without a reading \[us\].
 const SILENT_US: u64 = 2_000_000;
 
-struct Known {
+struct KnownAids {
     frame: FixFrame,
     origin: Option<EarthOrigin>,
     /// Newest epoch of the GNSS receiver and its time \[us\].
@@ -31,7 +31,7 @@ struct Known {
     battery: Option<(u64, Option<BatteryPins>, BatteryScale)>,
 }
 
-static KNOWN: Mutex<CriticalSectionRawMutex, RefCell<Known>> = Mutex::new(RefCell::new(Known {
+static KNOWN: Mutex<CriticalSectionRawMutex, RefCell<KnownAids>> = Mutex::new(RefCell::new(KnownAids {
     frame: FixFrame::NEW,
     origin: None,
     receiver: None,
@@ -41,7 +41,7 @@ static KNOWN: Mutex<CriticalSectionRawMutex, RefCell<Known>> = Mutex::new(RefCel
 }));
 
 /// Runs `change` under the lock. `try_borrow_mut` succeeds, since nothing else borrows while the lock is held.
-fn with<T>(change: impl FnOnce(&mut Known) -> T) -> Option<T> {
+fn with<T>(change: impl FnOnce(&mut KnownAids) -> T) -> Option<T> {
     KNOWN.lock(|known| known.try_borrow_mut().ok().map(|mut known| change(&mut known)))
 }
 

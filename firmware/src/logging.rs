@@ -67,9 +67,9 @@ fn storage() -> StorageState {
     StorageState::of(STORAGE.load(Ordering::Relaxed))
 }
 
-struct Queue(Sender<'static, CriticalSectionRawMutex, LogBlock>);
+struct BlockQueue(Sender<'static, CriticalSectionRawMutex, LogBlock>);
 
-impl BlockSink for Queue {
+impl BlockSink for BlockQueue {
     fn free(&mut self) -> Option<&mut LogBlock> {
         self.0.try_send()
     }
@@ -101,7 +101,7 @@ pub struct LinkLog {
     pub(crate) server: LogServer,
     stored: KeptLogs<Pages>,
     writer: LogWriter,
-    queue: Queue,
+    queue: BlockQueue,
     hardware: &'static str,
 }
 
@@ -121,7 +121,7 @@ impl LinkLog {
             server: LogServer::default(),
             stored: KeptLogs::new(Pages(page)),
             writer: LogWriter::new(B::SMALL_LOGS),
-            queue: Queue(queue),
+            queue: BlockQueue(queue),
             hardware: B::HARDWARE,
         });
         (log, LogEnds { blocks, pages })

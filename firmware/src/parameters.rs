@@ -25,7 +25,7 @@ use heapless::Deque;
 
 /// Change that is waiting to be written.
 #[derive(Clone, Copy)]
-enum Unwritten {
+enum UnwrittenParameter {
     /// A change of the parameters.
     Parameters(RecordChange),
     /// A part of the signing key.
@@ -33,7 +33,8 @@ enum Unwritten {
 }
 
 /// Changes to write, and a signal that the queue has changes.
-static CHANGES: Mutex<CriticalSectionRawMutex, RefCell<Deque<Unwritten, 8>>> = Mutex::new(RefCell::new(Deque::new()));
+static CHANGES: Mutex<CriticalSectionRawMutex, RefCell<Deque<UnwrittenParameter, 8>>> =
+    Mutex::new(RefCell::new(Deque::new()));
 static CHANGED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 /// Flags for a station's warning: the parameters' flash could not be read at the start; a change could not be written.
 /// Cleared when the station is told.
@@ -135,7 +136,7 @@ pub fn change(table: &ParameterTable, change: RecordChange, number: u16) {
     if let Ok(prepared) = Prepared::new(table.configuration()) {
         control::fly(prepared, number);
     }
-    put(Unwritten::Parameters(change));
+    put(UnwrittenParameter::Parameters(change));
 }
 
 /// Returns a problem with the parameters' flash as a text for stations. Each problem is returned once.
@@ -152,12 +153,12 @@ pub fn keep_signing(record: impl FnOnce() -> Option<SigningRecord>) {
     let has_room = CHANGES.lock(|changes| changes.try_borrow().is_ok_and(|changes| !changes.is_full()));
     // The room cannot vanish, since only this task queues. It is checked first because a record is handed out once.
     if has_room && let Some(record) = record() {
-        put(Unwritten::Signing(record));
+        put(UnwrittenParameter::Signing(record));
     }
 }
 
 /// Queues a change, or sets the flag `UNWRITTEN` if the queue is full.
-fn put(change: Unwritten) {
+fn put(change: UnwrittenParameter) {
     if CHANGES.lock(|changes| changes.try_borrow_mut().ok()?.push_back(change).ok()).is_none() {
         UNWRITTEN.store(true, Ordering::Relaxed);
     }
@@ -191,15 +192,15 @@ pub async fn run<M: NorFlash>(keeper: &mut Keeper<M>) -> ! {
 
 /// Writes a change. Out of line, so that it can be identified in the image.
 #[inline(never)]
-fn keep<M: NorFlash>(store: &mut Store<Gate<M>>, change: Unwritten) -> Result<(), Error<Shut>> {
+fn keep<M: NorFlash>(store: &mut Store<Gate<M>>, change: UnwrittenParameter) -> Result<(), Error<Shut>> {
     match change {
-        Unwritten::Parameters(change) => Kept::NOW.keep(store, change),
-        Unwritten::Signing(SigningRecord { name, bits }) => store.set(name, 0, bits),
+        UnwrittenParameter::Parameters(change) => Kept::NOW.keep(store, change),
+        UnwrittenParameter::Signing(SigningRecord { name, bits }) => store.set(name, 0, bits),
     }
 }
 
 /// Waits for the next change.
-fn next() -> impl Future<Output = Unwritten> {
+fn next() -> impl Future<Output = UnwrittenParameter> {
     poll_fn(|context| {
         // The waker is registered before the queue is read, so that no change is missed.
         let _ = pin!(CHANGED.wait()).poll(context);

@@ -7,13 +7,21 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Names that several crates may use, with the reasons.
-const SHARED: [(&str, &str); 6] = [
+const SHARED: [(&str, &str); 14] = [
+    ("Aids", "a board's slow sensors, which the trait `Board` calls so"),
+    ("Board", "firmware: the trait that a board implements; sitl: the same on the command line"),
     ("Error", "a library's error, as in std"),
+    ("ExactLog", "the exact log, on board and on the host"),
+    ("Flight", "onboard: the flight; firmware: the same for the image's vehicle"),
+    ("FlightController", "control: the trait of laws; stm32f4: the boards that the field calls so"),
     ("Gains", "a law's gains, named with the law's module: `pid::Gains`"),
-    ("Law", "afbc: what fills the cascade; scenario: a law of the list, with its gains"),
-    ("Limits", "bounds on what the module computes, named with it: `limiter::Limits`"),
     ("Memory", "what changes from step to step, named with the module that steps"),
+    ("Prepared", "onboard: a flight that is checked; firmware: the same for the image's vehicle"),
+    ("Reader", "a reader of bytes, as in std"),
+    ("Receiver", "one end of a link: firmware: the trait; a chip and the emulated board implement it"),
     ("Settings", "the constants of a crate, named with it: `estimator::Settings`"),
+    ("State", "types: the vehicle's state; firmware: the state of a task"),
+    ("Transmitter", "the other end of a link, like `Receiver`"),
 ];
 /// Largest allowed number of shared names.
 const SHARED_MAX: usize = 25;

@@ -43,11 +43,11 @@ pub const SILENCE_US: u64 = 3_000_000;
 /// Tracks one sender's clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SourceClock {
-    known: Option<Known>,
+    known: Option<KnownOffset>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Known {
+struct KnownOffset {
     sent_us: u64,
     arrived_us: u64,
     /// Number of messages heard, up to 255.
@@ -56,7 +56,7 @@ struct Known {
     least_us: [i128; 2],
     /// Start of the present half window \[us\].
     half_since_us: u64,
-    step: Option<Step>,
+    step: Option<ClockStep>,
     /// Smallest time between two stamps \[us\], and time until which the clock counts as coarse \[us\].
     tick_us: u64,
     coarse_until_us: u64,
@@ -64,7 +64,7 @@ struct Known {
 
 /// Consecutive messages that may indicate a step of the clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Step {
+struct ClockStep {
     ahead: bool,
     count: u8,
     since_us: u64,
@@ -80,9 +80,9 @@ impl SourceClock {
     ///
     /// `None` if the message is a duplicate or out of order, and must be dropped.
     pub fn stamp(&mut self, sent_us: u64, arrived_us: u64, differs: bool) -> Option<u64> {
-        let heard_lately = |known: &&mut Known| arrived_us.saturating_sub(known.arrived_us) <= SILENCE_US;
+        let heard_lately = |known: &&mut KnownOffset| arrived_us.saturating_sub(known.arrived_us) <= SILENCE_US;
         let Some(known) = self.known.as_mut().filter(heard_lately) else {
-            self.known = Some(Known::new(sent_us, arrived_us));
+            self.known = Some(KnownOffset::new(sent_us, arrived_us));
             return Some(arrived_us);
         };
         let (old, goes_on_back) = (sent_us < known.sent_us, known.goes_on_back(sent_us, arrived_us));
@@ -120,9 +120,9 @@ fn offset_us(sent_us: u64, arrived_us: u64) -> i128 {
     i128::from(arrived_us) - i128::from(sent_us)
 }
 
-impl Known {
+impl KnownOffset {
     fn new(sent_us: u64, arrived_us: u64) -> Self {
-        Known {
+        KnownOffset {
             sent_us,
             arrived_us,
             heard: 1,
@@ -166,8 +166,8 @@ impl Known {
     /// Counts a message that is too far ahead. The last one of a step starts a new window.
     fn steps_ahead(&mut self, sent_us: u64, arrived_us: u64) {
         let offset_us = offset_us(sent_us, arrived_us);
-        let goes_on = |step: &Step| step.ahead && sent_us >= step.sent_us;
-        let new = Step { ahead: true, count: 0, since_us: arrived_us, sent_us, offset_us };
+        let goes_on = |step: &ClockStep| step.ahead && sent_us >= step.sent_us;
+        let new = ClockStep { ahead: true, count: 0, since_us: arrived_us, sent_us, offset_us };
         let step = self.step.filter(goes_on).unwrap_or(new);
         // Use the slowest: with the fastest, one outlier among them would make all later messages look late.
         let slowest_us = step.offset_us.max(offset_us);
@@ -175,10 +175,10 @@ impl Known {
         let (count, needed) = (step.count + 1, if self.heard < NEW_COUNT { AHEAD_COUNT_NEW } else { AHEAD_COUNT });
         // Do not keep an outlier's stamp: the next correct one would count as out of order.
         self.arrived_us = arrived_us;
-        self.step = Some(Step { count, sent_us, offset_us: slowest_us, ..step });
+        self.step = Some(ClockStep { count, sent_us, offset_us: slowest_us, ..step });
         if count >= needed {
             let heard = self.heard.saturating_add(count);
-            *self = Known { heard, least_us: [slowest_us; 2], ..Known::new(sent_us, arrived_us) };
+            *self = KnownOffset { heard, least_us: [slowest_us; 2], ..KnownOffset::new(sent_us, arrived_us) };
         }
     }
 
@@ -195,13 +195,13 @@ impl Known {
     /// stepped back.
     fn steps_back(&mut self, sent_us: u64, arrived_us: u64) -> bool {
         let offset_us = offset_us(sent_us, arrived_us);
-        let new = Step { ahead: false, count: 0, since_us: arrived_us, sent_us, offset_us };
+        let new = ClockStep { ahead: false, count: 0, since_us: arrived_us, sent_us, offset_us };
         let step = self.step.filter(|_| self.goes_on_back(sent_us, arrived_us)).unwrap_or(new);
         let count = step.count.saturating_add(1);
-        self.step = Some(Step { count, sent_us, ..step });
+        self.step = Some(ClockStep { count, sent_us, ..step });
         let stepped = count >= BACK_COUNT && arrived_us.saturating_sub(step.since_us) >= BACK_US;
         if stepped {
-            *self = Known::new(sent_us, arrived_us);
+            *self = KnownOffset::new(sent_us, arrived_us);
         }
         stepped
     }

@@ -90,7 +90,7 @@ pub fn fly(
 ) -> Result<LoopEnd, Error> {
     check(scenario)?;
     let mut world = World::wired(scenario, STEP_S)?;
-    let mut line = Line {
+    let mut line = LoopLine {
         station,
         autopilot,
         pace,
@@ -108,7 +108,7 @@ pub fn fly(
 }
 
 /// A station connected to an autopilot, advanced in milliseconds.
-struct Line<'a, A> {
+struct LoopLine<'a, A> {
     station: &'a mut Station,
     autopilot: &'a mut A,
     pace: MessagePeriods,
@@ -124,7 +124,7 @@ struct Line<'a, A> {
     shift_m: Vector3<f32>,
 }
 
-impl<A: Autopilot> FlightSoftware for Line<'_, A> {
+impl<A: Autopilot> FlightSoftware for LoopLine<'_, A> {
     type Error = Error;
 
     /// Runs one step. The first step is the tick that arms the vehicle.
@@ -141,10 +141,10 @@ impl<A: Autopilot> FlightSoftware for Line<'_, A> {
     }
 }
 
-impl<A: Autopilot> Line<'_, A> {
+impl<A: Autopilot> LoopLine<'_, A> {
     /// Runs one millisecond: sends the messages that are due, and receives.
     fn turn(&mut self, world: &mut World) -> Result<WorldView, Error> {
-        let Line { station, autopilot, pace, now_ms, silent_ms, has_armed, is_placed, shift_m, .. } = self;
+        let LoopLine { station, autopilot, pace, now_ms, silent_ms, has_armed, is_placed, shift_m, .. } = self;
         let view = world.look();
         if let Some(readings) = world.readings() {
             if !autopilot.sense(readings) {

@@ -3,7 +3,7 @@
 use crate::configuration::Configuration;
 use crate::control_inputs::ControlInputs;
 use crate::front_end::{Corrections, EstimatorFrontEnd};
-use crate::guided::{Core, Guide};
+use crate::guided::{Core, GuidanceStage};
 use crate::imu_selector::ImuSelector;
 use crate::law::FlightLaw;
 use crate::readings::Readings;
@@ -22,7 +22,7 @@ pub struct Flight<const N: usize = 4, C: FlightLaw<N> = Guarded<N>> {
     memory: FlightCoreMemory<C::Memory>,
     front_end: EstimatorFrontEnd,
     motor: Motor,
-    guide: Guide,
+    guide: GuidanceStage,
     timeouts: SensorTimeouts,
     /// True if the flight core's observer provided the last tick's state.
     observes: bool,
@@ -39,7 +39,7 @@ pub struct Prepared<const N: usize = 4, C: FlightLaw<N> = Guarded<N>> {
     output_filter: OutputFilter,
     corrections: Corrections,
     motor: Motor,
-    guide: Guide,
+    guide: GuidanceStage,
 }
 
 impl<const N: usize> Prepared<N> {
@@ -79,7 +79,7 @@ impl<const N: usize, C: FlightLaw<N>> Prepared<N, C> {
             output_filter: OutputFilter::of(parameters, N).handing_over(),
             corrections: Corrections::new(imu, calibration),
             motor: Motor::new(*curve)?,
-            guide: Guide::new(configuration)?,
+            guide: GuidanceStage::new(configuration)?,
         })
     }
 }

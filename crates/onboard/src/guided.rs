@@ -13,7 +13,7 @@ const OWN: u8 = u8::MAX;
 
 /// The guidance of a vehicle, with the vehicle's data that it needs.
 #[derive(Clone, Debug)]
-pub(crate) struct Guide {
+pub(crate) struct GuidanceStage {
     guidance: Guidance,
     lift: AvailableThrust,
     mass_kg: f32,
@@ -31,7 +31,7 @@ pub(crate) struct Core<'a> {
     pub(crate) observed: Option<&'a State>,
 }
 
-impl Guide {
+impl GuidanceStage {
     /// Creates the guidance of a vehicle.
     ///
     /// # Errors
@@ -39,7 +39,7 @@ impl Guide {
     pub(crate) fn new(configuration: &Configuration) -> Result<Self, OutOfRange> {
         let Configuration { parameters, rotors, settings, guidance, .. } = configuration;
         let most_m_s2 = rotors.count() as f32 * settings.common.rotor_force_max_n / parameters.mass_kg;
-        Ok(Guide {
+        Ok(GuidanceStage {
             guidance: Guidance::new(*guidance)?,
             lift: AvailableThrust { most_m_s2, gravity_m_s2: parameters.gravity_m_s2, given_m_s2: None },
             mass_kg: parameters.mass_kg,
@@ -48,7 +48,7 @@ impl Guide {
     }
 
     /// Takes over new settings for the same number of rotors. Mode, mission and home stay.
-    pub(crate) fn adopt(&mut self, prepared: &Guide) {
+    pub(crate) fn adopt(&mut self, prepared: &GuidanceStage) {
         // Cannot fail: `prepared` was made from these settings.
         let _ = self.guidance.set(*prepared.guidance.settings());
         (self.lift, self.mass_kg) = (prepared.lift, prepared.mass_kg);

@@ -48,7 +48,7 @@ pub struct ImuPair {
 
 /// One of the two sensors.
 #[derive(Clone, Copy, Debug)]
-struct Imu {
+struct SelectableImu {
     /// Time of the newest accepted sample \[us\].
     last_us: Option<u64>,
     /// Newest accepted sample: rates \[rad/s\] and specific force \[m/s2\].
@@ -75,8 +75,8 @@ struct Imu {
 #[derive(Clone, Debug)]
 pub struct ImuSelector {
     second_flies: bool,
-    first: Imu,
-    second: Imu,
+    first: SelectableImu,
+    second: SelectableImu,
     /// Number of samples averaged in the offset of the sensor in reserve, and the remaining difference from the sensor
     /// that flies, averaged and newest \[rad/s, m/s2\].
     averaged: f32,
@@ -91,10 +91,10 @@ pub struct ImuSelector {
     flown_us: u64,
 }
 
-impl Imu {
+impl SelectableImu {
     const NEW: Self = {
         let zero = [Vector3::new(0.0, 0.0, 0.0); 2];
-        Imu { last_us: None, newest: zero, came: zero, equals: [0; 2], offset: zero, wrong: false }
+        SelectableImu { last_us: None, newest: zero, came: zero, equals: [0; 2], offset: zero, wrong: false }
     };
 
     /// Returns one of its samples, with the offset removed.
@@ -104,7 +104,7 @@ impl Imu {
     }
 
     /// Returns true if this sensor's rates or force repeat and those of `other` do not.
-    fn is_stuck(&self, other: &Imu) -> bool {
+    fn is_stuck(&self, other: &SelectableImu) -> bool {
         // Without noise, as at rest in a simulation, both sensors repeat. That is no fault.
         self.equals.iter().zip(other.equals).any(|(own, others)| *own >= STUCK && others < STUCK / 2)
     }
@@ -120,8 +120,8 @@ impl ImuSelector {
         let zero = Vector3::new(0.0, 0.0, 0.0);
         ImuSelector {
             second_flies: false,
-            first: Imu::NEW,
-            second: Imu::NEW,
+            first: SelectableImu::NEW,
+            second: SelectableImu::NEW,
             averaged: 0.0,
             apart: [zero; 2],
             apart_now: [zero; 2],
@@ -281,8 +281,9 @@ impl ImuSelector {
 
     /// Returns which sensor flies at `now_us`, and which sensors work.
     pub fn pair(&self, now_us: u64) -> ImuPair {
-        let works =
-            |imu: &Imu| !imu.wrong && imu.last_us.is_some_and(|last_us| now_us.saturating_sub(last_us) <= FAILED_US);
+        let works = |imu: &SelectableImu| {
+            !imu.wrong && imu.last_us.is_some_and(|last_us| now_us.saturating_sub(last_us) <= FAILED_US)
+        };
         let both = [&self.first, &self.second];
         ImuPair {
             second_flies: self.second_flies,

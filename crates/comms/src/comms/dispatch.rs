@@ -55,7 +55,7 @@ pub(super) enum ParameterTask {
 }
 
 /// Handler of the frames in received bytes.
-struct Frames<'a, R> {
+struct FrameDispatcher<'a, R> {
     comms: &'a mut Comms,
     requests: &'a mut R,
     /// True if the bytes came over a wire.
@@ -66,13 +66,13 @@ struct Frames<'a, R> {
     setup: Option<SetupSigning>,
 }
 
-impl<R: TransferRequests> FrameHandler<Uplink> for Frames<'_, R> {
+impl<R: TransferRequests> FrameHandler<Uplink> for FrameDispatcher<'_, R> {
     fn accepts(&mut self, frame: &ReceivedFrame<'_>) -> bool {
         self.comms.signing.accepts(self.comms.now_us, frame, self.wired)
     }
 
     fn handle(&mut self, from: Address, message: Uplink, payload: &[u8]) {
-        let Frames { comms, requests, inputs, setup, .. } = self;
+        let FrameDispatcher { comms, requests, inputs, setup, .. } = self;
         match message {
             Uplink::State { sent_us, state, sigmas } => comms.take_state(from, sent_us, state, sigmas, inputs),
             Uplink::Pose { sent_us, pose } if comms.status.senses => comms.take_pose(from, sent_us, pose, inputs),
@@ -112,9 +112,9 @@ impl Comms {
     ) -> ControlInputs {
         let before = *decoder.counters();
         let wired = decoder.is_wired();
-        let mut frames = Frames { comms: self, requests, wired, inputs: ControlInputs::EMPTY, setup: None };
+        let mut frames = FrameDispatcher { comms: self, requests, wired, inputs: ControlInputs::EMPTY, setup: None };
         decoder.feed_to(&mut frames, bytes);
-        let Frames { mut inputs, setup, .. } = frames;
+        let FrameDispatcher { mut inputs, setup, .. } = frames;
         self.frames.add_since(&before, decoder.counters());
         // The new key is set after all bytes: the frames beside SETUP_SIGNING are checked with the old key.
         if let Some(setup) = setup {

@@ -34,11 +34,11 @@ pub const CALIBRATES: i32 = 67;
 pub struct Commands {
     /// Requests that the flight core has not answered, indexed by ticket. Ticket 0 is reserved for [`Request::Kill`],
     /// so that it is always accepted. The array limits open requests, so that the flight core's inbox never overflows.
-    asked: [Option<Open>; QUEUE_MAX],
+    asked: [Option<OpenCommand>; QUEUE_MAX],
     /// Orders that the guidance has not answered, indexed by ticket. The guidance's queue cannot overflow either.
-    ordered: [Option<Open>; QUEUE_MAX],
+    ordered: [Option<OpenCommand>; QUEUE_MAX],
     /// The command in progress, and the time of its last "in progress" answer \[us\].
-    in_progress: Option<(Open, u64)>,
+    in_progress: Option<(OpenCommand, u64)>,
     waiting: Deque<QueuedAnswer, ANSWERS_MAX>,
     unanswered: u32,
 }
@@ -54,7 +54,7 @@ struct QueuedAnswer {
 
 /// A command that has not been answered yet.
 #[derive(Clone, Copy)]
-struct Open {
+struct OpenCommand {
     /// Number of the command; none for a message that needs no answer.
     command: Option<u16>,
     from: Address,
@@ -68,7 +68,7 @@ impl Commands {
         let mut places = self.asked.iter_mut().zip(0..).filter(|(_, ticket)| (*ticket == 0) == kills);
         match places.find(|(place, _)| place.is_none()) {
             Some((place, ticket)) => {
-                *place = Some(Open { command: Some(command), from, at_us });
+                *place = Some(OpenCommand { command: Some(command), from, at_us });
                 Some(Ticketed { value: request, ticket })
             }
             None => {
@@ -84,7 +84,7 @@ impl Commands {
     pub fn order(&mut self, order: Order, command: Option<u16>, from: Address, at_us: u64) -> Option<Ticketed<Order>> {
         match self.ordered.iter_mut().zip(0..).find(|(place, _)| place.is_none()) {
             Some((place, ticket)) => {
-                *place = Some(Open { command, from, at_us });
+                *place = Some(OpenCommand { command, from, at_us });
                 Some(Ticketed { value: order, ticket })
             }
             None => {
@@ -100,7 +100,7 @@ impl Commands {
         let is_free = self.in_progress.is_none();
         if is_free {
             self.answer(command, CommandResult::InProgress, from);
-            self.in_progress = Some((Open { command: Some(command), from, at_us }, at_us));
+            self.in_progress = Some((OpenCommand { command: Some(command), from, at_us }, at_us));
         } else {
             self.answer(command, CommandResult::Refused(BUSY), from);
         }
@@ -109,7 +109,7 @@ impl Commands {
 
     /// Ends the lasting command.
     pub fn end(&mut self, answer: CommandResult) {
-        if let Some((Open { command: Some(command), from, .. }, _)) = self.in_progress.take() {
+        if let Some((OpenCommand { command: Some(command), from, .. }, _)) = self.in_progress.take() {
             self.answer(command, answer, from);
         }
     }
@@ -157,7 +157,7 @@ impl Commands {
             }
             return Some(next);
         }
-        let forgotten = |open: &mut Open| now_us.saturating_sub(open.at_us) > FORGOTTEN_US;
+        let forgotten = |open: &mut OpenCommand| now_us.saturating_sub(open.at_us) > FORGOTTEN_US;
         let mut open = self.asked.iter_mut().chain(&mut self.ordered);
         // A lost message that needs no answer is dropped silently.
         while let Some(lost) = open.find_map(|place| place.take_if(forgotten)) {
@@ -180,7 +180,7 @@ impl Commands {
     }
 }
 
-impl Open {
+impl OpenCommand {
     fn answered(self, answer: CommandResult) -> Option<Downlink> {
         self.command.map(|command| Downlink::CommandAck { command, answer, to: self.from })
     }

@@ -43,21 +43,21 @@ struct Stream {
     defines: bool,
     records: Records,
     /// Part that is being filled.
-    part: Part,
+    part: LogStreamPart,
     /// Part to be acknowledged, the time at which it was last sent, and the number of times it was sent.
     waiting: Option<(StreamedLog, u64, u8)>,
 }
 
 #[derive(Clone, Debug)]
-struct Part {
+struct LogStreamPart {
     bytes: [u8; STREAM_DATA_MAX],
     length: usize,
     /// Offset of the first record that begins in the part.
     first_record: Option<usize>,
 }
 
-impl Part {
-    const EMPTY: Part = Part { bytes: [0; STREAM_DATA_MAX], length: 0, first_record: None };
+impl LogStreamPart {
+    const EMPTY: LogStreamPart = LogStreamPart { bytes: [0; STREAM_DATA_MAX], length: 0, first_record: None };
 
     fn push(&mut self, byte: u8) {
         if let Some(to) = self.bytes.get_mut(self.length) {
@@ -117,7 +117,7 @@ impl LogStream {
             sequence: 0,
             defines: true,
             records: Records::BEGIN,
-            part: Part::EMPTY,
+            part: LogStreamPart::EMPTY,
             waiting: None,
         });
         starts
@@ -213,7 +213,8 @@ impl Stream {
     /// Ends the part `rest` bytes before its end, and begins the next part with these bytes. They must begin with a
     /// record.
     fn cut(&mut self, rest: usize, to_be_acknowledged: bool) -> StreamedLog {
-        let Part { mut bytes, length, first_record } = core::mem::replace(&mut self.part, Part::EMPTY);
+        let LogStreamPart { mut bytes, length, first_record } =
+            core::mem::replace(&mut self.part, LogStreamPart::EMPTY);
         let length = length.saturating_sub(rest);
         if rest > 0 {
             self.part.first_record = Some(0);

@@ -19,7 +19,7 @@ const SHORT: u32 = 1 << 20;
 pub struct LogTransfer {
     /// List that is being sent.
     listing: Option<Listing>,
-    parts: Deque<Part, PARTS_MAX>,
+    parts: Deque<LogPart, PARTS_MAX>,
 }
 
 /// A requested list of logs.
@@ -33,7 +33,7 @@ enum Listing {
 
 /// A requested part of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Part {
+struct LogPart {
     log: u16,
     offset: u32,
     /// Number of bytes left.
@@ -47,7 +47,7 @@ impl LogTransfer {
         match request {
             LogRequest::List { first, last } => self.listing = Some(Listing::Wanted([first, last])),
             LogRequest::Data { log, offset, bytes } => {
-                let part = Part { log, offset, left: bytes };
+                let part = LogPart { log, offset, left: bytes };
                 if self.parts.iter().chain([&part]).any(|it| it.log != log || it.left > SHORT) {
                     self.parts.clear();
                 }
@@ -85,7 +85,7 @@ impl LogTransfer {
             let newest = count.saturating_sub(1);
             return Some(LogMessage::Entry(LogEntry { log: next, count, last: newest, utc_s, size }));
         }
-        let Part { log, offset, left } = *self.parts.front()?;
+        let LogPart { log, offset, left } = *self.parts.front()?;
         let mut data = [0; LOG_DATA_MAX];
         let wanted = LOG_DATA_MAX.min(left as usize);
         let into = data.get_mut(..wanted).unwrap_or_default();
@@ -97,7 +97,7 @@ impl LogTransfer {
         let (offset_then, left) = (offset.saturating_add(count as u32), left - count as u32);
         // LOG_DATA that is not full marks the end of the log. If the last one is full, an empty one follows.
         if count == LOG_DATA_MAX && left > 0 {
-            self.parts.push_front(Part { log, offset: offset_then, left }).ok();
+            self.parts.push_front(LogPart { log, offset: offset_then, left }).ok();
         }
         Some(LogMessage::Data(LogData { log, offset, count: count as u8, data }))
     }

@@ -4,7 +4,7 @@ use crate::storage::block::LogBlock;
 use crate::storage::card::{CardError, LogCard};
 use crate::storage::keeper::{LogKeeper, StorageState};
 use crate::storage::query::{KeeperAnswer, LogPage, LogQuery};
-use crate::storage::volume::{Device, NoClock};
+use crate::storage::volume::{CardBlocks, NoClock};
 use core::ops::ControlFlow;
 use embedded_sdmmc::{DirEntry, Error, Mode, RawDirectory, RawFile, ShortFileName, VolumeIdx, VolumeManager};
 
@@ -20,7 +20,7 @@ const DIGITS: usize = 3;
 const NUMBER_MAX: u32 = 99_999;
 
 /// The volume manager, with room for two open files: one being written and one being read.
-type Volumes<'a> = VolumeManager<Device<'a>, NoClock, 1, 2, 1>;
+type Volumes<'a> = VolumeManager<CardBlocks<'a>, NoClock, 1, 2, 1>;
 
 /// State of reading logs back.
 #[derive(Debug, Default)]
@@ -59,7 +59,7 @@ impl<'a> CardKeeper<'a> {
     /// Creates the keeper. The card's state is unknown until [`poll`](LogKeeper::poll).
     pub fn new(card: &'a mut dyn LogCard) -> Self {
         CardKeeper {
-            volumes: Some(volumes(Device::new(card))),
+            volumes: Some(volumes(CardBlocks::new(card))),
             root: None,
             file: None,
             reader: Reader::default(),
@@ -248,7 +248,7 @@ impl LogKeeper for CardKeeper<'_> {
     }
 }
 
-fn volumes(device: Device<'_>) -> Volumes<'_> {
+fn volumes(device: CardBlocks<'_>) -> Volumes<'_> {
     VolumeManager::new_with_limits(device, NoClock, 1)
 }
 

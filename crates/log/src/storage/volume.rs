@@ -13,7 +13,7 @@ const TYPES: [u8; 5] = [0x04, 0x06, 0x0E, 0x0B, 0x0C];
 const CLUSTERS: [u64; 2] = [4_085, 65_525];
 
 /// A card as `embedded-sdmmc` uses it.
-pub(crate) struct Device<'a> {
+pub(crate) struct CardBlocks<'a> {
     card: RefCell<&'a mut dyn LogCard>,
     /// Number of blocks, 0 until the card has started.
     blocks: Cell<u32>,
@@ -23,9 +23,9 @@ pub(crate) struct Device<'a> {
     failure: Cell<Option<CardError>>,
 }
 
-impl<'a> Device<'a> {
+impl<'a> CardBlocks<'a> {
     pub(crate) fn new(card: &'a mut dyn LogCard) -> Self {
-        Device { card: RefCell::new(card), blocks: Cell::new(0), left: Cell::new(0), failure: Cell::new(None) }
+        CardBlocks { card: RefCell::new(card), blocks: Cell::new(0), left: Cell::new(0), failure: Cell::new(None) }
     }
 
     /// Begins a call: resets its block limit and its failure.
@@ -70,7 +70,7 @@ impl<'a> Device<'a> {
     }
 }
 
-impl BlockDevice for Device<'_> {
+impl BlockDevice for CardBlocks<'_> {
     type Error = CardError;
 
     fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), CardError> {

@@ -16,7 +16,7 @@ pub struct Reason(String<REASON_MAX>);
 impl Reason {
     /// Creates the line `subject: text`, cut to the length that fits.
     pub fn new(subject: &str, text: &str) -> Self {
-        let mut line = Line::default();
+        let mut line = ReasonLine::default();
         [subject, ": ", text].into_iter().for_each(|part| line.text(part));
         Reason(line.text)
     }
@@ -28,7 +28,7 @@ impl Reason {
 
     /// Creates a line about a value out of its own range.
     pub(crate) fn range(name: RecordName, error: &OutOfRange) -> Self {
-        let mut line = Line::default();
+        let mut line = ReasonLine::default();
         [name.as_str(), ": must be "].into_iter().for_each(|part| line.text(part));
         line.number(error.range.min);
         line.text(" to ");
@@ -41,7 +41,7 @@ impl Reason {
     pub(crate) fn together(name: RecordName, error: &OutOfRange) -> Self {
         let OutOfRange { value, range } = error;
         let (side, limit) = if *value > range.max { (" above", range.max) } else { (" below", range.min) };
-        let mut line = Line::default();
+        let mut line = ReasonLine::default();
         [name.as_str(), ": ", range.name, side].into_iter().for_each(|part| line.text(part));
         let short = line.text.clone();
         line.text(" ");
@@ -63,12 +63,12 @@ impl fmt::Display for Reason {
 
 /// A line that drops the characters that do not fit.
 #[derive(Default)]
-struct Line {
+struct ReasonLine {
     text: String<REASON_MAX>,
     is_cut: bool,
 }
 
-impl Line {
+impl ReasonLine {
     fn text(&mut self, text: &str) {
         text.chars().for_each(|c| self.char(c));
     }
@@ -143,7 +143,7 @@ mod tests {
     use std::string::{String as Text, ToString};
 
     fn written(number: f64) -> Text {
-        let mut line = Line::default();
+        let mut line = ReasonLine::default();
         line.number(number);
         line.text.to_string()
     }

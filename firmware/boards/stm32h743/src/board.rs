@@ -37,7 +37,7 @@ use chip_stm32::motors::{CHANNELS, MotorProtocol, Motors, Throttles, hold_low, p
 use chip_stm32::sd_card::{self, SdCardLog};
 use chip_stm32::sensors::{Device, InterruptPin, Interrupted, Polled, StampHandler, interrupted};
 use chip_stm32::{crystal, escs, faults, usb, watchdog};
-use chip_stm32h7::flash::Words;
+use chip_stm32h7::flash::WordFlash;
 use chip_stm32h7::{boot_loader, clocks, reset};
 use embassy_executor::SendSpawner;
 use embassy_stm32::adc::{Adc, SampleTime};
@@ -134,7 +134,7 @@ impl Board for Stm32h743 {
     type Aids = Aids;
     type Links = [BoardLink<Receiver, Transmitter>; 3];
     type Log = SdCardLog;
-    type Memory = Words;
+    type Memory = WordFlash;
     const CORE_HZ: u32 = clocks::CORE_HZ;
     const STORE: u32 = 0;
     const HARDWARE: &'static str = "stm32h743";
@@ -226,7 +226,7 @@ impl Board for Stm32h743 {
         // While a debugger halts the core, the watchdog is halted too.
         pac::DBGMCU.apb4fzr1().modify(|freeze| freeze.set_iwdg1(true));
         let board = Stm32h743 { watchdog: watchdog(p.IWDG1) };
-        Parts { board, sampler, aids, links, memory: Words::new(p.FLASH), log: sd_card::new(interface) }
+        Parts { board, sampler, aids, links, memory: WordFlash::new(p.FLASH), log: sd_card::new(interface) }
     }
 
     fn set_motor_protocol(&mut self, protocol: MotorProtocol, answers: bool) {

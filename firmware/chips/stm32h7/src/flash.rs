@@ -27,20 +27,20 @@ const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 const BFHFNMIGN: u32 = 1 << 8;
 
 /// The two sectors as words of four bytes.
-pub struct Words(Peri<'static, FLASH>);
+pub struct WordFlash(Peri<'static, FLASH>);
 
-impl Words {
+impl WordFlash {
     /// Takes the flash. Must be called at the start.
     pub fn new(flash: Peri<'static, FLASH>) -> Self {
-        Words(flash)
+        WordFlash(flash)
     }
 }
 
-impl ErrorType for Words {
+impl ErrorType for WordFlash {
     type Error = NorFlashErrorKind;
 }
 
-impl ReadNorFlash for Words {
+impl ReadNorFlash for WordFlash {
     const READ_SIZE: usize = WORD;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
@@ -56,7 +56,7 @@ impl ReadNorFlash for Words {
     }
 }
 
-impl NorFlash for Words {
+impl NorFlash for WordFlash {
     const WRITE_SIZE: usize = WORD;
     const ERASE_SIZE: usize = SECTOR as usize;
 
