@@ -18,8 +18,8 @@ pub struct PairedDifference {
 }
 
 impl Comparison {
-    /// Compares a figure of each contender with that of the contender at [`Comparison::against`]. Returns none for that
-    /// contender itself, and for all with a single seed.
+    /// Compares a figure of each contender with that of the contender at [`Comparison::baseline`]. Returns none for
+    /// that contender itself, and for all with a single seed.
     pub fn paired_differences(&self, value: fn(&Metrics) -> f64) -> Vec<Option<PairedDifference>> {
         let Some(baseline) = self.entries.get(self.baseline) else { return Vec::new() };
         let others = baseline.values(value);

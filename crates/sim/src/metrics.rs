@@ -40,7 +40,7 @@ pub struct EstimateMetrics {
     pub nees: f64,
     /// Share of the time in which the estimate was valid.
     pub valid_ratio: f64,
-    /// Agreement of the measurements with the estimate, in the order of [`Aid::ALL`].
+    /// Agreement of the measurements with the estimate, in the order of [`AidSource::ALL`].
     pub aids: [AidMetrics; AidSource::ALL.len()],
 }
 
