@@ -221,7 +221,7 @@ impl<const N: usize> FlightController<N> for Guarded<N> {
             Some(FallbackMemory { cascade, .. }) => self.resumed(cascade, |_, _, _, integral| integral.value),
             None => self.resumed(afbc, |axis, x, errors, own| self.adaptive.law().fuzzy(axis, x, errors, own)),
         };
-        // With new figures, because a mean that has tripped is still beyond its bound.
+        // The monitor starts with new figures, because a mean that has tripped is still beyond its bound.
         *memory = Memory { afbc, ..Memory::default() };
         true
     }

@@ -1,6 +1,6 @@
 //! Composition of the cascade: the context and tracking of each subsystem, the use of its input, and the memory between
 //! steps. `law.rs` and `integral.rs` compare the laws themselves with their equations.
-#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a failed construction must stop the test
 
 use crate::common::step;
 use afbc::desired::desired_attitude;

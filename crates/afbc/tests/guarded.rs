@@ -1,6 +1,6 @@
 //! AFBC with its monitor: the checks of every step, the switch to the fallback law and back, and that only a command
 //! engages AFBC again. `tests/tests/guarded.rs` has closed loops.
-#![allow(clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
+#![allow(clippy::unwrap_used, missing_docs)] // a failed construction must stop the test
 
 use crate::common::{Stepped, U, check_step, gains, plausible, setpoint, settings, state, step, value};
 use afbc::adaptive::Gains;

@@ -1,5 +1,5 @@
 //! Limits on the demands of the cascade, for every accepted limit and every plausible state and setpoint.
-#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a failed construction must stop the test
 
 use crate::common;
 use afbc::integral::IntegralBackstepping;

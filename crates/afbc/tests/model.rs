@@ -1,5 +1,5 @@
 //! Compares the nominal model (7) with rigid-body mechanics in `f64`, and d eta/dt with the rotation that it describes.
-#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a failed construction must stop the test
 
 use crate::common::{U, spread, step};
 use afbc::model::{ModelConstants, RollPitch, TILT_COSINE_MIN};

@@ -140,8 +140,8 @@ proptest! {
     }
 }
 
-/// Known moments are not observed when they are as old as the assumed age of the rates. A moment turns by mass over
-/// inertia.
+/// The observer does not observe known moments if the rates have the assumed age. A moment as force gives an angular
+/// acceleration by the factor mass over inertia.
 #[test]
 fn what_is_known_is_not_observed() {
     let (observer, vehicle) = (observer(60.0, 0.02), Parameters::PAPER.to_f32());
@@ -159,7 +159,7 @@ fn what_is_known_is_not_observed() {
             rates += known * DT_S;
             seen_rates += (rates - seen_rates) * if age_s > 0.0 { 1.0 - (-DT_S / age_s).exp() } else { 1.0 };
         }
-        // 10 rad/s for 10 ms are a tenth.
+        // The known moment has a frequency of 10 rad/s. Rates that are 10 ms too young give an error of a tenth.
         assert!(if age_s > 0.0 { largest < 0.02 } else { (0.08..0.12).contains(&largest) }, "{age_s}: {largest}");
     }
     let found = Vector3::new(1.0, 2.0, -3.0);

@@ -1,6 +1,6 @@
 //! Compares every figure of the monitor with its definition, and checks every trip, and that a healthy flight does not
 //! trip.
-#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a failed construction must stop the test
 
 use afbc::monitor::{Monitor, MonitorBounds, MonitorFigures, TRIM_SHARE};
 use afbc::{AdaptiveEstimate, CascadeMemory, Profile, Settings, Trip};

@@ -1,5 +1,5 @@
 //! Checks the profiles: the paper's numbers, the rules for `flight`, and that every profile is valid.
-#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a failed construction must stop the test
 
 use afbc::adaptive::Gains;
 use afbc::fuzzy::Membership;

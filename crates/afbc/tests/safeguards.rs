@@ -1,5 +1,5 @@
 //! Compares the safeguards with the equations in `safeguards.rs` in `f64`, and checks their consequences.
-#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a failed construction must stop the test
 
 use crate::common::{U, gains_of_one};
 use afbc::adaptive::Gains;

@@ -3,7 +3,7 @@
 /// Transfers get at least 1 / `SHARE` of the link's bytes, even if telemetry needs all of it. They also get all bytes
 /// that telemetry leaves.
 const SHARE: i64 = 5;
-/// Most bytes of the share that can be saved up, less than a frame \[1e-3 bytes\].
+/// Largest part of the share that can be saved up, less than a frame \[1e-3 bytes\].
 const SAVED: i64 = 250_000;
 
 /// Budget of the transfers' share.

@@ -12,7 +12,7 @@ pub const VALUE_BYTES: u32 = 37;
 pub const LINK_SHARE: u32 = 40;
 /// Number of values that may be sent at once after a pause.
 const BURST: u64 = 4;
-/// Most queued answers. A station asks again for values that it misses.
+/// Largest number of queued answers. A station asks again for values that it misses.
 const WAITING_MAX: usize = 32;
 
 /// Results of a station's message.

@@ -10,7 +10,8 @@ use afbc_mavlink::{
 };
 use heapless::Deque;
 
-/// Most queued requests for files, and of other kinds. Further ones are dropped, since stations repeat them.
+/// Largest number of queued requests for files, and of other kinds. Further requests are dropped, since stations repeat
+/// them.
 const FILES_MAX: usize = 4;
 const OTHERS_MAX: usize = 24;
 /// Longest frame with a part of a file or of a log stream \[bytes\].

@@ -1,6 +1,6 @@
 //! Tests of the interface's defaults for every controller: a screen before each step, and the answers of a law without
 //! a fallback.
-#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a failed construction must stop the test
 
 use afbc_control::{Action, FlightController, Health, Mixer, Trace, Validated};
 use afbc_types::{Inputs, PLUS, Parameters, ROTORS_MAX, Setpoint, State};

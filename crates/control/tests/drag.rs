@@ -1,5 +1,5 @@
-//! Compares known drag's part of the thrust's derivatives with finite differences, and its moment with that of a force
-//! above the centre of mass.
+//! Tests the drag that a law knows. Its part of the thrust's derivatives is compared with finite differences. Its
+//! moment is compared with the moment of a force above the centre of mass.
 
 use afbc_control::drag::KnownDrag;
 use nalgebra::{Unit, Vector3};
@@ -36,9 +36,9 @@ proptest! {
     }
 }
 
-/// Compares jerk and snap of the thrust with finite differences in double precision of the thrust needed on 2,000
-/// paths. They contain nearly all that drag adds. The second derivative is compared without its part along the thrust,
-/// which turns nothing.
+/// Compares the jerk and snap of the thrust on 2,000 paths with finite differences of the needed thrust, in double
+/// precision. Jerk and snap must contain nearly all that drag adds. The snap is compared without its part along the
+/// thrust, because that part does not turn the vehicle.
 #[test]
 fn jerk_and_snap_are_those_of_the_thrust_on_the_path() {
     let mut seed = 1_u64;

@@ -3,7 +3,7 @@
 //! Some mutants of `mixer.rs` survive because they change no result: another number for `ASKED_MAX * ASKED_MAX` (a
 //! shortcut past a clamp that changes nothing below `ASKED_MAX`), `least < most` (scales by 1) and `yaw >= 0` (zero yaw
 //! takes no room).
-#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // a failed construction must stop the test
 
 use afbc_control::Settings;
 use afbc_control::mixer::{AUTHORITY, Allocation, HOVER_MARGIN, Mixer, THRUST_SHARE};

@@ -170,7 +170,7 @@ mod tests {
     }
 
     proptest! {
-        /// For axes of any offset and length, and any limit on the number of ticks.
+        /// This holds for axes of any offset and length, and for any limit on the number of ticks.
         #[test]
         fn every_axis_has_two_ticks_with_labels_of_their_own(
             sign in prop::sample::select(vec![-1.0, 0.0, 1.0]), offset in -12.0..9.0f64, span in -12.0..9.0f64,

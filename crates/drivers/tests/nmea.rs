@@ -191,7 +191,7 @@ fn epochs_that_do_not_belong_together_are_no_fix() {
     assert_eq!(fixes(&mut decoder, &format!("{fix}$GPGSV{motion}")), []);
 }
 
-/// Returns an epoch in either order, with the given quality fields.
+/// Returns an epoch's sentences with the given quality fields. The position's sentence or the motion's comes first.
 fn judged(quality: &str, dilution: &str, status: &str, mode: Option<&str>, motion_comes_first: bool) -> String {
     let place = "4807.03800,N,01131.00000,E";
     let mode = mode.map(|mode| format!(",{mode}")).unwrap_or_default();

@@ -40,7 +40,7 @@ pub(crate) fn about_z(angle_rad: f32) -> Quaternion<f32> {
 
 /// Returns the shortest rotation of the body's unit vector `up` to the earth's z, `None` if it points down.
 pub(crate) fn levelling(up: &Vector3<f32>) -> Option<Quaternion<f32>> {
-    // Upside down, every axis would do and the norm would vanish. NaN returns `None`.
+    // If `up` points down, every horizontal axis is a solution and the norm is zero. NaN returns `None`.
     (up.z > -0.99).then(|| normalized(&Quaternion::new(1.0 + up.z, up.y, -up.x, 0.0)))
 }
 
@@ -73,15 +73,15 @@ pub(crate) fn matrix(q: &Quaternion<f32>) -> Matrix3<f32> {
     )
 }
 
-/// Returns the rotation vector \[rad\] from `from` to `to` in the earth frame: to = small(v) from. Exact for small
-/// angles, and right in direction up to half a turn.
+/// Returns the rotation vector \[rad\] from `from` to `to` in the earth frame: to = small(v) from. It is exact
+/// for small angles, and its direction is right up to half a turn.
 pub(crate) fn difference(to: &Quaternion<f32>, from: &Quaternion<f32>) -> Vector3<f32> {
     let q = to * from.conjugate();
     let vector = q.imag();
     let sine = sqrt(vector.norm_squared());
     // Angle divided by the vector's length, 2 for small angles.
     let scale = if sine < 0.05 { 2.0 + sine * sine * (1.0 / 3.0) } else { 2.0 * atan2(sine, q.w.abs()) / sine };
-    // q and -q are the same rotation. The sign of w selects the one of at most half a turn.
+    // q and -q are the same rotation. With w >= 0, its angle is at most half a turn.
     vector * if q.w < 0.0 { -scale } else { scale }
 }
 

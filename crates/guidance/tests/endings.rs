@@ -54,7 +54,7 @@ fn it_asks_to_disarm_on_the_ground() {
     assert!(times.len() == 4 && (998..=1002).contains(times.first().unwrap()), "{times:?}");
     assert!(times.iter().zip(times.iter().skip(1)).all(|(one, next)| (99..=101).contains(&(next - one))), "{times:?}");
     assert_eq!(fixture.said, [GuidanceNotice::Disarms]);
-    // After a flight another time applies, from touchdown on.
+    // After a flight, the guidance disarms after another time, counted from touchdown.
     fixture.airborne = true;
     assert_eq!(asks(&mut fixture, 3000), []);
     fixture.airborne = false;
@@ -62,7 +62,7 @@ fn it_asks_to_disarm_on_the_ground() {
     assert!((498..=502).contains(times.first().unwrap()), "{times:?}");
     assert_eq!(fixture.said, [GuidanceNotice::Disarms; 2]);
     assert_eq!(asks(&mut armed(timed(0.0, 0.0)), 5000), [], "never");
-    // Disarming in between restarts the time.
+    // If the vehicle is disarmed meanwhile, the time until the guidance disarms it begins anew.
     let mut fixture = armed(timed(1.0, 0.5));
     assert_eq!(asks(&mut fixture, 900), []);
     fixture.core = Mode::Disarmed;

@@ -9,7 +9,7 @@ use std::fs::File;
 
 /// Steps per row: 100 Hz.
 const EVERY: u64 = 10;
-/// Most bytes that wait for a slow disk: minutes of a flight.
+/// Largest number of bytes that wait for a slow disk: minutes of a flight.
 const ROOM: usize = 1 << 22;
 
 /// Writes a row every 10 ms with the vehicle's true motion, the reference, and the rotor speeds from the link. No step

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 /// Number of bytes gathered before they go to the file: about a second of a log.
 const FLUSH_BYTES: usize = 1 << 16;
-/// Most bytes that wait for a slow disk: some minutes of a flight in real time.
+/// Largest number of bytes that wait for a slow disk: some minutes of a flight in real time.
 const ROOM: usize = 1 << 23;
 /// Longest time for writing the rest of a live log at its end.
 const END_MAX: Duration = Duration::from_secs(10);

@@ -15,7 +15,7 @@ use std::time::UNIX_EPOCH;
 /// Directories of the metadata and of the logs.
 const ETC: &str = "etc";
 const LOG: &str = "log";
-/// Most logs erased in one call.
+/// Largest number of logs erased in one call.
 const ERASED_MAX: usize = 16;
 
 /// The files of a host. None can be written. Logs can be removed, except the one being written.

@@ -5,11 +5,11 @@ use crate::stored_logs::StoredLogs;
 use afbc_files::{Error, OutputFile};
 use std::path::{Path, PathBuf};
 
-/// Most logs of earlier starts that may still wait for the disk.
+/// Largest number of logs of earlier starts that may still wait for the disk.
 const ENDING_MAX: usize = 8;
-/// Most starts that are logged, because stations may restart the vehicle any number of times.
+/// Largest number of starts that are logged, because stations may restart the vehicle any number of times.
 const STARTS_MAX: u32 = 1000;
-/// Most file numbers that are tried until one is free.
+/// Largest number of file numbers that are tried until one is free.
 const NUMBERS_TRIED: u32 = 1000;
 
 /// The ULog files of a vehicle. If a log cannot be written any more, it ends, and the flight continues.

@@ -108,7 +108,8 @@ parameters! {
 }
 
 impl Gains {
-    /// Law of 2010, without integrals. Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
+    /// Gains of the law that Lee published in 2010, without integrals. They are tuned by hand for the paper's vehicle
+    /// with a rotor lag of 20 ms.
     pub const LEE_2010: Self = Gains {
         position_p_1_s2: 16.0,
         position_d_1_s: 8.0,

@@ -321,7 +321,7 @@ fn strangers_come_to_rest_where_they_should() {
         lands("dfbc", &dfbc(), &stranger);
         lands("mpc", &mpc(), &stranger);
 
-        // What L1 estimates is what its model lacks: at rest, the force that the modelled thrust is short of.
+        // L1 estimates the force that its model lacks. At rest, this is the weight minus the modelled thrust.
         let estimate = lands("l1", &l1(), &stranger);
         let [(_, mass), (_, inertia), (_, thrust)] = stranger.factors;
         let pushed = -Vector3::new(stranger.push[0], stranger.push[1], stranger.push[2]);

@@ -294,7 +294,7 @@ fn an_armed_vehicle_flies_no_other_configuration() {
     let impossible = (1_100, vec![ReplayDifference::Configuration(1_100)]);
     assert_eq!(replay(&mut self::replayer(), &wrong), impossible);
     let mut changed = self::replayer();
-    // A change without effect on this flight.
+    // The changed parameter has no effect on this flight.
     changed.change(name("EST_GATE"), 4.0).unwrap();
     assert_eq!(replay(&mut changed, &wrong), (1_101, Vec::new()));
     // Adopts a configuration that is not in the log.

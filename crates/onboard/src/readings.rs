@@ -3,7 +3,7 @@
 use afbc_estimator::{ImuSample, Measurement, Stamped};
 use nalgebra::Vector3;
 
-/// Most aiding measurements in one tick. Further ones wait for the next tick.
+/// Largest number of aiding measurements in one tick. Further ones wait for the next tick.
 pub const AIDS_MAX: usize = 2;
 
 /// A value with its age.

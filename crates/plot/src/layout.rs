@@ -17,7 +17,7 @@ const BAND: f64 = 0.2;
 const UNSEEN_PT: f64 = 0.12;
 /// Margin around the values of an axis, as a share of their range.
 const ROOM: f64 = 0.05;
-/// Most ticks of a y-axis, and least distance between ticks of the x-axis in widths of its longest label.
+/// Largest number of ticks on a y-axis, and least distance between ticks of the x-axis in widths of its longest label.
 const Y_TICKS: usize = 5;
 const X_APART: f64 = 1.8;
 /// Dash patterns: lengths of dashes and gaps \[pt\].

@@ -14,8 +14,8 @@ const TIME: &str = "time_s";
 /// Deepest nesting of messages, and most elements of an array that become columns.
 const DEPTH: usize = 8;
 const LONGEST: usize = 64;
-/// Most fields of a message that are read, including those of nested messages. Ten fields at each of eight levels would
-/// be 10^8.
+/// Largest number of fields of a message that are read, including those of nested messages. Ten fields at each of eight
+/// levels would be 10^8.
 const FIELDS: u32 = 100_000;
 
 /// Reads a ULog file.

@@ -6,7 +6,7 @@ use tiny_skia::{Color, FillRule, LineJoin, Mask, Paint, PathBuilder, Pixmap, Rec
 
 /// Points per inch.
 const POINTS: f64 = 72.0;
-/// Most pixels along one side.
+/// Largest number of pixels along one side.
 const LONGEST_PX: f64 = 20_000.0;
 
 /// Draws a figure at `dpi` pixels per inch.

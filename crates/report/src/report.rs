@@ -149,7 +149,7 @@ pub(super) fn picture(figure: &Picture) -> Markup {
     }
 }
 
-/// Most points of a vehicle's track, on a page with many flights.
+/// Largest number of points of a vehicle's track, on a page with many flights.
 const POINTS_OF_MANY: usize = 300;
 
 /// Returns an interactive view in space, reduced for a page with many flights.

@@ -159,7 +159,7 @@ const FACTOR: Range = Range::new("factor", 0.01, 100.0);
 const MOMENT_FACTOR: Range = Range::new("factor", -10.0, 10.0);
 /// Accepted turn rate of a held vehicle about the vertical, positive to the left \[deg/s\].
 const TURN: Range = Range::new("turn", -180.0, 180.0);
-/// Most milliseconds of one `step` command: an hour.
+/// Largest duration of one `step` command, an hour \[ms\].
 const STEP_MAX: u32 = 3_600_000;
 /// Default rise and hold time of a gust \[s\].
 const RISE_S: f64 = 1.0;

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Most bytes that wait to be read: some ten thousand lines.
+/// Largest number of bytes that wait to be read: some ten thousand lines.
 const ROOM: usize = 1 << 20;
 /// Longest wait for the last lines to be read, at the end.
 const END_MAX: Duration = Duration::from_secs(2);

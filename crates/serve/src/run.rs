@@ -37,7 +37,7 @@ pub struct InputLines {
 
 /// Longest wait for a line before the stop flag is checked again.
 const NAP: Duration = Duration::from_millis(50);
-/// Most lines that are queued, and most that are carried out between two steps.
+/// Largest number of queued lines, and largest number of lines that are carried out between two steps.
 const LINES_MAX: usize = 16;
 /// Least time between two reports of lost time.
 const REPORTED_EVERY: Duration = Duration::from_secs(5);

@@ -7,15 +7,15 @@ use std::io::{self, Read, Write};
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
 use std::time::Duration;
 
-/// Most bytes that wait for a slow reader before it is disconnected: a minute or more of telemetry.
+/// Largest number of bytes that wait for a slow reader before it is disconnected: a minute or more of telemetry.
 const WAITING_MAX: usize = 1 << 20;
-/// Most connections, and most connections that are accepted in one step.
+/// Largest number of connections, and largest number of connections that are accepted in one step.
 pub(crate) const STREAMS_MAX: usize = 32;
 const ACCEPTED_MAX: usize = 2;
-/// Most bytes read in one step from all streams together, and from one stream.
+/// Largest number of bytes read in one step from all streams together, and from one stream.
 const TAKEN_MAX: usize = 16_384;
 const PART_MAX: usize = 2048;
-/// Most bytes written to a stream in one step; much more than one step's telemetry.
+/// Largest number of bytes written to a stream in one step; much more than one step's telemetry.
 const WRITTEN_MAX: usize = 4096;
 
 /// A listener and its connections.

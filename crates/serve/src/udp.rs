@@ -11,9 +11,10 @@ use std::time::Duration;
 pub(crate) const SILENCE_MAX: Duration = Duration::from_secs(60);
 /// Time after which unsigned peers are forgotten once a signing key is set.
 const UNSIGNED_MAX: Duration = Duration::from_secs(5);
-/// Most peers of a vehicle.
+/// Largest number of peers of a vehicle.
 pub(crate) const PEERS_MAX: usize = 32;
-/// Most datagrams read in one step, and number of bytes after which reading stops, so that a flood does not stop time.
+/// Largest number of datagrams read in one step, and number of bytes after which reading stops, so that a flood does
+/// not stop time.
 const DATAGRAMS_MAX: usize = 128;
 const TAKEN_MAX: usize = 16_384;
 /// Longest datagram \[bytes\], small enough for one Ethernet packet.

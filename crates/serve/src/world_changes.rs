@@ -10,7 +10,7 @@ use afbc_scenario::Scenario;
 use afbc_sim::flight::World;
 use afbc_types::{Axis, OutOfRange};
 
-/// Most changes of one kind that act at the same time; each one costs every step a little.
+/// Largest number of changes of one kind that act at the same time. Each change costs every step a little time.
 const ACTIVE_MAX: usize = 256;
 
 /// Weather and faults that act on a vehicle now, and those of its scenario.

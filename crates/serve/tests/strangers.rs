@@ -14,7 +14,7 @@ use std::time::Duration;
 const STATION: Address = Address { system: 255, component: 190 };
 const KEY: SigningKey = SigningKey([7; 32]);
 const SIGNED_10US: u64 = 37_000_000_000_000;
-/// Most peers per protocol, and most bytes read and written in a step, as docs/serve.md says.
+/// Largest number of peers per protocol, and of bytes read and written in a step, as docs/serve.md says.
 const PEERS: usize = 32;
 const TAKEN: usize = 16_384;
 const WRITTEN: usize = 4096;

@@ -28,9 +28,11 @@ use afbc_mavlink::{
 use afbc_onboard::ControlInputs;
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 
-/// Most queued replies, besides answers to commands. Further replies are dropped, since stations repeat requests.
+/// Largest number of queued replies, besides answers to commands. Further replies are dropped, since stations repeat
+/// requests.
 pub(super) const REPLIES_MAX: usize = 16;
-/// Most parameter requests queued until the end of the tick. Further ones are dropped, since stations repeat them.
+/// Largest number of parameter requests queued until the end of the tick. Further requests are dropped, since stations
+/// repeat them.
 pub(super) const PARAMETER_TASKS_MAX: usize = 24;
 /// Shortest time between two reports to the guidance that the station in control was heard \[us\].
 const HEARD_EVERY_US: u64 = 50_000;

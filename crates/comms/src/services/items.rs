@@ -6,7 +6,7 @@ use afbc_guidance::{Item, is_place};
 use afbc_mavlink::{Datum, GlobalPosition, Height, MavCmd, MissionItem, MissionResult};
 use nalgebra::{Vector2, Vector3};
 
-/// Most items of all plans together.
+/// Largest number of items of all plans together.
 pub const ITEMS_MAX: usize = 64;
 
 const WAYPOINT: u16 = MavCmd::MAV_CMD_NAV_WAYPOINT as u16;
@@ -297,7 +297,7 @@ pub(super) fn check_jumps(items: &[MissionItem]) -> Result<(), (u16, Invalid)> {
     Ok(())
 }
 
-/// Most jumps in a mission.
+/// Largest number of jumps in a mission.
 pub(super) const JUMPS_MAX: usize = 8;
 
 /// Returns the number if it is whole and at most `most`.

@@ -227,7 +227,7 @@ impl Stream {
         }
         let (to, sequence) = (self.to, self.sequence);
         self.sequence = self.sequence.wrapping_add(1);
-        // Both numbers are below 256.
+        // Length and first record are below 256.
         let first_record = first_record.filter(|at| *at < length).map(|at| at as u8);
         StreamedLog { to, sequence, length: length as u8, first_record, data: bytes, to_be_acknowledged }
     }

@@ -9,7 +9,7 @@ use afbc_mavlink::{LOG_DATA_MAX, LogData, LogEntry, LogRequest};
 use core::task::Poll;
 use heapless::Deque;
 
-/// Most queued parts of a log. A further part replaces the oldest.
+/// Largest number of queued parts of a log. A further part replaces the oldest.
 const PARTS_MAX: usize = 20;
 /// Longest part that can be queued with other parts \[bytes\]. A longer part replaces them.
 const SHORT: u32 = 1 << 20;

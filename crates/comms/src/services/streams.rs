@@ -70,7 +70,7 @@ pub const DEFAULTS: [(u32, u32); 23] = [
 pub const INTERVAL_MIN_US: u32 = 1_000;
 /// Messages that can be requested but not streamed. HEARTBEAT has a fixed rate.
 const ONCE: [u32; 4] = [id::HEARTBEAT, id::AUTOPILOT_VERSION, id::PROTOCOL_VERSION, id::AVAILABLE_MODES];
-/// Most queued requests for messages.
+/// Largest number of queued requests for messages.
 pub const REQUESTS_MAX: usize = 16;
 /// Bytes that streams may send at once after a pause \[1e-3 bytes\]. Texts and replies may use as many again. Together
 /// with answers and one frame that just fitted this is less than 1 kB, the size of the board's transmit buffer.

@@ -5,7 +5,7 @@ use afbc_guidance::notice::Severity;
 use afbc_mavlink::{Address, Downlink, MavSeverity, StatusText};
 use heapless::{Deque, String};
 
-/// Most queued texts. Further texts are dropped.
+/// Largest number of queued texts. Further texts are dropped.
 const TEXTS_MAX: usize = 12;
 /// Longest text \[bytes\].
 const LENGTH_MAX: usize = 50;

@@ -67,7 +67,7 @@ pub(crate) fn turns(
         let is_level = talk.wait(PATIENCE_MS, |talk| level.follow(&mut talk.latest, &Vector3::z()))?;
         step.check(is_level, "the board was not held level");
         tell(turn.order);
-        // Start anew, so that the angle counts from level.
+        // A new `TurnProgress` counts the angle from level.
         let mut turned = TurnProgress::default();
         let is_done = talk.wait(PATIENCE_MS, |talk| turned.follow(&mut talk.latest, &turn.up.into()))?;
         let angle_rad = turned.angle_rad.get(turn.axis).copied().unwrap_or_default() * turn.sign;
@@ -77,7 +77,7 @@ pub(crate) fn turns(
         step.found("angle turned by the gyroscope, 90 expected", format!("{:.0} degrees", angle_rad.to_degrees()));
         step.found("angle turned by the estimate, 90 expected", format!("{:.0} degrees", attitude_rad.to_degrees()));
         step.check(is_done, "the accelerometer does not show the requested side facing up; check the IMU's rotation");
-        // Between half and one and a half right angles.
+        // The gyroscope must show a turn between 45 and 135 degrees.
         step.check(
             (0.78..2.36).contains(&angle_rad),
             "the gyroscope does not show this turn; check the IMU's rotation",

@@ -29,7 +29,8 @@ pub enum KeeperAnswer {
     /// There is no such log. For [`LogQuery::Erase`]: nothing is left to erase.
     #[default]
     None,
-    /// The number asked for. For [`LogQuery::Read`]: the number of bytes read, less than a page at the log's end.
+    /// The requested number. For [`LogQuery::Read`], this is the number of bytes read: less than a page at the log's
+    /// end.
     Is(u32),
     /// The storage has failed or refused.
     Failed,

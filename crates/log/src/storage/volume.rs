@@ -4,8 +4,8 @@ use crate::storage::card::{CardError, LogCard};
 use core::cell::{Cell, RefCell};
 use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx, TimeSource, Timestamp};
 
-/// Most blocks that one call may touch: more than the allocation table of the largest FAT32 volume on SD cards (2^26
-/// clusters, 128 in a block).
+/// Largest number of blocks that one call may touch: more than the allocation table of the largest FAT32 volume on SD
+/// cards (2^26 clusters, 128 in a block).
 const TOUCHED_MAX: u32 = 1 << 20;
 /// Partition types: three of FAT16 and two of FAT32.
 const TYPES: [u8; 5] = [0x04, 0x06, 0x0E, 0x0B, 0x0C];

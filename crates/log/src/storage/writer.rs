@@ -9,8 +9,8 @@ use afbc_onboard::{LogMode, TickRecord};
 /// Size of the ring of bytes that wait for a block. It holds a tick in which every topic is due, and the unfinished
 /// block before.
 pub const STAGING: usize = 2560;
-/// Most entries of a log's beginning handled in one tick. Each entry is looked up in the vehicle's table, and the task
-/// has other work.
+/// Largest number of entries of a log's beginning handled in one tick. Each entry is looked up in the vehicle's table,
+/// and the task has other work.
 const PACE: u16 = 2;
 /// Time for which a log continues after the vehicle is disarmed \[us\].
 const TAIL_US: u64 = 1_000_000;

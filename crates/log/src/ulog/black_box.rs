@@ -31,7 +31,7 @@ const TEXT_MAX: usize = 128;
 pub struct BlackBox {
     known: Known,
     definitions: Definitions,
-    /// Most entries of the log's beginning, or changed parameters, written in one tick.
+    /// Largest number of entries of the log's beginning, or of changed parameters, written in one tick.
     pace: u16,
     small: bool,
     unwritten: Unwritten,

@@ -14,7 +14,7 @@ pub enum RecordChange {
     Restored,
 }
 
-/// Most passes over the store to set values that depend on each other.
+/// Largest number of passes over the store to set values that depend on each other.
 const ROUNDS_MAX: u32 = 100;
 
 /// Tells how to read values that earlier images have stored.

@@ -9,7 +9,7 @@ use afbc_replay::exact::{
 
 /// Column heads.
 pub(super) const HEADS: [&str; 3] = ["RMS", "largest", "at"];
-/// Most parameters that are listed.
+/// Largest number of parameters that are listed.
 const LISTED_MAX: usize = 40;
 /// Ticks per second.
 const RATE_HZ: f64 = 1000.0;

@@ -5,7 +5,7 @@ use super::packed::deltas;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-/// Most points of a track.
+/// Largest number of points of a track.
 const POINTS_MAX: usize = 1500;
 /// Grid steps along the time axis, along an edge of the box, and in a full turn.
 const TIME_STEPS: f64 = 1e6;

@@ -9,9 +9,9 @@ use afbc_campaign::{BINS, CampaignSummary, ContenderSummary, DrawnQuantity, Surv
 use afbc_drawing::{PlotAxis, Point, Ticks};
 use core::ops::Range;
 
-/// Most points of a curve.
+/// Largest number of points of a curve.
 const POINTS: usize = 400;
-/// Most ticks on the value axis of a distribution, and on each other axis.
+/// Largest number of ticks on the value axis of a distribution, and on each other axis.
 const X_TICKS: usize = 12;
 const Y_TICKS: usize = 6;
 const LINE_PX: f64 = 1.6;

@@ -12,7 +12,7 @@ use afbc_replay::{LoggedState, Recording, ReplayRow, Replayed};
 use afbc_types::State;
 use nalgebra::{Quaternion, Vector3};
 
-/// Most resets that are marked.
+/// Largest number of resets that are marked.
 const MARKS_MAX: usize = 10;
 
 /// A panel's label, our value, and the log's value.

@@ -22,7 +22,7 @@ const LANE_PX: f64 = 16.0;
 /// Width of a panel's plot.
 pub(super) const PLOT_PX: f64 = WIDTH_PX - LEFT_PX - RIGHT_PX;
 
-/// Most ticks on each axis.
+/// Largest number of ticks on each axis.
 const T_TICKS: usize = 13;
 const Y_TICKS: usize = 6;
 

@@ -17,7 +17,7 @@ use std::collections::HashSet;
 const HEIGHT_PX: f64 = 660.0;
 /// Area of the box, below a legend of one line: left, top, width, height.
 const ROOM_PX: [f64; 4] = [110.0, 70.0, WIDTH_PX - 220.0, HEIGHT_PX - 70.0 - 62.0];
-/// Most ticks along an edge.
+/// Largest number of ticks along an edge.
 const TICKS: usize = 7;
 /// Width of a band along the reference.
 const BAND_PX: f64 = 13.0;

@@ -301,7 +301,7 @@ fn stale_files_are_removed_and_foreign_ones_kept() {
     assert_eq!(one["notes.csv"], b"mine");
     assert_eq!(one.len(), both.len());
 
-    // A file of somebody else, here a link, with the name of a result.
+    // A link that `sitl` has not created has the name of a result. It is replaced only on request.
     fs::remove_file(scratch.0.join("paper-afbc.csv")).unwrap();
     write(&scratch.open(), &[], &[]).unwrap();
     std::os::unix::fs::symlink("nowhere", scratch.0.join("paper-afbc.csv")).unwrap();

@@ -6,7 +6,7 @@ use afbc_replay::{ErrorFigure, EstimatorStart, SampleSource};
 
 /// Column heads.
 pub(super) const HEADS: [&str; 4] = ["RMS", "largest", "within 3σ", "valid"];
-/// Most resets of the log that are listed.
+/// Largest number of resets of the log that are listed.
 const RESETS_MAX: usize = 12;
 
 /// Differences of one quantity.

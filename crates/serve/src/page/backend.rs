@@ -20,7 +20,7 @@ use std::collections::VecDeque;
 /// Time for which a text is sent again with every frame, as frames may be lost \[s\], and most texts per frame.
 const TEXTS_S: f64 = 3.0;
 const TEXTS_MAX: usize = 40;
-/// Most places in a plan.
+/// Largest number of places in a plan.
 const PLACES_MAX: usize = 50;
 /// Largest coordinate of a place, relative to the origin \[m\].
 const FAR_M: f32 = 10_000.0;

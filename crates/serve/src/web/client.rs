@@ -26,9 +26,9 @@ const NAP: Duration = Duration::from_millis(8);
 /// Longest message from a page, and most bytes that wait to be written.
 const MESSAGE_MAX: usize = 16_384;
 const WAITING_MAX: usize = 1 << 20;
-/// Most outgoing messages that are queued for a client.
+/// Largest number of outgoing messages that are queued for a client.
 const OUT_MAX: usize = 32;
-/// Most messages of a client per second, including pings.
+/// Largest number of messages of a client per second, including pings.
 const RATE_MAX: u32 = 60;
 
 /// WebSocket close code for a page that another page has replaced; such a page does not reconnect by itself.

@@ -17,7 +17,7 @@ use std::time::Duration;
 /// Time between two frames, in flight and during a pause.
 const FRAME: Duration = Duration::from_millis(33);
 const PAUSED: Duration = Duration::from_millis(250);
-/// Most messages of clients that wait for the flight's loop.
+/// Largest number of messages of clients that wait for the flight's loop.
 const EVENTS_MAX: usize = 32;
 /// Time after which a client that accepts nothing is dropped.
 const STUCK: Duration = Duration::from_secs(10);

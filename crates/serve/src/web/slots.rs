@@ -6,11 +6,11 @@ use std::net::{IpAddr, Shutdown, TcpStream};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// Most pages at a time: WebSockets of admitted clients.
+/// Largest number of pages at a time: WebSockets of admitted clients.
 pub const PAGES_MAX: usize = 8;
-/// Most other connections at a time.
+/// Largest number of other connections at a time.
 const OTHERS_MAX: usize = 32;
-/// Most connections at a time.
+/// Largest number of connections at a time.
 pub const CONNECTIONS_MAX: usize = PAGES_MAX + OTHERS_MAX;
 
 /// The open connections.

@@ -22,7 +22,7 @@ use nalgebra::{Vector2, Vector3};
 use plans::PlanItems;
 use upload::Upload;
 
-/// Most queued messages. The protocol repeats lost messages.
+/// Largest number of queued messages. The protocol repeats lost messages.
 const OUT_MAX: usize = 8;
 
 /// Position data with which plans are checked.
