@@ -62,7 +62,7 @@ pub fn housekeeping() -> SendSpawner {
 /// # Panics
 /// If the task has been spawned before.
 pub fn once<S>(task: Result<SpawnToken<S>, SpawnError>) -> SpawnToken<S> {
-    // Out of line, so that the tasks share one panic message.
+    // The function is not inlined, so that all tasks share one panic message.
     #[cold]
     #[inline(never)]
     fn again() -> ! {

@@ -49,7 +49,7 @@ static STATE: Mutex<State> =
 /// Starts the time base of a core that runs at `core_hz`. The priority of its interrupt must be set before.
 pub(crate) fn start(mut syst: SYST, core_hz: u32) {
     syst.set_clock_source(SystClkSource::Core);
-    // One less, because the counter passes through 0 as well.
+    // The reload value is one less than the period, because the counter passes through 0 as well.
     syst.set_reload(core_hz / 1000 - 1);
     syst.clear_current();
     syst.enable_interrupt();

@@ -107,7 +107,7 @@ fn lists_and_checks() {
 #[test]
 fn flights() {
     let folder = small("flights");
-    // Long enough for all figures to be evaluated.
+    // The flight is long enough for all figures to be evaluated.
     let flown = prints(
         &folder,
         "Flights",

@@ -41,7 +41,7 @@ fn flights_are_lines_and_seeds_of_one_law_a_band() {
         fs::read_to_string(folder.join("figure.svg")).unwrap()
     };
     let both = plot(&["1/hold-pid.csv", "1/hold-indi.csv"], &["--y", "x_m", "--y", "z_m,z_d_m"]);
-    // Two panels with two and four lines, without bands; the names lack their common prefix.
+    // The two panels have two and four lines, without bands. The names lack their common prefix.
     assert_eq!((lines(&both).len(), bands(&both)), (6, 0));
     assert!(both.contains(">pid</text>") && both.contains(">x [m]</text>") && both.contains(">time [s]</text>"));
     let seeds: Vec<String> = (1..=5).map(|seed| format!("PID={seed}/hold-pid.csv")).collect();

@@ -119,24 +119,24 @@ const FOREVER: i64 = i64::MAX;
 
 #[derive(Clone, Copy, Debug)]
 enum Expected {
-    /// Continues to fly within this distance of the reference \[m\].
+    /// The vehicle continues to fly within this distance of the reference \[m\].
     Flies(f64),
-    /// Coasts and then continues to fly. The distance from the reference stays within the first value, and within the
-    /// second one during the last 2 s \[m\].
+    /// The vehicle coasts and then continues to fly. Its distance from the reference never exceeds the first value, and
+    /// during the last 2 s it does not exceed the second value \[m\].
     Recovers(f64, f64),
-    /// Coasts, descends and then continues to fly. The distance from the reference stays within the first value, and
-    /// within the second one during the last 2 s \[m\].
+    /// The vehicle coasts, descends and then continues to fly. Its distance from the reference never exceeds the first
+    /// value, and during the last 2 s it does not exceed the second value \[m\].
     Resumes(f64, f64),
-    /// Descends and touches down at most this fast \[m/s\], then disarms on the ground.
+    /// The vehicle descends and touches down at most this fast \[m/s\], then disarms on the ground.
     Lands(f64),
-    /// Descends without an attitude and disarms in the air 2.25 s after the last state. Hits the ground at most this
-    /// fast \[m/s\].
+    /// The vehicle descends without an attitude and disarms in the air 2.25 s after the last state. It hits the ground
+    /// at most this fast \[m/s\].
     GivesUp(f64),
-    /// Disarms at this time \[ms\].
+    /// The vehicle disarms at this time \[ms\].
     Stops(i64),
-    /// Does not arm, and reports this reason.
+    /// The vehicle does not arm, and reports this reason.
     Refuses(Refusal),
-    /// Does not arm, since no request arrives.
+    /// The vehicle does not arm, since no request arrives.
     Stays,
 }
 

@@ -226,7 +226,7 @@ fn a_stopped_rotor_is_noticed_within_100_ms() {
     assert!(latest_ms[0] > latest_ms[1] && latest_ms[1] > 15, "{latest_ms:?}");
 }
 
-/// A vehicle with six rotors that loses one acts as the parameter says.
+/// A vehicle with six rotors loses one and holds, lands or returns, as the parameter COM_ACT_FAIL_ACT says.
 #[test]
 fn a_failure_has_the_consequence_that_is_set() {
     let vehicle = BUILT_IN.iter().find(|built_in| built_in.name == "f550").unwrap().read().unwrap();

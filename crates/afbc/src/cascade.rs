@@ -257,10 +257,10 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
         let allocation = self.mixer.allocate(&asked);
         let action = self.mixer.carry_out(&allocation);
 
-        // For the next step.
+        // The next step's observer needs the thrust.
         if let Some(forces) = &self.forces {
-            // The thrust as given, not as asked: otherwise the part beyond the rotors' limits would be observed as a
-            // disturbance.
+            // It gets the thrust as given, not as asked. Otherwise it would observe the part beyond the rotors'
+            // limits as a disturbance.
             forces.record_thrust(&mut filters.forces, action.given.thrust_n);
         }
         if let Some(moments) = &self.moments {

@@ -129,7 +129,7 @@ impl ForceObserver {
     ) -> Result<Option<Self>, OutOfRange> {
         let DisturbanceObserver { disturbance_rad_s: bandwidth, disturbance_lag_s: lag_s, .. } = *settings;
         let Settings { dt_s, drag, .. } = *common;
-        // Two poles at exp(-w dt).
+        // The observer has two poles at exp(-w dt).
         let rest = 1.0 - math::exp(-bandwidth * dt_s);
         let memory = ForceMap::new(settings.memory_1_s, settings.memory_speed_m_s, dt_s)?;
         Ok((bandwidth > 0.0).then(|| ForceObserver {

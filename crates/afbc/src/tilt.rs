@@ -72,7 +72,7 @@ impl Tilt {
         let theta_dot = cos2_theta * ahead_dot;
         // (cos^2 theta)' = -2 tan theta cos^2 theta theta'; the same holds for phi below.
         let theta_ddot = cos2_theta * ahead_ddot - 2.0 * ahead * theta_dot * theta_dot;
-        // First and second derivative of cos theta, divided by -cos theta.
+        // These are the first and second derivatives of cos theta, divided by -cos theta.
         let (shrink, shrink_dot) = (ahead * theta_dot, ahead * theta_ddot + theta_dot * theta_dot);
         let tan_phi_dot = cos_theta * aside_dot - tan_phi * shrink;
         let tan_phi_ddot = cos_theta * (aside_ddot - 2.0 * aside_dot * shrink) - tan_phi * shrink_dot;

@@ -74,8 +74,8 @@ proptest! {
         let [f, g, g_dot, x1d_ddot, u] = [f, g, g_dot, tracking.x1d_ddot, u].map(f64::from);
         let e1_dot = e2 - a1 * e1; // (13)
         let e2_dot = a1 * (e2 - a1 * e1) + x1d_ddot - f - g * u; // (13)
-        // u is rounded at most 12 times relative to its largest terms. Both derivatives contain e_2 g u; the first
-        // divides it by g.
+        // u is rounded at most 12 times, each time relative to its largest term. Both derivatives contain e_2 g u, but
+        // (14) divides it by g.
         let terms = c * e1.abs()
             + a1 * e2.abs()
             + a1 * a1 * e1.abs()

@@ -97,7 +97,7 @@ proptest! {
 
         let [phi, theta] = command.trace.desired_rad.map(f64::from);
         let (forward, left) = (vertical * theta.tan(), -vertical * phi.tan() / theta.cos());
-        // By rotation, roll and pitch belong to an attitude with the setpoint's yaw.
+        // With `by_rotation`, roll and pitch belong to an attitude with the setpoint's yaw.
         let (sin, cos) = f64::from(if settings.by_rotation { setpoint.yaw_rad } else { yaw_rad }).sin_cos();
         let got = [forward * cos - left * sin, forward * sin + left * cos];
         // Errors of the rotation, and rounding of angles near 90 degrees, amplified by their tangent.

@@ -175,7 +175,7 @@ fn limit_cycles_are_counted_and_vibration_about_yaw_is_not() {
         let trips = |hz: f32, amplitude| {
             let (steps, trip) = sine(axis, hz, amplitude).1.unwrap();
             assert_eq!(trip, Trip::LimitCycle(axis), "{hz} Hz");
-            // 1 - exp(-t) = 16/(2 hz), plus the first periods.
+            // The time follows from 1 - exp(-t) = 16/(2 hz). The margin covers the first periods.
             let within_s = -(1.0 - 16.0 / (2.0 * hz)).ln() + 0.35;
             assert!(steps as f32 * DT_S < within_s, "{axis:?}, {hz} Hz: {steps} steps");
         };

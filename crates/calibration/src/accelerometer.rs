@@ -46,7 +46,7 @@ pub struct AccelerometerCalibration {
     /// Time at which the last side was finished \[us\].
     done_us: Option<u64>,
     rest: RestSamples,
-    /// Side of the present rest, once detected; true if the side is finished, now or before.
+    /// Side that points to the ground during the present rest, once detected; true if that side is finished.
     detected: Option<(Option<Side>, bool)>,
     pending: Sides,
     read_m_s2: Matrix3x6,

@@ -341,7 +341,7 @@ fn every_key_of_a_vehicle_file_counts() {
 
 #[test]
 fn every_key_of_a_campaign_file_counts() {
-    // All quantities that apply to a measured state, or to an estimated one.
+    // The file varies all quantities that apply to a measured state, or to an estimated one.
     let spread = |estimated: bool| -> String {
         let mut spread = String::from("[spread]\n");
         for quantity in &campaign::QUANTITIES {

@@ -156,7 +156,7 @@ impl<const N: usize> Mixer<N> {
         let columns = rotors.map(|rotor| Vector4::new(rotor.y, -rotor.x, spin(&rotor), 1.0));
         let effectiveness = SMatrix::<f32, 4, N>::from_columns(&columns);
         let gram: Matrix4<f32> = effectiveness * effectiveness.transpose();
-        // At most 1 by Hadamard's inequality, up to rounding.
+        // By Hadamard's inequality, the ratio is at most 1, up to rounding.
         AUTHORITY.check(gram.determinant() / gram.diagonal().product())?;
         // The default is unreachable: matrices without an inverse have been refused above.
         let inverse = effectiveness.transpose() * gram.try_inverse().unwrap_or_default();

@@ -98,7 +98,7 @@ fn tan_and_tilt_cosine_are_as_exact_as_documented() {
     assert_figure("tilt_cosine", worst(even_sweep(-FRAC_PI_2, FRAC_PI_2, 1_000_000), alone), 1e-4);
     let both =
         |x: f32| (f64::from(math::tilt_cosine(x, 1.3 * x)) - f64::from(x).cos() * f64::from(1.3 * x).cos()).abs();
-    // Two cosines, each accurate to 1.7e-4.
+    // The product has two cosines, each accurate to 1.7e-4.
     assert!(worst(even_sweep(-700.0, 700.0, 1_000_000), both).0 <= 3.4e-4);
 }
 

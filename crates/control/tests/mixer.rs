@@ -457,7 +457,7 @@ proptest! {
         prop_assume!(mixer.is_ok());
         let mixer = mixer.unwrap();
         prop_assert_eq!(mixer.thrust_max_n(), 4.0 * limit);
-        // Each rotor's share of a pure thrust without limits.
+        // `share` is the largest share that a rotor has of a pure thrust without limits.
         let free = Mixer::new(airframe(frame), 1e4).unwrap();
         let share = free.allocate(&inputs([0.0, 0.0, 0.0, 1.0])).forces.0.max();
         let needed_n = HOVER_MARGIN * weight_n * share;
@@ -541,11 +541,11 @@ fn a_frame_that_cannot_fly_is_refused_by_name() {
         assert_eq!(refused([Rotor { x: bad, ..first }, second, third, fourth]), ROTOR_POSITION);
         assert_eq!(refused([first, second, third, Rotor { y: bad, ..fourth }]), ROTOR_POSITION);
     }
-    // All spin the same way; too few rotors; all at one point.
+    // The rotors all spin the same way, or are too few, or are all at one point.
     assert_eq!(refused(PLUS.map(|rotor| Rotor { pushes_left: true, ..rotor })), AUTHORITY);
     assert_eq!(refused(circle::<3>(0.1)), AUTHORITY);
     assert_eq!(refused(PLUS.map(|rotor| Rotor { x: 0.0, y: 0.0, ..rotor })), AUTHORITY);
-    // All on one line through the centre, at any angle and size.
+    // The rotors are all on one line through the centre, at any angle and size.
     for angle in [0.0_f32, 0.3, 0.8, 1.1, FRAC_PI_2, 2.9] {
         for size in [1e-3_f32, 1.0, 7.3] {
             let at = |r: f32, pushes_left| Rotor { x: r * angle.cos(), y: r * angle.sin(), pushes_left };

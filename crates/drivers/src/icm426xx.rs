@@ -37,7 +37,7 @@ const INT_SOURCE0: u8 = 0x65;
 const SELF_TEST_CONFIG: u8 = 0x70;
 const WHO_AM_I: u8 = 0x75;
 const REG_BANK_SEL: u8 = 0x76;
-/// In bank 1 and in bank 2.
+/// First register of the self-test values: XG in bank 1, XA in bank 2.
 const XG_ST_DATA: u8 = 0x5F;
 const XA_ST_DATA: u8 = 0x3B;
 

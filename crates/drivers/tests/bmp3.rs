@@ -184,7 +184,7 @@ fn pressures_and_temperatures_of_the_whole_range_are_read_and_none_beyond() {
         [(30_010.0, -39.9), (30_010.0, 84.9), (124_990.0, -39.9), (124_990.0, 84.9), (101_325.0, 25.0), (7e4, 0.0)];
     for trim in SETS {
         let model = |pressure_pa, temperature_c| Registers { pressure_pa, temperature_c, ..Registers::new(0x50, trim) };
-        // 1.5 Pa of noise and half of a last bit of 19.
+        // The tolerances cover 1.5 Pa of noise and half of the last of 19 bits.
         reads_pressures(Bmp388::default, model, &points, [1.5 + 1.0, 0.02], 11);
     }
     let model = |pressure_pa, temperature_c| Registers { pressure_pa, temperature_c, ..Registers::new(0x50, SETS[0]) };

@@ -224,7 +224,7 @@ fn pressures_and_temperatures_of_the_whole_range_are_read_and_none_beyond() {
         [(30_010.0, -39.9), (30_010.0, 84.9), (119_990.0, -39.9), (119_990.0, 84.9), (101_325.0, 25.0), (7e4, 0.0)];
     for set in SETS {
         let model = |pressure_pa, temperature_c| Registers { set, pressure_pa, temperature_c, ..Registers::new(false) };
-        // 0.3 Pa of noise and the last bit.
+        // The tolerances cover 0.3 Pa of noise and the last bit.
         let lsb_pa = f64::from(set[3].abs()) / SCALES[4];
         reads_pressures(Dps310::default, model, &points, [0.5 + lsb_pa, 0.02], 6);
     }

@@ -121,7 +121,7 @@ proptest! {
                     continue;
                 }
                 let delay_us = begins_us + if is_trouble && !loses { late_us } else { 0 };
-                // Only one answer at a time on the line.
+                // The line carries only one answer at a time.
                 let free_us = answers.back().map_or(0, |(end_us, _)| *end_us);
                 answers.push_back(((frame_us + delay_us).max(free_us) + 870, who));
             }

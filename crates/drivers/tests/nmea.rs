@@ -221,7 +221,7 @@ fn what_is_not_measured_is_no_fix() {
             }
         }
     }
-    // As sent by a receiver in a tunnel.
+    // A receiver in a tunnel sent these sentences.
     let tunnel = "$GNGGA,123519.00,4807.038000,N,01131.000000,E,6,00,0.9,545.4,M,46.9,M,,*78\r\n\
         $GNRMC,123519.00,A,4807.038000,N,01131.000000,E,22.4,84.4,230394,,,E*48\r\n";
     assert_eq!(fixes(&mut NmeaDecoder::new(), tunnel).into_iter().flatten().count(), 0);

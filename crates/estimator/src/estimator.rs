@@ -130,7 +130,7 @@ impl Estimator {
         let predicted = imu.is_some_and(|sample| self.take_sample(memory, now_us, sample));
         memory.moved = (Vector3::zeros(), Vector3::zeros());
         if memory.runs {
-            // Only between fixes, because a fix refers to a stored state.
+            // The history settles only between fixes, because a fix refers to a stored state.
             if predicted {
                 // The prediction has used this step's time; the history settles in a later step.
             } else if memory.fix.is_none() && memory.history.is_unsettled() {
@@ -178,7 +178,7 @@ impl Estimator {
             memory.nominal.begin(sample);
             return false;
         };
-        // Less than a quarter of a second.
+        // The gap is shorter than a quarter of a second.
         let dt_s = gap_us as u32 as f32 * 1e-6;
         if gap_us > GAP_US {
             let (turn, speed) = (GAP_RAD_S * dt_s, GAP_M_S2 * dt_s);

@@ -139,7 +139,7 @@ impl StateHistory {
             entry.position += position;
         }
         let zero = Vector3::zeros();
-        // The exact rotation stays in the sum: a quaternion has no limit.
+        // The attitude stays in the sum, because a sum of rotations does not grow beyond a unit quaternion.
         (self.shift.theta, self.shift.velocity, self.shift.position) = (zero, zero, zero);
     }
 

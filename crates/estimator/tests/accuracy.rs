@@ -121,7 +121,7 @@ fn the_tracker_is_gone_in_hover() {
 fn a_late_tracker() {
     let truth = fly(eight, 16.0);
     let mut flight = Flight::new(&truth, ICM, MOCAP, 5);
-    // In addition to the tracker's own 8 to 12 ms.
+    // The tracker itself is 8 to 12 ms late. This delay is added.
     flight.late_ms = 238.0;
     let (mut position, mut behind) = (Rms::default(), Rms::default());
     for ms in 0..16_000 {

@@ -105,7 +105,7 @@ fn a_frozen_tracker_is_not_believed() {
         },
     );
     assert!((770..=790).contains(&frozen), "{frozen}");
-    // Only with the default setting: a tracker without noise repeats itself.
+    // With the default `frozen_s`, repeated poses are refused. With 0 they are not, for a tracker without noise.
     let estimator = |frozen_s| Estimator::new(Settings { frozen_s, ..settings(&ICM) }).unwrap();
     for (frozen_s, all) in [(0.0, true), (Settings::DEFAULT.frozen_s, false)] {
         let (estimate, mut memory) = at_rest(1500, NOTHING, |_, _| ());
@@ -485,7 +485,7 @@ fn bad_measurements_are_counted() {
     }
     let _ = step(&mut memory, 1);
     assert_eq!(memory.dropped().implausible, 7);
-    // Too old, far in the future, the same twice, and older than the last one.
+    // One measurement is too old, one is far in the future, two have the same time, and one is older than the last.
     for at_us in [now_us - 300_000, now_us + 500_000, now_us - 20_000, now_us - 20_000, now_us - 40_000] {
         memory.offer(&Stamped { value: good, at_us });
     }

@@ -80,7 +80,7 @@ impl Body {
             self.aim_rad = self.random.vector(Random::uniform) * tilt_rad;
             self.climb[1] = self.random.uniform() * climb_m_s2;
         }
-        // As fast as a small multirotor, and slower about the vertical.
+        // The vehicle turns as fast as a small multirotor, and more slowly about the vertical.
         let stiffness = Vector3::new(100.0, 100.0, 10.0);
         let damping = Vector3::new(16.0, 16.0, 5.0);
         let off = self.aim_rad - self.angles_rad;

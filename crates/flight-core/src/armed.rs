@@ -69,7 +69,7 @@ impl<M: Default> Armed<M> {
             open_loop: None,
             turning: RateMemory::default(),
             turns: false,
-            // As after idling: tells the law that it starts on the ground.
+            // This tells the law that it starts on the ground, as after idling.
             idle_on_ground: true,
             guide: Guide::default(),
             landing: LandDetector::new(state, weight_n),

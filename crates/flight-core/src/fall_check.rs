@@ -6,12 +6,12 @@ use crate::landing::CARRY_SHARE;
 use afbc_control::math::abs_max;
 use nalgebra::Vector3;
 
-/// Speed that a free fall would have gained when the check decides \[m/s\]. The slowest rotors, which follow within 0.1
-/// s, leave a falling vehicle 1 m/s short of it.
+/// Speed that a free fall would have gained when the check decides \[m/s\]. A falling
+/// vehicle whose rotors follow as slowly as within 0.1 s gains 1 m/s less.
 pub const FALL_M_S: f32 = 3.0;
 /// A vehicle that has gained less than this share of a fall's speed stands on the ground.
 pub const FALL_SHARE: f32 = 0.5;
-/// Largest speed along any axis for the check \[m/s\]; drag may carry a faster vehicle.
+/// Largest speed along any axis at which the check applies \[m/s\]. Drag may carry a faster vehicle.
 pub const FALL_MAX_M_S: f32 = 1.5;
 /// Acceleration of free fall \[m/s2\].
 const GRAVITY_M_S2: f32 = 9.81;

@@ -15,9 +15,9 @@ use nalgebra::Vector3;
 
 /// Time over which displacements are compared \[us\].
 pub const WINDOW_US: u32 = 250_000;
-/// Smallest displacement along any axis, by the twist, for a comparison \[m\].
+/// Pose and twist are compared if the integrated velocity exceeds this along any axis \[m\].
 pub const TRAVEL_M: f32 = 0.15;
-/// Smallest rotation about body x or y, by the twist, for a comparison \[rad\].
+/// Pose and twist are compared if the integrated rates exceed this about body x or y \[rad\].
 pub const TURN_RAD: f32 = 0.15;
 /// Share of the twist's displacement or rotation below which the pose counts as constant.
 pub const STANDS_SHARE: f32 = 0.2;

@@ -298,7 +298,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
     }
 
     /// Returns the action that flies a pilot's body rates. The law restarts afterwards.
-    // Out of line, to keep the law's ticks fast.
+    // The function is not inlined, so that the law's ticks stay fast.
     #[cold]
     #[inline(never)]
     fn turn(&self, flight: &mut Armed<C::Memory>, state: &State, target: &RateTarget) -> Action<N> {

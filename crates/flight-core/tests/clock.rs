@@ -119,7 +119,7 @@ fn two(until_us: u64) -> Vec<Sent> {
     sent.retain(|sent| sent.measured_us < until_us);
     let mut other = stamped(|t| t / 3 + 77 * HOUR_US);
     for sent in &mut other {
-        // At the same rate as the first, between its states, with another zero of the clock.
+        // The second sender sends as often as the first, between its states. Its clock has another zero.
         sent.stamp_us = sent.measured_us + 77 * HOUR_US;
         sent.sender = 2;
         sent.measured_us += 4_000;

@@ -30,7 +30,7 @@ proptest! {
 #[test]
 fn another_frame_is_driven_by_number() {
     assert_eq!(rotors_of_outputs(BETAFLIGHT, &Rotors::new(&PLUS)), [0, 1, 2, 3]);
-    // Three rotors in one corner.
+    // Three rotors are in one corner.
     let crowded = [[1.0, 1.0], [0.9, 0.9], [0.8, 0.8], [-1.0, -1.0]].map(rotor);
     assert_eq!(rotors_of_outputs(BETAFLIGHT, &Rotors::new(&crowded)), [0, 1, 2, 3]);
     // Six rotors: two at the sides, four in the corners of an X.

@@ -134,7 +134,7 @@ fn a_vehicle_that_lies_is_disarmed() {
 fn a_vehicle_that_leans_or_rights_itself_is_not_disarmed() {
     let mut bench = Bench::flying();
     assert_eq!(bench.wait(20_000, rolled(1.2)), None);
-    // On its back for a moment, then righting itself for more than a second.
+    // The vehicle is on its back for a moment. Then it takes more than a second to turn upright.
     assert_eq!(bench.wait(300, rolled(3.1)), None);
     for step in 0..1600 {
         assert_eq!(bench.wait(1, rolled(3.1 - step as f32 * 1e-3)), None, "{step} ms");
@@ -206,7 +206,7 @@ fn disarming_is_for_the_ground() {
     bench.wait(5000, State::default());
     assert_eq!(bench.answer(Request::Disarm, State::default()), Ok(()));
 
-    // In the air, even at rest.
+    // A vehicle in the air does not disarm, even at rest.
     let mut bench = Bench::flying();
     assert_eq!(bench.answer(Request::Disarm, State::default()), Err(Refusal::InFlight));
     assert_eq!(bench.tick(State::default()).mode, Mode::Flying);

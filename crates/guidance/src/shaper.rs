@@ -202,7 +202,7 @@ impl MotionShaper {
         let most = AIM * side(&wanted, reach.speed);
         let across_squared = motion.velocity.norm_squared() - along * along;
         let room = max(sqrt(max(most * most - across_squared, 0.0)) - along, 0.0);
-        // As g, but with the largest jerk.
+        // This is the function g with the largest jerk.
         let settling = SETTLING * reach.jerk;
         let d = settling * self.inverse_k2;
         let root = sqrt(d * d + 2.0 * settling * room);

@@ -125,8 +125,8 @@ fn what_bars_arming_has_its_limits() {
 /// setpoint that passes the limiter unchanged, such as a held place, does not restart.
 #[test]
 fn the_setpoint_keeps_to_the_vehicle() {
-    // Places the vehicle at `off` plus a second's distance, times `share`, from its setpoint, with a velocity off by
-    // `other_m_s`.
+    // Returns true if the setpoint restarts at a vehicle that is away from it. The distance is `off` plus the distance
+    // of a second, times `share`. The velocity differs by `other_m_s`.
     let begins_anew = |off: Vector3<f32>, share: f32, other_m_s: Vector3<f32>, change: &dyn Fn(&mut Fixture)| {
         let mut fixture = Fixture::flying(Settings::DEFAULT);
         let order = Order::GoTo { position_m: Vector3::new(1.0, 90.0, 8.0), yaw_rad: NAN, speed_m_s: Some(0.5) };

@@ -110,7 +110,7 @@ fn flips_end_in_position_mode() {
             let (lost_m, upright_ms) = if name == "crazyflie" { (20.0, 3_000) } else { (15.0, 1_200) };
             assert!(flip.lost_m < lost_m && flip.upright_ms < upright_ms, "{name} {flip:?}");
             if stick != YAW {
-                // One turn, minus the time to reach the rate, within a fifth.
+                // The vehicle turns once, less what it misses until it reaches the rate.
                 assert!((5.8..6.5).contains(&flip.turned_rad.abs()), "{name} {flip:?}");
                 assert!(flip.off_rad_s < 1.3, "{name} {flip:?}");
             }

@@ -66,7 +66,7 @@ fn a_folders_logs_are_served_and_nothing_else_of_it() {
     for name in ["log/secret.txt", "log/sub.ulg", "log", "etc", "", "secret.txt", "log/none.ulg", "etc/none"] {
         assert_eq!(read(&mut files, name), Err(FtpError::FILE_NOT_FOUND), "{name}");
     }
-    // By number, and beyond the end.
+    // Logs are read by number. A number or an offset beyond the end gives nothing.
     assert_eq!(files.count_logs(), Poll::Ready(2));
     assert_eq!(files.log(0), Poll::Ready(Some(LogInfo { size: 1000, utc_s: 1_700_000_001 })));
     assert_eq!(files.log(2), Poll::Ready(None));

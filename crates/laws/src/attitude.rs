@@ -70,10 +70,10 @@ pub fn roll_pitch(r: &Matrix3<f32>) -> [f32; 2] {
 /// largest of the four parts, so never by a small number.
 #[inline]
 pub fn quaternion(r: &Matrix3<f32>) -> Quaternion<f32> {
-    // Four times the square of each part; the sum is 4.
+    // These are four times the squares of the parts. Their sum is 4.
     let (w, x) = (1.0 + r.m11 + r.m22 + r.m33, 1.0 + r.m11 - r.m22 - r.m33);
     let (y, z) = (1.0 - r.m11 + r.m22 - r.m33, 1.0 - r.m11 - r.m22 + r.m33);
-    // Four times the products of pairs of parts.
+    // These are four times the products of pairs of parts.
     let (wx, wy, wz) = (r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12);
     let (xy, yz, xz) = (r.m12 + r.m21, r.m23 + r.m32, r.m13 + r.m31);
     let scaled = if w >= x && w >= y && w >= z {

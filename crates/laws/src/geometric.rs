@@ -133,7 +133,8 @@ impl Gains {
     /// (`docs/tuning.md`).
     pub const TUNED: Self = Self::DEFAULT;
 
-    /// Law with the integrals of 2013. Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
+    /// Gains of the law with the integral terms that Goodarzi published in 2013. They are tuned by hand for the paper's
+    /// vehicle with a rotor lag of 20 ms.
     pub const GOODARZI_2013: Self =
         Gains { position_i_1_s3: 25.0, height_i_1_s3: 60.0, tilt_i_1_s2: 20.0, yaw_i_1_s2: 10.0, ..Self::LEE_2010 };
 }
@@ -227,7 +228,7 @@ impl<const N: usize> Geometric<N> {
         let specific_force = position.specific_force_m_s2;
 
         // Desired attitude.
-        // Advances also without a new state, because the filtered signal is a command, not a measurement.
+        // The filter advances also without a new state, because the filtered signal is a command, not a measurement.
         self.filter.advance(&mut memory.specific_force, &specific_force);
         let filtered = &memory.specific_force;
         let second = self.filter.second_derivative(filtered, &specific_force);

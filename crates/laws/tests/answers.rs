@@ -118,7 +118,7 @@ fn turning_the_scene_about_the_vertical_changes_nothing_for_the_body() {
                 (a.inputs.pitch_n - b.inputs.pitch_n) * 65.8,
                 (a.inputs.yaw_n - b.inputs.yaw_n) * 1.43,
             );
-            // Four times the sine error, 1.2e-3, times the stiffest loop's 330 1/s2.
+            // The bound is four times the sine's error of 1.2e-3, times the stiffest loop's gain of 330 1/s2.
             assert!(difference.amax() < 1.6, "{name}: {difference:?} after a turn of {turn}");
             assert!((a.inputs.thrust_n - b.inputs.thrust_n).abs() < 0.03, "{name}: {a:?} {b:?}");
         };

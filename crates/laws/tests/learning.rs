@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 
 #[test]
 fn an_integrator_does_not_wind_up_against_a_limit() {
-    // Far below and beside the setpoint for 20 s: tilt and thrust stay at their limits.
+    // The vehicle is far below and beside the setpoint for 20 s. Tilt and thrust stay at their limits.
     let state = State { position_m: Vector3::new(-50.0, 0.0, 0.0), ..State::default() };
     let far = Setpoint { position_m: Vector3::new(0.0, 0.0, 500.0), ..Setpoint::default() };
     let mut memory = Validated::<pid::Memory>::default();

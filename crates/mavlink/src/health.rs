@@ -38,13 +38,13 @@ pub struct HealthArray {
 /// Number of states since power-up that were not used, by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StatesRefused {
-    /// Out of order or duplicate.
+    /// States that were out of order or duplicate.
     pub overtaken: u32,
-    /// Too old on arrival.
+    /// States that were too old on arrival.
     pub late: u32,
-    /// From a sender other than the one in use.
+    /// States from a sender other than the one in use.
     pub elsewhere: u32,
-    /// Repeats the last one in flight, or comes from a tracker that is no longer trusted.
+    /// States that repeat the last one in flight, or come from a tracker that is no longer trusted.
     pub frozen: u32,
 }
 

@@ -136,7 +136,7 @@ fn every_command_is_read() {
             assert_eq!(matches!(expected, VehicleCommand::Other(_)), !known, "{id}");
             assert_eq!(expected == VehicleCommand::Disarm, id == 400);
             assert_eq!(expected == VehicleCommand::Engage, id == 31_010);
-            // The same without trailing zeros.
+            // The frame without its trailing zeros gives the same command.
             let again = read::<Uplink>(&raw(message, &payload[..30], extra_crc));
             assert_eq!(format!("{again:?}"), format!("{:?}", Ok::<_, Counters>(Uplink::Command(expected))));
             assert_eq!(expected.id(), id);

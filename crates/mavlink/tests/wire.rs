@@ -301,7 +301,7 @@ fn targets_in_frames_of_the_vehicle_are_read() {
             other => panic!("{other:?}"),
         }
     };
-    // Only velocity, only position, both.
+    // The masks select only the velocity, only the position, and both.
     let [velocity, position, both] = [0b1111_1100_0111, 0b1101_1111_1000, 0b1101_1100_0000];
     for mask in [velocity, position, both].map(|mask: u16| mask & !(1 << 9)) {
         assert_eq!(axes(F::MAV_FRAME_LOCAL_OFFSET_NED, mask), Ok(TargetFrame::Offset));

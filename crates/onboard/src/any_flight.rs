@@ -59,7 +59,7 @@ macro_rules! each {
     };
 }
 
-// Not inlined where it is long, so that other crates share the code instead of compiling it again.
+// Long functions are not inlined, so that other crates share their code instead of compiling it again.
 impl<P: Prepare> AnyFlight<P> {
     /// Creates the vehicle, disarmed.
     ///

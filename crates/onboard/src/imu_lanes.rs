@@ -11,17 +11,18 @@ const SPEED_M_S: f32 = 0.5;
 /// Number of consecutive field and velocity measurements that must agree.
 const FIELDS: i8 = 15;
 const SPEEDS: i8 = 2;
-/// Scales of turn \[rad\] and velocity \[m/s\] in the distance between the lanes. Next, the distance from which the
-/// estimate can decide, and the share of this distance that the estimate must have moved. Fixes alone make the estimate
-/// wander by one unit.
+/// Difference in attitude that counts as one unit of the distance between the lanes \[rad\].
 const TURN_RAD: f32 = 0.05;
+/// Difference in velocity that counts as one unit of the distance between the lanes \[m/s\].
 const SPEED_LIKE_M_S: f32 = 0.5;
+/// Distance between the lanes from which the estimate can decide. Fixes alone make the estimate wander by one unit.
 const FAR: f32 = 3.0;
+/// Share of the distance between the lanes that the estimate must have moved to decide.
 const GOES: f32 = 0.5;
 /// Time after which the lanes start again \[s\].
 const OLD_S: f32 = 6.0;
 /// Stored past velocities, to which a late fix is compared: their number and spacing \[us\].
-// Together 0.4 s, more than the largest delay of a measurement, 0.25 s.
+// They cover 0.4 s, more than the largest delay of a measurement, 0.25 s.
 const PAST: usize = 16;
 const APART_US: u64 = 25_000;
 

@@ -1,8 +1,8 @@
 //! Protocol between the emulated board and the host, which wait for each other.
 //!
-//! It has two streams of bytes, little-endian. The host sends the [`Readings`](crate::Readings) for the next control
-//! tick, a `u32` length, and that many bytes, which arrive at the link before the tick. For each of these, the firmware
-//! sends a [`ReplyHead`] and as many bytes as the head states.
+//! It has two streams of bytes, little-endian. For each control tick, the host sends the [`Readings`](crate::Readings),
+//! a `u32` length, and that many bytes, which arrive at the link before the tick. After the tick, the firmware sends a
+//! [`ReplyHead`] and as many bytes as the head states.
 
 use afbc_types::ROTORS_MAX;
 

@@ -208,9 +208,9 @@ impl RegisterAccess {
         let (is_load, register, length) = match first >> 12 {
             // LDR and STR in the wide encoding, also of bytes and half-words.
             0xF if first & 0xFE00 == 0xF800 => (first >> 4 & 1 == 1, second >> 12, 4),
-            // Address: register plus register.
+            // LDR and STR whose address is a register plus a register.
             0x5 => (first >> 9 & 7 >= 3, first & 7, 2),
-            // Address: register plus offset.
+            // LDR and STR whose address is a register plus an offset.
             0x6..=0x8 => (first >> 11 & 1 == 1, first & 7, 2),
             _ => {
                 return Err(Error::Protocol(format!(

@@ -13,7 +13,7 @@ pub const TICKS: u64 = 6_000;
 /// Returns the bytes that reach the link before `tick`: a flight with every kind of link fault. Must be called for
 /// consecutive ticks from 0 on.
 pub fn bytes_of_tick(station: &mut Station, tick: u64) -> Vec<u8> {
-    // At rest until armed.
+    // The vehicle is at rest until it is armed.
     let (state, setpoint) = motion(tick.saturating_sub(ARMED) as f32 * 1e-3);
     // Two gaps in the states: a short one that ends while coasting, and a long one that ends in a descent.
     let tracked = !(2_500..2_600).contains(&tick) && !(4_000..5_000).contains(&tick);

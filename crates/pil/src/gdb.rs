@@ -184,7 +184,7 @@ impl Gdb {
     }
 
     fn count_while(&mut self, mut within: impl FnMut(&mut Self) -> Result<bool, Error>) -> Result<u32, Error> {
-        /// Far more instructions than any counted code takes.
+        /// Number of instructions after which counting fails. Any counted code takes far fewer.
         const STEPS_MAX: u32 = 100_000;
         for steps in 1..STEPS_MAX {
             self.step()?;

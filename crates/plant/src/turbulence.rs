@@ -195,7 +195,7 @@ impl SimulatedTurbulence {
     /// Returns the velocity along, to the left of and above the wind's direction, after one more step \[m/s\].
     #[inline]
     pub(crate) fn advance(&mut self, height_m: f64, airspeed_m_s: impl FnOnce() -> f64) -> Vector3<f64> {
-        // Not in every step, because the coefficients need exponentials, powers and roots.
+        // The coefficients need exponentials, powers and roots, so they are not computed in every step.
         if self.remaining == 0 {
             self.refresh(height_m, airspeed_m_s());
         }

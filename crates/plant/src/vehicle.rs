@@ -174,7 +174,7 @@ impl Plant {
     }
 
     /// Advances with all effects of [`Realism`].
-    // Not inlined, so that the ideal plant's step stays short.
+    // The function is not inlined, so that the ideal plant's step stays short.
     #[inline(never)]
     fn advance_in_effect(&mut self, speeds: &PerRotor, dt_s: f64) {
         let Some(effects) = &mut self.effects else { return };

@@ -58,7 +58,7 @@ fn blades_slow_a_level_vehicle_exponentially_to_the_winds_speed() {
             let expected = wind + (initial.velocity_m_s - wind) * gone;
             let velocity = plant.motion().velocity_m_s;
             assert!((velocity.xy() - expected.xy()).amax() < 1e-9);
-            // Nothing along the rotor axes, except rounding of the speeds.
+            // The blades give no force along the rotor axes. The tolerance covers the rounding of the speeds.
             assert!((velocity.z - 0.5).abs() < 1e-4);
         }
     }
@@ -84,8 +84,8 @@ fn drag_above_the_centre_of_mass_turns_the_vehicle_away_from_its_motion() {
     assert!((rates.x - 0.5 * -rates.y).abs() < 1e-3 * rates.y.abs());
 }
 
-/// The hubs move around the centre of mass at r l each, against the blade forces: dr/dt = -4 k omega l^2/Iz r. Only yaw
-/// changes, because hubs at equal speed balance.
+/// At the yaw rate r, each hub moves around the centre of mass at the speed r l. Its blade force opposes the motion, so
+/// dr/dt = -4 k omega l^2/Iz r. Only yaw changes, because the blade forces of four equally fast hubs cancel.
 #[test]
 fn blades_brake_yaw_exponentially() {
     let drag = Drag { blade_n_s2_m: 2.4e-4, rotor_height_m: 0.02, ..none() };
@@ -105,7 +105,7 @@ fn blades_brake_yaw_exponentially() {
     }
 }
 
-/// Rotors 2 (front) and 4 (rear) at unequal speed in wind from the right: the faster one has the larger force.
+/// Rotors 2 (front) and 4 (rear) turn at unequal speeds in wind from the right. The faster one has the larger force.
 #[test]
 fn unequal_rotors_in_wind_turn_the_vehicle_about_its_vertical_axis() {
     let drag = Drag { blade_n_s2_m: 2.4e-4, ..none() };
@@ -121,7 +121,7 @@ fn unequal_rotors_in_wind_turn_the_vehicle_about_its_vertical_axis() {
     };
     let expected = drag.blade_n_s2_m * f64::from(front - rear) * P.arm_m * wind.y / P.inertia_kg_m2.z;
     let found = yaw_rad_s2(wind) - yaw_rad_s2(Vector3::zeros());
-    // A thousandth of the yaw damping of 1.6 1/s, and the pitch that grows within the step.
+    // The tolerance covers the yaw damping of 1.6 1/s during a step, and the pitch that grows within it.
     assert!((found / expected - 1.0).abs() < 2e-3, "{found}, not {expected} rad/s2");
 }
 

@@ -96,7 +96,7 @@ fn reflections_have_their_spread_and_correlation_and_end() {
     }
     assert_sigma_of(&coordinates(first), 5.0, 1200.0, "at the onset");
     assert_sigma_of(&coordinates(later), 5.0, 1200.0, "later");
-    // A quarter of a second apart.
+    // Consecutive fixes are a quarter of a second apart, which is half of the correlation time.
     assert_correlation(&pairs, 5.0, (-0.5_f64).exp(), "from fix to fix");
 }
 

@@ -130,7 +130,8 @@ fn free_fall_is_felt_as_nothing_and_thrust_along_body_z() {
     }
 }
 
-/// At rest on the ground the specific force is gravity upward, also before the first step, and so is it before a hover.
+/// A vehicle at rest on the ground has gravity upward as its specific force. This also holds before the first step, on
+/// the ground and in a hover.
 #[test]
 fn rest_is_felt_as_gravity_upward() {
     let at_rest = |truth: &Truth, bound: f64| {

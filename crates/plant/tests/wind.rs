@@ -31,7 +31,7 @@ fn air(plant: &mut Plant, step_s: f64) -> Vector3<f64> {
 fn a_gust_rises_and_falls_as_one_minus_cosine() {
     let peak = Vector3::new(4.0, -2.0, 1.0);
     let gust = CosineGust { velocity_m_s: peak, start_s: 1.0, rise_s: 0.5, hold_s: 2.0 };
-    // By hand: V/2 (1 - cos(pi x)) at x = 0, 1/3, 1/2, 2/3, 1.
+    // The shares are V/2 (1 - cos(pi x)) at x = 0, 1/3, 1/2, 2/3 and 1, calculated by hand.
     for (since, share) in [(-1.0, 0.0), (0.0, 0.0), (0.5 / 3.0, 0.25), (0.25, 0.5), (1.0 / 3.0, 0.75), (0.5, 1.0)] {
         assert!((gust.at(1.0 + since) - peak * share).amax() < 1e-12);
         assert!((gust.at(4.0 - since) - peak * share).amax() < 1e-12, "falls as it rose");

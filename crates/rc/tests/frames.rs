@@ -173,12 +173,12 @@ fn a_footer_that_a_receiver_repeats_counts() {
             bytes[24] = footer;
             bytes
         };
-        // The same footer in each frame, or with a slot number counted in two or four bits.
+        // Each frame has the same footer, or a footer with a slot number that counts in two or four bits.
         for slots in [1, 4, 16] {
             let frames = |count: u8| (0..count).map(move |number| with(footer.wrapping_add((number % slots) << 4)));
             let (decoder, heard) = listen(frames(11), &[]);
             assert!(heard && decoder.good_frames() >= 10, "{footer:#04x}: {decoder:?}");
-            // With sensors that answer in SBUS2's slots.
+            // Sensors answer in SBUS2's slots between the frames.
             assert!(listen(frames(11), &[0x03, 0x84, 0x2F]).1, "{footer:#04x} with sensors");
         }
     }

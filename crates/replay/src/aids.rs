@@ -46,7 +46,7 @@ impl ReceiverFix {
 pub(crate) fn begin(fixes: &[ReceiverFix]) -> Option<&ReceiverFix> {
     let middle = |of: fn(&ReceiverFix) -> f64| {
         let mut all: Vec<f64> = fixes.iter().map(of).collect();
-        // The median, since one absurd fix does not move it.
+        // The median is used because a single absurd fix does not move it.
         all.sort_by(f64::total_cmp);
         all.get(all.len() / 2).copied()
     };

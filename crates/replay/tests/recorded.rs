@@ -41,7 +41,7 @@ fn agrees_with_ekf2_on_recorded_flights() {
 fn rest_before_the_first_fix_is_rest() {
     for name in ["px4_sitl_hover.ulg", "ecl_iris_gps.csv"] {
         let Some(mut recording) = shared(name) else { continue };
-        // Also without flags that say that it stands, and without any fix.
+        // The vehicle is also found at rest without flags that say that it stands, and without any fix.
         for (stated, fixes) in [(true, true), (false, true), (true, false)] {
             if !stated {
                 recording.landed.clear();

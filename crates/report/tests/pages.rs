@@ -85,7 +85,7 @@ fn captions_explain_exactly_what_the_figure_shows() {
     assert_eq!((mentions(&events, "gust"), mentions(&events, "Shaded")), (5, 5), "{:?}", captions(&events));
     assert_eq!(mentions(&events, "Cross"), 0);
 
-    // Only a parameter change, without a gust.
+    // The flight has only a parameter change, without a gust.
     let mut changed = eventful();
     changed.environment = Environment::new(
         changed.vehicle,

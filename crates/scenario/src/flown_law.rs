@@ -13,7 +13,7 @@ pub struct FlownLaw(pub Option<Law>);
 impl Prepare for FlownLaw {
     type Law<const N: usize> = AnyController<N>;
 
-    // Not inlined, like the control step.
+    // The function is not inlined, like the control step.
     #[inline(never)]
     fn prepare<const N: usize>(
         &self,

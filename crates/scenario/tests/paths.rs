@@ -101,7 +101,7 @@ proptest! {
         for (i, c) in knot(right).iter().enumerate() {
             bumped[at + 1].coefficients[0][i] += size * c;
         }
-        // The same septic, mirrored in time, for the previous piece.
+        // The previous piece gets the same polynomial of degree seven, mirrored in time.
         let mirrored = knot(left);
         let shifted = |power: i32| {
             let binomial = |n: i32, k: i32| (0..k).map(|i| f64::from(n - i) / f64::from(i + 1)).product::<f64>();
@@ -166,7 +166,7 @@ fn samples_become_the_path_that_they_come_from() {
         errors.push((20..180).map(|i| error(0.1 * f64::from(i) + 0.05)).fold(0.0, f64::max));
     }
     assert!(errors[0] < 1e-3 && errors.is_sorted_by(|a, b| a > b), "{errors:?}");
-    // With another start and twice the pace: the same places at twice the speed.
+    // A path with another start and twice the pace has the same places at twice the speed.
     let slow = scenario(&folder, &write(",psi_rad", 1.0), "").unwrap();
     let fast = scenario(&folder, &write(",psi_rad", 1.0), "start_s = 3.0\npace = 2.0").unwrap();
     for t in [0.5, 4.25, 9.75] {

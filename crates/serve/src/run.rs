@@ -86,7 +86,7 @@ impl InputLines {
 /// Returns the next line; `None` at the end. Of a line that is too long it returns the beginning, which is then
 /// refused.
 fn read_line(source: &mut impl BufRead) -> io::Result<Option<Vec<u8>>> {
-    // One byte more than allowed, and the line ending.
+    // The reader takes one byte more than allowed, and the line ending of two bytes.
     let most = LINE_MAX as u64 + 3;
     let mut line = Vec::new();
     if source.take(most).read_until(b'\n', &mut line)? == 0 {

@@ -146,7 +146,7 @@ proptest! {
         store.make_room().unwrap();
         (0..count).for_each(|number| store.set(name(number), 0, Some(number)).unwrap());
         let mut flash = store.into_flash();
-        // After header and begin record.
+        // The records of the values come after the header and the begin record.
         damaged.iter().for_each(|number| flash.0[RECORD * (2 + *number as usize) + 20] ^= 0x10);
         let mut store = Store::open(flash, 0, 1).unwrap();
         prop_assert_eq!(store.found().damaged, damaged.len() as u32);

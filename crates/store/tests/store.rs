@@ -86,7 +86,7 @@ fn a_full_store_says_so_and_keeps_what_it_has() {
         done => done,
     };
     (0..most).for_each(|number| set(&mut store, number, Some(number)).unwrap());
-    // In every sector in turn: a new name is refused, known ones can be changed and deleted.
+    // The rounds use every sector in turn. The store refuses a new name. Known names can be changed and deleted.
     for round in 0..40 {
         assert_eq!(set(&mut store, most + round, Some(1)), Err(Error::Full), "{round}");
         set(&mut store, round % most, Some(round)).unwrap();
@@ -102,7 +102,7 @@ fn a_full_store_says_so_and_keeps_what_it_has() {
     let mut store = Store::open(store.into_flash(), 0, 1).unwrap();
     store.visit(|name, _, bits| _ = found.insert(name, bits)).unwrap();
     assert_eq!(found, expected);
-    // A reset always makes room.
+    // A reset makes room even in a full store.
     store.make_room().unwrap();
     store.reset().unwrap();
     store.visit(|name, _, _| panic!("{name}")).unwrap();
@@ -122,7 +122,7 @@ fn values_of_another_vehicle_do_not_count_and_are_not_lost_by_reading() {
     // Back on the first vehicle, its value is there.
     let mut store = Store::open(other.into_flash(), 0, 1).unwrap();
     assert_eq!((store.found(), store.get(name(0))), (StoreCondition::default(), Ok(Some((0, 9)))));
-    // Until the other vehicle sets something.
+    // The first vehicle's values are lost when the other vehicle sets something.
     let mut other = Store::open(store.into_flash(), 0, 2).unwrap();
     other.set(name(1), 0, Some(5)).unwrap();
     let mut other = Store::open(other.into_flash(), 0, 2).unwrap();

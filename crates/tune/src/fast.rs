@@ -56,7 +56,7 @@ pub(crate) fn lemniscate(
         sines: [sine(half_m, rate), sine(0.5 * half_m, 2.0 * rate), sine(0.0, rate)],
         yaw_rad: 0.0,
     };
-    // At least one period after errors begin to count.
+    // Errors count from 5 s on. The flight lasts at least one period longer.
     let duration_s = libm::ceil((5.0 + TAU / rate).max(12.0));
     builder.scenario(TrainingFlight { trajectory, ..TrainingFlight::new(name, duration_s) })
 }

@@ -31,9 +31,9 @@ pub(crate) enum Do {
 pub(crate) enum Start {
     /// Disarmed, 12 s after power-up.
     PowerUp,
-    /// Just armed.
+    /// The vehicle has just been armed.
     Ground,
-    /// In hold at this height \[m\].
+    /// The vehicle holds at this height \[m\].
     Air(f32),
 }
 

@@ -151,7 +151,7 @@ impl UntimedPath {
         let within = |from_s: f64, to_s: f64| (0..64).map(move |k| from_s + (to_s - from_s) * f64::from(k) / 64.0);
         match trajectory {
             Trajectory::Lissajous { sines: [sine, ..], .. } => within(0.0, sine.period_s.min(DURATION_S)).collect(),
-            // A circle demands the same at every point.
+            // A circle demands the same acceleration at every point, so one point is enough.
             Trajectory::Circle { .. } => vec![0.0],
             Trajectory::Waypoints(waypoints) => {
                 let legs = waypoints.iter().zip(waypoints.iter().skip(1)).skip(usize::from(self.stands()));

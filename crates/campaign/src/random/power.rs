@@ -81,7 +81,7 @@ impl Power {
     pub(super) fn under(mut self, change: &ModelMismatch) -> Self {
         match change {
             ModelMismatch::Wind(wind_m_s) => self.wind_m_s = wind_m_s.norm(),
-            // Two standard deviations of the turbulence.
+            // The turbulence counts as a wind of two standard deviations.
             ModelMismatch::Turbulence(turbulence) => self.wind_m_s = 2.0 * turbulence.at(HEIGHT_M).horizontal_m_s,
             // The rotor on the payload's side carries more than the others.
             ModelMismatch::Payload { share, ahead_m, left_m, .. } => {

@@ -35,7 +35,7 @@ impl Share {
         let scale = 1.0 + Z * Z / n;
         let centre = (p + Z * Z / (2.0 * n)) / scale;
         let half = Z / scale * sqrt(p * (1.0 - p) / n + Z * Z / (4.0 * n * n));
-        // At 0 and 1 the formula gives the end itself, except for rounding.
+        // For the shares 0 and 1, the formula gives the limits 0 and 1 except for rounding.
         let low = if hits == 0 { 0.0 } else { (centre - half).max(0.0) };
         let high = if hits == trials { 1.0 } else { (centre + half).min(1.0) };
         Share { value: p, low, high }

@@ -178,7 +178,7 @@ mod tests {
     fn chance_is_seldom_significant() {
         for count in [8, 12, 150] {
             let significant = (0..2000).filter(|seed| SignedRank::of(&drawn(100 + seed, count, 0.0)).p <= 0.05).count();
-            // 5 % of 2000 tests, plus three standard deviations.
+            // The bound is 5 % of 2000 tests, plus three standard deviations.
             assert!(significant <= 130, "{count}: {significant}");
             let found = (0..200).filter(|seed| SignedRank::of(&drawn(100 + seed, count, 1.5)).p <= 0.05).count();
             assert!(found >= 180, "{count}: {found}");

@@ -48,7 +48,7 @@ pub(crate) fn expected(message: &MavMessage) -> Expected {
         M::SERIAL_CONTROL(_) => Answer(&[126]),
         M::TERRAIN_CHECK(_) => Answer(&[136]),
 
-        // Answers, and parts of a transfer that the receiver has begun.
+        // These messages answer a request, or belong to a transfer that the receiver has begun.
         M::AUTOPILOT_VERSION(_)
         | M::AVAILABLE_MODES(_)
         | M::CHANGE_OPERATOR_CONTROL_ACK(_)

@@ -92,7 +92,7 @@ pub(super) fn step(interface: Interface, number: u8, baud: u32) -> Option<(UbxCo
         }
         (Interface::Messages, 3) => {
             let [low, high] = BY_MESSAGES_MS.to_le_bytes();
-            // One solution per measurement, aligned to GPS time.
+            // The receiver gives one solution per measurement, aligned to GPS time.
             (UbxCommand::new(CFG_RATE, &[low, high, 1, 0, 1, 0]), Importance::Wished)
         }
         _ => return None,

@@ -102,7 +102,7 @@ impl Registers {
         let gyr = 65536.0 / 500.0 / f64::from(1 << (self.registers[0x1B] >> 3 & 3));
         let clamp = |lsb: f64| lsb.round().clamp(-32768.0, 32767.0) as i16;
         for axis in 0..3 {
-            // Not in any data sheet: ArduPilot's finding about an unnamed register.
+            // No data sheet describes this. ArduPilot found the effect of the unnamed register 0x11.
             let is_off = axis == 1 && matches!(self.identity, 0x12 | 0xAF) && self.registers[0x11] != 0xC9;
             let is_pushed = |register: usize| f64::from(self.registers[register] >> (7 - axis) & 1);
             let pushed_g = self.responses[3 + axis] * is_pushed(0x1C);

@@ -39,7 +39,7 @@ proptest! {
         prop_assert!(apart(&ours, &exact) < 3e-6 && (ours.norm() - 1.0).abs() < 1e-6, "{turn}");
         let dense = exact.to_rotation_matrix().into_inner();
         prop_assert!((matrix(&ours).map(f64::from) - dense).abs().max() < 5e-6);
-        // From any norm, and from a norm close to one.
+        // `normalized` accepts any norm, and `renormalized` a norm close to one.
         prop_assert!((normalized(&(ours * 3.0)) - ours).norm() < 1e-6);
         prop_assert!((renormalized(&(ours * 1.01)).norm() - 1.0).abs() < 2e-4);
         let from = UnitQuaternion::new(vector(other) * 3.0);

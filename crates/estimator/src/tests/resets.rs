@@ -405,7 +405,7 @@ fn an_alignment_has_limits() {
     for (k, sign) in [(0, 1.0_f32), (1, -1.0), (2, 1.0)] {
         let moving = Some(Unready::Moving);
         for (share, why) in [(0.9, None), (1.1, moving)] {
-            // Too large a spread, one outlier, a slow change.
+            // A large spread, one outlier or a slow change makes the vehicle count as moving.
             assert_eq!(runs(&|ms, s| s.rates_rad_s[k] += shake(ms, share * rate)), why, "{k}, {share}");
             assert_eq!(runs(&|ms, s| s.specific_force_m_s2[k] += shake(ms, share * force)), why, "{k}, {share}");
             let late = |ms: u64| if ms == 900 { 6.0 * share * sign } else { 0.0 };

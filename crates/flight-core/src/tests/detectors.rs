@@ -98,7 +98,7 @@ fn coming_up_gives_another_second() {
         assert!(!counts || !last(&mut tumble, &state, LOST - 101), "from {lowest}");
         assert!(last(&mut tumble, &state, 1));
     }
-    // Coming up does not count after a moment upright.
+    // After a moment upright, a turn from upside down to sideways counts as tumbling again.
     let mut tumble = Tumble::default();
     last(&mut tumble, &cosine(-1.0), 300);
     last(&mut tumble, &State::default(), 100);
@@ -118,7 +118,7 @@ fn a_blind_tumble_goes_on() {
     assert!(!tumble.is_lost());
     tumble.advance_blind(GAP_US);
     assert!(tumble.is_lost());
-    // Upright again, and blind for the rest of the recovery time.
+    // The vehicle is upright again. It has no state for the rest of the recovery time.
     last(&mut tumble, &State::default(), 2);
     (0..UPRIGHT_US / GAP_US).for_each(|_| tumble.advance_blind(GAP_US));
     last(&mut tumble, &State::default(), 1);
@@ -355,7 +355,7 @@ fn the_usual_thrust_is_learnt_in_the_air() {
     let usual_n = WEIGHT_N * (2.0 - (-seconds / USUAL_S).exp());
     let carries = |thrust_n: f32| {
         let mut land = Land(land.0);
-        // No longer than needed: the usual thrust is a mean, which decays meanwhile.
+        // The time without thrust is as short as possible, because the usual thrust is a mean and decays meanwhile.
         land.run(STILL_US / GAP_US - 5, &somewhere(), 0.0);
         let thrust_n = thrust_n * (-(STILL_US as f32) * 1e-6 / USUAL_S).exp();
         land.run(1, &somewhere(), thrust_n);
@@ -364,8 +364,8 @@ fn the_usual_thrust_is_learnt_in_the_air() {
     assert!(carries(1.01 * CARRY_SHARE * usual_n) && !carries(0.99 * CARRY_SHARE * usual_n), "{usual_n} N");
 }
 
-/// A state at rest in the air without thrust, with no descent before, is that of a frozen tracker. A descent counts
-/// until the vehicle has hovered after it.
+/// A state at rest in the air without thrust shows a frozen tracker, unless the vehicle has descended before. A descent
+/// counts until the vehicle has hovered after it.
 #[test]
 fn rest_in_the_air_without_thrust_contradicts() {
     let mut land = Land::hovering();
@@ -379,7 +379,7 @@ fn rest_in_the_air_without_thrust_contradicts() {
         let mut land = Land::hovering();
         land.run(1, &moving(along(2, -1.0)), WEIGHT_N);
         land.run(hovers, &somewhere(), WEIGHT_N);
-        // From now on it is not carried. One tick of motion restarts the times.
+        // From now on, the rotors do not carry the vehicle. One tick of motion restarts the times.
         land.run(1, &moving(along(0, 2.0 * STILL_M_S)), 0.1 * WEIGHT_N);
         land.run(FROZEN_US / GAP_US + 1, &somewhere(), 0.1 * WEIGHT_N);
         assert_eq!(land.0.contradicts(), forgotten, "{hovers} ms");
@@ -488,7 +488,7 @@ fn a_vehicle_adrift_lands_by_its_thrust() {
     // It did not hover meanwhile, so the descent counts.
     assert!(back.run(1, &somewhere(), WEIGHT_N));
     assert_eq!(back.lands(&somewhere(), 0.1 * WEIGHT_N), Some(STILL_US / GAP_US + 1));
-    // On the ground it stays on the ground.
+    // A vehicle on the ground stays on the ground, whatever its state drifts to.
     let mut land = Land::new();
     land.0.advance_adrift(&moving(Vector3::new(3.0, -4.0, -5.0)), 0.1 * WEIGHT_N, GAP_US, DT_S);
     assert!(!land.0.airborne());

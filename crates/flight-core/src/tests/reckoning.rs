@@ -460,7 +460,7 @@ fn an_outlier_counts_little_until_it_repeats() {
             assert!((reached - wanted).abs() < if axis < 3 { 1e-4 } else { 0.3 * wanted }, "axis {axis}: {followed:?}");
             let interrupted = after(&[far, far, hold, far, far]);
             assert!(where_it_is(&interrupted) < 6.0 * most, "axis {axis}: {interrupted:?}");
-            // Then the count restarts, from the present place.
+            // After the third outlier, the count restarts at the present pose.
             let back = after(&[far, far, far, hold, hold]);
             assert!(where_it_is(&back) > 10.0 * most, "axis {axis}: {back:?}");
         }

@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 const PATIENCE_MS: u64 = 60_000;
 /// Largest angle between gravity and the axis that should be vertical \[rad\]: 30 degrees.
 const ASIDE_MAX_RAD: f32 = 0.52;
-/// A longer time between two samples counts as this \[s\].
+/// Largest time between two samples that is integrated; a longer time counts as this one \[s\].
 const GAP_MAX_S: f64 = 0.1;
 
 /// A turn by hand from level: its name, the instruction, the direction that points up afterwards (x forward, y left, z

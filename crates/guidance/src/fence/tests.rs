@@ -82,7 +82,7 @@ proptest! {
             let now = limiter.setpoint().unwrap();
             let now_m = now.position_m.xy();
             let off_m = distance(now_m, path.from_m, path.via_m).min(distance(now_m, path.via_m, path.to_m));
-            // Half of the margin: the vehicle needs the other half.
+            // The setpoint may use half of the margin. The vehicle needs the other half.
             prop_assert!(off_m < 0.5 * MARGIN_M + path.beside_m, "{off_m} m off {path:?}");
             if now.velocity_m_s.norm() < 1e-3 {
                 break;
@@ -112,7 +112,7 @@ proptest! {
         prop_assume!((nearest - MARGIN_M).abs() > 0.05 && (approach - (0.1 * (now - 0.2)).max(1e-3)).abs() > 0.05);
         let nears = nearest < MARGIN_M && approach > 0.1 * (now - 0.2);
         prop_assert_eq!(path.nears_edge(a, b), nears, "{} m, {} m", now, nearest);
-        // The same for circles, by definition.
+        // A disc and a rim are checked in the same way, against the definition of their distance.
         let centre = a;
         let off = |outside: f32, point: Vector2<f32>| (outside * ((point - centre).norm() - 8.0)).max(0.0);
         for (outside, nears) in [(1.0, path.nears_disc(centre, 8.0)), (-1.0, path.nears_rim(centre, 8.0))] {
@@ -130,7 +130,7 @@ proptest! {
     fn a_star_holds_what_is_within_it(polygon in star(), place in place()) {
         prop_assert_eq!(check_polygon(polygon.len(), |it| polygon[it]), Ok(()));
         let within = edges(&polygon).any(|(a, b)| {
-            // In the triangle of the middle and this edge.
+            // The place is in the triangle of the middle and this edge.
             let middle = Vector2::zeros();
             area(middle, a, place) >= 0.0 && area(a, b, place) >= 0.0 && area(b, middle, place) >= 0.0
         });

@@ -151,7 +151,7 @@ mod tests {
         }
     }
 
-    // The same topic with one more line, which logs one more signal.
+    // This topic is the same with one more line, which logs one more signal.
     message! {
         /// Three signals.
         "three" Three of moment {

@@ -228,7 +228,7 @@ impl InstructionCounts {
             } else {
                 (times.sum(), transfers.sum())
             };
-            // Two DMA ends per transfer, and one run of the task per transfer.
+            // Each transfer has two DMA interrupts at its end and one run of the task.
             entries.push(RowInput {
                 name: "sampling, with its transfers",
                 priority: priority::SAMPLING,

@@ -333,7 +333,7 @@ impl SimulatedFailures {
 
     pub(super) fn gnss(&mut self, now_s: f64, mut seen: GnssFix) -> Option<GnssFix> {
         let mut alive = true;
-        // By the true time, as for the tracker.
+        // Failures act by the true time, as for the tracker.
         for (failure, held) in Self::active(&mut self.faults, now_s) {
             match failure {
                 FailureKind::GnssLost => alive = false,

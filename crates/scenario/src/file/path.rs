@@ -58,7 +58,7 @@ pub(super) fn read(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     Ok(path)
 }
 
-/// Returns a piece flown `pace` times as fast, of a path that begins at `start_s` instead of `first_s`.
+/// Returns the piece of a path that is flown `pace` times as fast. The path begins at `start_s` instead of `first_s`.
 fn paced(piece: &PolynomialPiece, first_s: f64, start_s: f64, pace: f64) -> PolynomialPiece {
     let mut coefficients = piece.coefficients;
     for axis in &mut coefficients {

@@ -208,8 +208,8 @@ fn sensor_faults_and_paces_that_contradict_themselves_are_refused() {
     );
 }
 
-/// An error on a reference that no controller accepts names its motion or its heading. A path longer than any flight is
-/// refused, too.
+/// References that no controller accepts are refused. The error names the derivative of position or heading that is too
+/// large. A path that lasts longer than any flight is refused, too.
 #[test]
 fn references_that_no_controller_accepts_are_told() {
     let refused = |keys: &str| example(&format!("[trajectory]\n{keys}")).unwrap_err().to_string();

@@ -110,7 +110,7 @@ macro_rules! laws {
             ///
             /// # Errors
             /// The first parameter, gain or setting that is out of range.
-            // Not inlined, like the control step.
+            // The function is not inlined, like the control step.
             #[inline(never)]
             pub fn controller<const N: usize>(
                 &self,

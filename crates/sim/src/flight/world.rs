@@ -218,7 +218,7 @@ impl WorldView {
 }
 
 /// Returns the view through the vehicle's own estimator.
-// Not inlined, so that the step of an ideal flight stays short.
+// The function is not inlined, so that the step of an ideal flight stays short.
 #[inline(never)]
 fn estimated(estimator: &mut SimulatedEstimator, plant: &Plant, motion: Motion, reference: Reference) -> WorldView {
     let (time_s, telemetry) = (plant.time_s(), plant.telemetry());
@@ -245,7 +245,7 @@ fn is_lost(outages: &[Outage], time_s: f64) -> bool {
 }
 
 /// Measures the motion with the sensors.
-// Not inlined, so that the step of an ideal flight stays short.
+// The function is not inlined, so that the step of an ideal flight stays short.
 #[inline(never)]
 fn measure(sensors: &mut StateSensor, motion: &Motion) -> StateMeasurement {
     sensors.measure(motion)

@@ -35,7 +35,7 @@ impl<T: Instance> BatteryConverter<T> {
         BatteryConverter { adc, pins: [voltage.degrade_adc(), current.degrade_adc()], end, convert, scale }
     }
 
-    /// Reads forever and passes each reading on; passes none on if the reading is not a battery's.
+    /// Reads the voltage and current forever and passes them on, or none if they cannot be a battery's.
     pub async fn run(mut self) {
         let mut sensor = BatterySensor::new(RANGE_V);
         let mut ticker = Ticker::every(Duration::from_millis(PERIOD_MS));

@@ -47,7 +47,7 @@ impl Line {
 
     /// Pulls the pin down instead of up.
     pub(crate) fn pull_down(self) {
-        // Without interrupts, since tasks of other priorities change other pins of the port.
+        // Interrupts are masked, because tasks of other priorities change other pins of the port.
         cortex_m::interrupt::free(|_| self.port.pupdr().modify(|pulls| pulls.set_pupdr(self.pin, Pupdr::PULL_DOWN)));
     }
 

@@ -279,7 +279,7 @@ where
         let (port, samples) = self.answers.sampling();
         let request = self.dma.request();
         let mut channel = dma::Channel::new(self.dma.reborrow(), self.irqs);
-        // One transfer per update instead of a row's burst.
+        // Each update requests one transfer, instead of the burst that sends a row.
         self.timer.regs_gp16().dcr().modify(|burst| burst.set_dbl(0));
         self.timer.enable_update_dma(true);
         // SAFETY: the address is that of a register that may be read at any time. Nothing else writes to the samples

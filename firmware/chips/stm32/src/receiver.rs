@@ -21,7 +21,7 @@ const BYTE_BITS: u64 = 10;
 /// its measurement \[us\], and none for an epoch without a fix.
 pub async fn run(mut uart: BufferedUart<'static>, mut take: impl FnMut(u64, Option<GnssReading>)) {
     let mut receiver = UbxReceiver::new();
-    // At least half of the UART's ring, since the UART also wakes this task at half its ring.
+    // The buffer must hold at least half of the UART's ring, since the UART also wakes this task at half its ring.
     let mut bytes = [0; 512];
     let mut byte_us = 0;
     loop {

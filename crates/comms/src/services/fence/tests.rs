@@ -303,7 +303,7 @@ fn a_circle_without_radius_is_none() {
     assert!(contains(&fence, &origin().chart(), Vector2::new(5.0, 5.0)));
 }
 
-/// Places, paths and circles of orders are inside or not.
+/// The fence tells whether the places, paths and circles of orders are inside.
 #[test]
 fn places_ways_and_circles_are_inside_or_not() {
     let chart = origin().chart();

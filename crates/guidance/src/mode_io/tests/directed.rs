@@ -146,7 +146,7 @@ fn aimed(stage: &Stage, targets: &mut OffboardMemory, target: MotionTarget, at_u
     (output, limited(&output))
 }
 
-/// A target in the local frame is passed on as it is, as one of a stream, with the largest speed.
+/// A target in the local frame reaches the limiter unchanged, with its time of sending and the largest speed.
 #[test]
 fn a_local_target_is_aimed_at_as_it_is() {
     let v = Vector3::new;
