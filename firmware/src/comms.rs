@@ -135,7 +135,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
                 {
                     calibrate(comms, calibrator, table, &mut outgoing);
                 }
-                // Constant as well, for the same reason.
+                // This condition is constant as well, for the same reason.
                 let kept = if recording::is_possible::<B>() { log.as_deref_mut() } else { None };
                 let others = [kept.as_ref().map(|log| log.link()), radio.as_ref().and_then(|radio| radio.link())];
                 let changed = serve(comms, table, kept, &mut outgoing);

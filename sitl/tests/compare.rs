@@ -330,7 +330,7 @@ fn a_manifest_makes_the_same_results_again() {
     let said = String::from_utf8(output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("round-soft.csv: differs\n") && said.contains("the inputs differ"), "{said}");
-    // A modified manifest, and a missing one.
+    // `again` refuses a modified manifest and a missing one.
     let path = folder.join("mine/round/manifest.json");
     fs::write(&path, fs::read_to_string(&path).unwrap().replace("\"soft.toml\"", "\"hover\"")).unwrap();
     let line = refused(&sitl(&folder, &["again", "mine/round"]));

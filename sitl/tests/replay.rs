@@ -37,7 +37,7 @@ fn says_how_far_the_estimates_are_apart() {
     assert_eq!(csv.lines().count(), 1 + 15 * 10);
     let columns = csv.lines().next().unwrap().split(',').count();
     assert!(columns == 28 && csv.lines().all(|line| line.split(',').count() == columns));
-    // Compares from another time on.
+    // This replay is compared from another time on.
     succeeds(&sitl(&folder, &["replay", "rest.csv", "--from", "14", "--force"]));
     assert_eq!(summary(&folder, "replay-rest")["measured_from_s"], 14.0);
 }

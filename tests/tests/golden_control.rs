@@ -230,7 +230,7 @@ fn mixer_agrees_from_speeds_to_inputs_in_every_row() {
     for row in table.rows() {
         let speeds = RotorSpeeds(Vector4::from(row.all(SPEEDS).map(|w| w as f32)));
         let forces = mixer().forces(&speeds);
-        // Roundings of b, of omega twice, and of two products.
+        // b, omega (twice) and two products round.
         for ((got, column), expected) in forces.0.iter().zip(FORCES).zip(row.all(FORCES)) {
             assert_within(&row, column, *got, 5.0 * U * expected);
         }

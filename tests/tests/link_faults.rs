@@ -220,7 +220,7 @@ const CASES: &[Case] = &[
     case("setpoints 400 ms late, the paper's flight", Paper,
         &[(Setpoints, 0..FOREVER, Delay(400))], 42_000, Flies(0.6)),
 
-    // Corrupt and truncated frames.
+    // These cases have corrupt and truncated frames.
     case("a flipped bit in one state in 4, the paper's flight", Paper,
         &[(States, 0..FOREVER, FlipSome(25))], 42_000, Flies(0.5)),
     case("a flipped bit in each state for 200 ms", Hover(2.0),
@@ -233,7 +233,7 @@ const CASES: &[Case] = &[
     asked(&[(5_000, Kill)],
         case("a flipped bit in a request to stop", Hover(2.0), &[(Commands, 5_000..5_010, Flip)], 10_000, Flies(0.1))),
 
-    // Repeated and reordered frames.
+    // These cases have repeated and reordered frames.
     case("every frame twice, the paper's flight", Paper, &[(Uplink, 0..FOREVER, Twice)], 42_000, Flies(0.5)),
     case("states in blocks of 10, back to front, the paper's flight", Paper,
         &[(States, 0..FOREVER, Reverse(10))], 42_000, Flies(0.6)),
@@ -241,7 +241,7 @@ const CASES: &[Case] = &[
     case("an old state again and again for 100 ms of a climb", Paper,
         &[(States, 1000..1100, Replay)], 13_000, Recovers(0.95, 0.2)),
 
-    // Frames from the vehicle.
+    // These cases disturb frames from the vehicle.
     case("half of all rotor commands lost by chance, the paper's flight", Paper,
         &[(Rotors, 0..FOREVER, DropSome(50))], 42_000, Flies(0.5)),
     case("rotor commands 5 ms late, the paper's flight", Paper, &[(Rotors, 0..FOREVER, Delay(5))], 42_000, Flies(0.5)),

@@ -73,7 +73,7 @@ fn declared(tokens: TokenStream, items: bool, names: &mut BTreeSet<String>) {
                 let (kind, name) = (kind.to_string(), word(at + 1));
                 let is_type = match kind.as_str() {
                     "struct" | "enum" | "trait" => true,
-                    // No keyword elsewhere than in front of a declaration.
+                    // `union` is a keyword only in front of a declaration.
                     "union" => matches!(tokens.get(at + 2), Some(TokenTree::Group(_))),
                     "type" => items,
                     _ => false,

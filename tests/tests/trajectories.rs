@@ -67,7 +67,7 @@ fn pace(trajectory: &Trajectory) -> (f64, f64) {
             let legs = waypoints.windows(2).map(|pair| pair[1].time_s - pair[0].time_s);
             (legs.clone().fold(0.5, f64::max), legs.fold(20.0, f64::min))
         }
-        // Never drawn here: `crates/scenario/tests/paths.rs` tests polynomials.
+        // This test draws no polynomials. `crates/scenario/tests/paths.rs` tests them.
         Trajectory::Polynomials(_) => (1.0, 1.0),
     }
 }

@@ -51,9 +51,9 @@ impl MissionLeg {
     fn item(self, number: u16) -> MissionItem {
         let (command, [north, west, up], parameters) = match self {
             MissionLeg::TakeOff(up) => (TAKE_OFF, [0.0, 0.0, up], [0.0; 4]),
-            // Ground speed, with the throttle unchanged.
+            // The item sets the ground speed and leaves the throttle unchanged.
             MissionLeg::Speed(speed) => (CHANGE_SPEED, [0.0; 3], [1.0, speed, -1.0, 0.0]),
-            // NaN: no heading of its own.
+            // NaN means that the item has no heading of its own.
             MissionLeg::To(place, stay) => (WAYPOINT, place, [stay, 0.0, 0.0, f32::NAN]),
             MissionLeg::Loiter(place, stay) => (LOITER_TIME, place, [stay, 0.0, 0.0, f32::NAN]),
             MissionLeg::Land([north, west]) => (LAND, [north, west, 0.0], [0.0; 4]),

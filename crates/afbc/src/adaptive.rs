@@ -331,8 +331,8 @@ impl SubsystemLaw for Adaptive {
     }
 
     fn hover_thrust_n(&self, z: &AdaptiveEstimate, weight_n: f32, known_n: f32) -> f32 {
-        // Theta_hat of the rule for zero error and zero speed. Never near zero, because (40), drag and the force
-        // observer divide by the hover thrust.
+        // The hover thrust is Theta_hat of the rule for zero error and zero speed. It is kept away from zero, because
+        // (40), drag and the force observer divide by it.
         math::max(known_n + z.theta.m22, HOVER_SHARE_MIN * weight_n)
     }
 }

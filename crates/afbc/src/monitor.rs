@@ -180,7 +180,7 @@ impl Default for MonitorFigures {
             saturation_share: 0.0,
             swings: [OscillationDetector::default(); 4],
             yaw: FollowableInput::default(),
-            // The last subsystem of a round, so that the first step updates roll.
+            // Y is the last subsystem of a round, so the first step updates roll.
             axis: Axis::Y,
         }
     }

@@ -162,7 +162,7 @@ fn compose<L: SubsystemLaw + Copy>(
             Ok(())
         };
 
-        // Position: directly from state and setpoint.
+        // The errors of the position follow directly from state and setpoint.
         for (index, axis) in [(2, Axis::Z), (0, Axis::X), (1, Axis::Y)] {
             let tracking = SubsystemTracking {
                 x1: state.position_m[index],
@@ -177,7 +177,7 @@ fn compose<L: SubsystemLaw + Copy>(
             check(axis, tracking, [0.0, slack])?;
         }
 
-        // Desired attitude (39), (40) within the limits.
+        // The desired attitude follows from (39) and (40), within the limits.
         let eta = state.attitude_rad.cast::<f64>();
         let thrust_max_n = 4.0 * f64::from(settings.common.rotor_force_max_n);
         let vertical = if settings.tilt_by_thrust {
@@ -199,7 +199,7 @@ fn compose<L: SubsystemLaw + Copy>(
 
         // Angles that lead by the filter's lag, with the derivatives that follow from jerk and snap.
         let w = f64::from(settings.command_filter_rad_s);
-        // (40) differentiated along a path through jerk and snap, with a turning yaw.
+        // Equation (40) is differentiated along a path with this jerk and snap, and with a turning yaw.
         let along = |t: f64, [jerk, snap]: [[f64; 2]; 2]| {
             let by = |i: usize| jerk[i] * t + snap[i] * (0.5 * t * t);
             let turn =
@@ -248,13 +248,13 @@ fn compose<L: SubsystemLaw + Copy>(
 
         // Attitude: from the filter and d eta/dt, which is Omega in (6).
         let turning = if settings.feed_forward { eta_dot(state) } else { state.rates_rad_s.cast() };
-        // Allowed error, divided by g of roll and pitch: rounding of the filter's acceleration, and rotation of the
-        // snap.
+        // The allowed error is divided by g of roll and pitch. It covers the rounding of the filter's acceleration and
+        // the rotation of the snap.
         let slack = match settings.feed_forward {
             true => [2.0 * ROTATION, 2.0 * ROTATION * 12.0],
             false => [0.0, 4e-7 * w * w / 65.0],
         };
-        // Shifted by the rotor lag too.
+        // The feed-forward is also shifted by the rotor lag.
         let yaw_acceleration = f64::from(setpoint.yaw_acceleration_rad_s2);
         let wanted = [forward[0], forward[1], yaw_acceleration];
         let before = carried.late.unwrap_or(wanted);
@@ -295,7 +295,7 @@ fn compose<L: SubsystemLaw + Copy>(
             [errors.roll.e1, errors.pitch.e1, errors.yaw.e1]
         );
 
-        // Memory for the next step.
+        // The memory is updated for the next step.
         let missing = |asked: f32, given: f32| if action.health.saturated { asked - given } else { 0.0 };
         let (Inputs { roll_n, pitch_n, yaw_n, thrust_n }, given) = (trace.inputs, &action.given);
         if settings.anti_windup {

@@ -187,7 +187,7 @@ fn a_slower_observer_is_the_same_on_a_slower_clock() {
         (0..100_u16)
             .map(|_| {
                 let seen = observer.advance(&mut memory, &state, &up, weight_n(), conditions(true, false));
-                // Half of the thrust and no motion, so that the rotor lag matters.
+                // Half of the thrust is given, but the vehicle does not move, so the rotor lag matters.
                 observer.record_thrust(&mut memory, 0.5 * weight_n());
                 seen.x
             })

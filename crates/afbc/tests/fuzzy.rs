@@ -65,7 +65,8 @@ proptest! {
     fn weights_are_finite_within_0_and_1_and_sum_to_1(membership in membership(), a in finite(), b in finite()) {
         let w = FuzzyBasis::new(membership).unwrap().weights([a, b]);
         prop_assert!(w.iter().all(|w| w.is_finite() && (0.0..=1.0).contains(w)), "{w:?}");
-        // Two sums of three, a product, a division and a product before the sum of nine: 16 roundings.
+        // A weight takes two sums of three, a product, a division and a product, and then follows the sum of nine: 16
+        // roundings.
         let sum: f64 = w.iter().copied().map(f64::from).sum();
         prop_assert!((sum - 1.0).abs() <= 16.0 * U, "sum {sum}");
         prop_assert!((w.sum() - 1.0).abs() <= 1e-6, "sum {}", w.sum());

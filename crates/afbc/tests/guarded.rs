@@ -160,7 +160,7 @@ proptest! {
             (None, Some(Trip::Theta(Axis::Roll)))
         );
 
-        // Engaged at once, before the first step of the fallback law.
+        // AFBC is engaged at once, before the first step of the fallback law.
         let mut at_once = memory;
         controller.engage(&mut at_once.control);
         let first_of_afbc = step(&controller, &mut at_once, &state, &setpoint);
@@ -257,7 +257,7 @@ fn the_ground_does_not_trip() {
         assert!(command.action.health.saturated);
     }
     assert_eq!(memory.control.trip(), None);
-    // Sinking in the air, it trips.
+    // A vehicle that sinks in the air trips.
     let sinking = State { velocity_m_s: Vector3::new(0.0, 0.0, -0.5), ..State::default() };
     for _ in 0..5_000 {
         step(&controller, &mut memory, &sinking, &below);

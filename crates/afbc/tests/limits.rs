@@ -100,7 +100,8 @@ proptest! {
         // With `by_rotation`, roll and pitch belong to an attitude with the setpoint's yaw.
         let (sin, cos) = f64::from(if settings.by_rotation { setpoint.yaw_rad } else { yaw_rad }).sin_cos();
         let got = [forward * cos - left * sin, forward * sin + left * cos];
-        // Errors of the rotation, and rounding of angles near 90 degrees, amplified by their tangent.
+        // The tolerance covers errors of the rotation, and the rounding of angles near 90 degrees, amplified by their
+        // tangent.
         let steep = (scale * size / vertical).powi(2) + 1.0;
         let allowed = scale * size * ROTATION + 8.0 * U * vertical * steep;
         prop_assert!(

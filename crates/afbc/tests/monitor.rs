@@ -147,7 +147,7 @@ fn lasting_saturation_trips_and_moments_of_it_do_not() {
     // 1 - exp(-t) = 0.9 at 2.303 s.
     let (steps, trip) = with(|_| true).1.unwrap();
     assert!((2295..=2310).contains(&steps) && trip == Trip::Saturation, "{trip:?} after {steps}");
-    // Five of six steps, then two whole seconds of every five.
+    // The rotors saturate in five of six steps, then for two whole seconds of every five. Neither trips.
     let (figures, trip) = with(|i| !i.is_multiple_of(6));
     assert_eq!(trip, None);
     assert!((figures.saturation_share - 5.0 / 6.0).abs() < 0.01, "{}", figures.saturation_share);
@@ -191,7 +191,7 @@ fn limit_cycles_are_counted_and_vibration_about_yaw_is_not() {
                 trips(hz, amplitude);
             }
         }
-        // Chatter between consecutive steps: 0, large, 0, large ...
+        // The input chatters between consecutive steps: 0, large, 0, large ...
         let chatter = |i: usize| if i.is_multiple_of(2) { 0.0 } else { 1.01 * large };
         let trip = watch(&monitor, 10_000, |i| (PerAxis::default(), input(axis, chatter(i)))).1;
         if axis == Axis::Yaw {

@@ -100,7 +100,7 @@ proptest! {
                 prop_assert!(near(own.backstepping.stiffness * k * k, of.backstepping.stiffness), "{axis:?}");
                 prop_assert!(near(effect * own.gamma * k * k, of.gamma), "{axis:?}");
                 prop_assert!(near(effect * own.eta * k * k, of.eta), "{axis:?}");
-                // A disturbance in proportion to the vehicle, within the accepted range.
+                // The bounds fit a disturbance in proportion to the vehicle, within the accepted range.
                 let bound = |own: f32, of: f32| near(own, (of / effect).min(1e6));
                 prop_assert!(bound(own.safeguards.theta_max, of.safeguards.theta_max), "{axis:?}");
                 prop_assert!(bound(own.safeguards.delta_max, of.safeguards.delta_max), "{axis:?}");

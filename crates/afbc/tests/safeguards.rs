@@ -110,7 +110,7 @@ proptest! {
         for (e2, unallocated) in inputs {
             let u = step(gains, e2, unallocated, dt_s, &mut estimate);
             let norm = estimate.theta.map(f64::from).norm();
-            // Nine squares summed, a root, a quotient and a product; squares below 1e-38 vanish.
+            // The norm rounds in the sum of nine squares, a root, a quotient and a product. Squares below 1e-38 vanish.
             prop_assert!(norm <= theta_max * (1.0 + 12.0 * U) + 1e-18, "{norm} beyond {theta_max}");
             prop_assert!((0.0..=delta_max).contains(&estimate.delta), "{} beyond {delta_max}", estimate.delta);
             prop_assert!(u.is_finite());

@@ -44,7 +44,7 @@ proptest! {
 
 #[test]
 fn a_light_vehicle_that_hovers_does_not_stand_and_one_that_lifts_off_no_longer() {
-    // 60 % of the nominal weight.
+    // This vehicle hovers with 60 % of the nominal weight as thrust.
     assert!(!stands(0.6 * WEIGHT_N, Vector3::zeros(), 10_000));
     let mut standstill = StandstillDetector::default();
     for _ in 0..1000 {

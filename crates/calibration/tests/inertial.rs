@@ -176,7 +176,7 @@ fn a_moving_gyroscope_is_not_calibrated() {
     assert_eq!(found, Some(Err(CalibrationFailure::Moving)));
     assert!(told.contains(&CalibrationEvent::Moved) && !told.contains(&CalibrationEvent::Progress(90)), "{told:?}");
 
-    // Knocked after 2 s, still from then on.
+    // The sensor is knocked after 2 s and still from then on.
     let (mut gyroscope, mut told) = (GyroscopeCalibration::default(), Vec::new());
     hands.tremor_rad = 0.0;
     for number in 0..160 {

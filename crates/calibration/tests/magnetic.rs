@@ -199,7 +199,7 @@ fn what_is_left_out_is_told() {
     // No magnetometer.
     let (found, _) = turned(&mut hands(Part::QMC5883L, 3), &[Side::Down], 1.0, |_, sample| sample.field_ut = None);
     assert_eq!(found, Some(Err(CalibrationFailure::NoField)));
-    // A repeated side, and then no further one.
+    // A side is repeated, and no further side follows.
     let (found, told) = turned(&mut hands(Part::QMC5883L, 3), &[Side::Up, Side::Down, Side::Up], 1.0, |_, _| ());
     assert_eq!((found, told.last()), (None, Some(&CalibrationEvent::Repeated(Side::Up))));
     let mut askew = hands(Part::QMC5883L, 3);

@@ -283,7 +283,7 @@ fn draws_fill_their_intervals_evenly() {
         // The mean of n uniform numbers has a standard deviation of 1 / sqrt(12 n) = 0.004.
         assert!((sum / FLIGHTS as f64 - 0.5).abs() < 0.02, "{sums:?}");
     }
-    // About 1250 of each, with a standard deviation of 31.
+    // Each rotor is drawn about 1250 times, with a standard deviation of 31.
     assert!(rotors.iter().all(|&count| count.abs_diff(1250) < 150), "{rotors:?}");
 }
 
@@ -318,7 +318,7 @@ fn damaged_files_are_refused() {
     for (index, part) in (1..).zip(&parts) {
         fly(&campaign, part, Shard { index, of: 2 }, 1);
     }
-    // A chunk of an interrupted campaign.
+    // The folder `begun` holds a chunk of an interrupted campaign.
     let begun = folder.join("begun");
     fly(&campaign, &begun, Shard::WHOLE, 1);
     fs::create_dir_all(begun.join("chunks")).unwrap();

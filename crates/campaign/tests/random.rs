@@ -180,7 +180,8 @@ fn no_flight_asks_for_more_than_the_vehicle_can_do() {
             );
             boldest = boldest.max(*acceleration_m_s2);
         }
-        // The demand is not much smaller either, though batteries sag and the rotors' lag limits small paths.
+        // The demanded acceleration is at least 0.4 times the largest one, though batteries sag and the rotors' lag
+        // limits small paths.
         let most_m_s2 = ((g + 0.6 * (intact_m_s2 - g)).powi(2) - g * g).sqrt().min(1.56 * g);
         let known = built_in(&vehicle.name).is_some();
         assert!(!known || boldest > 0.4 * most_m_s2, "{}: {boldest} of {most_m_s2} m/s2", vehicle.name);

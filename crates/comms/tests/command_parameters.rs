@@ -38,7 +38,7 @@ const COMMANDS: &[Row] = &[
     Row(20, NONE, UNUSED),
     // Abort altitude, precision landing, heading, place: the vehicle lands where it is.
     Row(21, NONE, UNUSED),
-    // Pitch (-1: none), flags, heading, place; height.
+    // The parameters are pitch (-1 for none), flags, heading and place, which must be unused, and the height.
     Row(22, NONE, [But(&[-1.0]), No, No, No, No, No, Yes]),
     Row(34, placed([10.0, 2.0, 0.0, 0.0]), [Yes, Yes, Yes, Yes, Yes, Yes, Yes]),
     // Of the mode flags only the custom mode flag is used: stations repeat the vehicle's other flags.

@@ -202,7 +202,7 @@ impl<const N: usize> Mixer<N> {
     /// # Errors
     /// If the largest force of one rotor is too small. The error states the smallest accepted force.
     pub fn check_hover(&self, weight_n: f32) -> Result<(), OutOfRange> {
-        // Rounded up, for a readable number.
+        // The force is rounded up to a readable number.
         let needed_n = libm::ceil(f64::from(HOVER_MARGIN * weight_n * self.share.max()) * 1e4) / 1e4;
         Range { min: needed_n, ..Settings::FORCE_MAX.range }.check(self.force_max)
     }

@@ -255,7 +255,8 @@ proptest! {
         let mixer = mixer(1e4);
         let forces = RotorForces(Vector4::from(force));
         let speeds = mixer.speeds(&forces);
-        // Forward: 1/b, the product, and the root, which halves errors. Back: two products.
+        // To the speeds, 1/b, the product and the root round, and the root halves errors. Back to the forces, two
+        // products round.
         for (back, force) in mixer.forces(&speeds).0.iter().zip(force) {
             prop_assert!((back - force).abs() <= 6.0 * U * force, "{back} for {force}");
         }

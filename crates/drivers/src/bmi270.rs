@@ -62,7 +62,7 @@ impl SensorPart for Bmi270 {
     /// Self-test of the accelerometer as in the data sheet: deflection to either side in turn, at 16 g and 1.6 kHz. The
     /// gyroscope's self-test needs another feature of the configuration and is not run.
     const SELF_TEST: Option<SelfTest<InertialReading>> = Some(SelfTest {
-        // Enabled, large amplitude, negative direction.
+        // The self-test is enabled with a large amplitude, first in the negative direction.
         quiet: &[ScriptStep::Write(ACC_SELF_TEST, 0b1001), ScriptStep::Wait(50_000)],
         trims: &[],
         between: &[],

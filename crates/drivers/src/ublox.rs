@@ -341,7 +341,7 @@ impl UbxReceiver {
         if self.owed > 0 {
             self.owed -= 1;
         } else if self.asked == 0 || matches!(self.phase, UbxPhase::Confirms(..)) {
-            // An answer to no known request.
+            // The answer belongs to no known request.
         } else if accepted {
             // After a refusal the step was sent again, and the refusal answered the earlier request.
             let owed = if self.refused { 0 } else { self.asked.saturating_sub(1) };

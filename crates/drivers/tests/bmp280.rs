@@ -114,7 +114,7 @@ impl Model for Registers {
             0xE0 if byte == 0xB6 => self.reset(now_us),
             0xF4 => {
                 assert_eq!(byte & 0b11, 0b01, "forced");
-                // Longest time by section 3.8.1, with 2^(osrs - 1) samples of each.
+                // The measurement takes the longest time in section 3.8.1, with 2^(osrs - 1) samples of each quantity.
                 let samples = |osrs: u8| if osrs == 0 { 0 } else { 1_u64 << (osrs - 1) };
                 let us = 1_250 + 2_300 * samples(byte >> 5) + 2_300 * samples(byte >> 2 & 7) + 575;
                 self.done_us = Some(now_us + us);

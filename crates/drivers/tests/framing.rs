@@ -80,10 +80,10 @@ fn on_spi<P: SensorPart>(register: u8) -> Vec<(Vec<u8>, usize)> {
 fn spi_is_framed_as_each_part_has_it() {
     let common = vec![(vec![0x80], 2), (vec![0x00, 0x55], 0), (vec![0x00], 0)];
     assert_eq!(on_spi::<Dps310>(0x00), common);
-    // A dummy byte before the answer.
+    // BMP3 sends a dummy byte before the answer.
     assert_eq!(on_spi::<Bmp388>(0x04)[0], (vec![0x84, 0], 2));
     assert_eq!(on_spi::<Bmp388>(0x1B)[1], (vec![0x1B, 0x55], 0));
-    // Commands instead of registers.
+    // MS5611 has commands instead of registers.
     assert_eq!(on_spi::<Ms5611>(0xA2)[0], (vec![0xA2], 2));
     assert_eq!(on_spi::<Ms5611>(0x48)[2], (vec![0x48], 0));
     // Address auto-increment, which has different bits on SPI and I2C.

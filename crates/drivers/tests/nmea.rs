@@ -258,7 +258,7 @@ proptest! {
         for text in [head.clone(), format!("P{head}{known}"), format!("{head}{known}")] {
             let talks = text.len() == 5 && text.ends_with(known) && !text.starts_with('P')
                 && text.bytes().take(2).all(|byte| byte.is_ascii_uppercase());
-            // No fix and not valid: the shortest sentence that the decoder reports.
+            // A sentence without a valid fix is the shortest one that the decoder reports.
             let read = fixes(&mut decoder, &sentence(&format!("{text},123519.00,V,,,,0,,")));
             prop_assert_eq!(read.len(), usize::from(talks), "{}", text);
         }

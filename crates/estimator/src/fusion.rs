@@ -260,7 +260,7 @@ impl Estimator {
         }
         let slow = row.slow.map_or(0.0, |slow| memory.covariance.slow.of_row(&slow));
         let y = memory.covariance.times(row);
-        // Negative only by rounding.
+        // The product is negative only by rounding.
         let hph = max(row.dot(&y), 0.0);
         let r = match &part.target {
             ObservedQuantity::Field(field) => field_variance(&horizon.field(field), part.variance.x) + part.rough,

@@ -232,7 +232,7 @@ impl LeverArmEstimator {
 impl LeverArmFilters {
     /// Returns the filters after long constant inputs.
     fn settled([first, second]: &[BiquadSection; 2], inputs: &[Vector3<f32>; 2]) -> Self {
-        // Weights of the previous cycle: 0 + 1 + ... + 7.
+        // The weights of the previous cycle are 0 + 1 + ... + 7.
         let weights = 0.5 * f32::from(CYCLE) * (f32::from(CYCLE) - 1.0);
         let [_, force] = *inputs;
         LeverArmFilters {

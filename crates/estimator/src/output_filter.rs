@@ -446,7 +446,7 @@ mod tests {
         for hover_rad_s in [65.0, 195.0, 600.0_f32] {
             for ratio in [0.1, 0.2, 0.5, 0.8, 1.0, 1.25, 2.0] {
                 let gain = told(OutputFilter::new(hover_rad_s), ratio * hover_rad_s);
-                // Frequency ratio as warped by the bilinear transform.
+                // The bilinear transform warps the frequency ratio.
                 let ratio_bent = (5e-4 * ratio * hover_rad_s).tan() / (5e-4 * hover_rad_s).tan();
                 let pole = 1.0 - ratio_bent * ratio_bent;
                 // Gain of the lead: 1 + LEAD/Q (1 - share z^-1/(1 - (1 - share) z^-1)), z = exp(j angle).

@@ -162,7 +162,7 @@ fn minute(seed: u64) -> (f64, u64) {
             memory.offer(&Stamped { value, at_us: at_us.saturating_sub(late_us(20_000.0, noise)) });
         }
         if noise.uniform() < 2e-5 {
-            // Started again in the air at the present state.
+            // The estimator starts again in the air at the present state.
             let state = State { attitude_rad: estimate.state.attitude_rad, ..estimate.state };
             let _ = estimator.start_at(
                 &mut memory,

@@ -133,7 +133,7 @@ fn a_disturbed_field_turns_nothing() {
         |_, _| true,
         |ms, measurement| {
             if let Measurement::MagneticField { field, .. } = &mut measurement.value {
-                // A disturbance like that of strong currents.
+                // Strong currents disturb the field for 8 s.
                 if (8000..16_000).contains(&ms) {
                     *field += Vector3::new(0.3, 0.5, 0.2);
                 }
@@ -397,7 +397,7 @@ fn faults_of_the_imu_are_told() {
             assert!(ms < 2020 || !estimate.validity.attitude);
         },
     );
-    // Clipped for a while: reported, then recovered.
+    // Clipped samples for a while are reported. Then the estimate recovers.
     flown(
         eight,
         MOCAP,

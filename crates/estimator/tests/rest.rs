@@ -38,7 +38,7 @@ fn it_stays_where_it_is() {
                 let state = &estimate.state;
                 let (_, first) = *start.get_or_insert((ms, state.attitude_rad));
                 let (speed, away) = (state.velocity_m_s.norm(), state.position_m.norm());
-                // Upwards, the accelerometer bias of 0.1 m/s2 shows first.
+                // The accelerometer bias of 0.1 m/s2 along the vertical appears first as a velocity.
                 let most = if ms < 4000 { 0.05 } else { 0.02 };
                 assert!(speed < most && away < 0.1, "seed {seed}, {ms} ms: {speed} m/s, {away} m");
                 let turned = (state.attitude_rad - first).xy().norm().to_degrees();

@@ -178,7 +178,7 @@ mod tests {
             let bytes = sealed(before, after, 1000);
             assert_eq!(bytes, sealed(before, after, 77_777));
             verify(&mut Cursor::new(&bytes)).unwrap();
-            // Every bit of the last 300 bytes, and some of the others.
+            // The test flips every bit of the last 300 bytes, and of some of the others.
             let positions = (0..bytes.len()).filter(|at| at + 300 > bytes.len() || at % 1009 == 0);
             for (at, bit) in positions.flat_map(|at| (0..8).map(move |bit| (at, bit))) {
                 let mut flipped = bytes.clone();

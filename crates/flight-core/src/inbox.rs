@@ -233,13 +233,13 @@ impl Inbox {
     #[inline]
     pub fn take_into(&mut self, taken: &mut Inbox) {
         (taken.state, taken.own) = (self.state, self.own);
-        // Rarely set: otherwise, copy the `None` only.
+        // A lost position is rare. Usually only the `None` is copied.
         match &self.position_lost {
             Some(position_lost) => taken.position_lost = Some(*position_lost),
             None => taken.position_lost = None,
         }
         taken.missing = self.missing;
-        // Rarely set, and taken once.
+        // A pose is rare, and it is taken once.
         match &self.pose {
             Some(pose) => {
                 taken.pose = Some(*pose);

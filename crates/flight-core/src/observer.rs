@@ -26,10 +26,10 @@ use afbc_control::math::{abs_max, max, min, settled, sqrt};
 use afbc_types::{Inputs, Pose, Stamped, State};
 use nalgebra::{Quaternion, Vector3};
 
-/// w of the attitude \[rad/s\]. As fast as trackers' noise allows: the fast law must not act for long on predictions of
-/// a wrong model.
+/// Bandwidth w of the attitude's observer \[rad/s\]. It is as high as the noise of trackers allows, because the fast
+/// attitude loop must not act for long on predictions of a wrong model.
 pub const ATTITUDE_RAD_S: f32 = 50.0;
-/// w of the position \[rad/s\].
+/// Bandwidth w of the position's observer \[rad/s\].
 pub const POSITION_RAD_S: f32 = 6.0;
 /// Largest age on arrival of a pose that is used \[us\].
 pub const LATE_US: u32 = 50_000;

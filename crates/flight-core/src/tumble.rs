@@ -44,7 +44,7 @@ impl Tumble {
     pub fn advance(&mut self, state: &State, gap_us: u32) {
         let (attitude, rates) = (&state.attitude_rad, &state.rates_rad_s);
         let spins = rates.xy().norm_squared() > SPIN_RAD_S * SPIN_RAD_S;
-        // Certainly upright: skip the cosine.
+        // An upright vehicle does not need the cosine.
         let tilt_rad = math::max(attitude.x.abs(), attitude.y.abs());
         if self.over.is_some() || spins || tilt_rad > UPRIGHT_RAD {
             self.look(math::tilt_cosine(attitude.x, attitude.y), spins, gap_us);

@@ -113,7 +113,7 @@ fn play(mut frames: Vec<Frame>) -> Seen {
         }
         let outcome = vehicle.tick(&mut memory, now_us, &inbox.take());
 
-        // Motor gating, checked in every tick of every case.
+        // Every tick of every case checks the gating of the motors.
         let still = outcome.motors == RotorSpeeds::default();
         assert!(outcome.mode.armed() || still, "motors turn while disarmed");
         assert!(outcome.motors.0.iter().all(|speed| speed.is_finite() && *speed >= 0.0));

@@ -198,7 +198,7 @@ fn a_late_arm_does_not_start_a_falling_vehicle() {
 
 #[test]
 fn disarming_is_for_the_ground() {
-    // Armed, and not yet carried by its rotors.
+    // The vehicle is armed. Its rotors do not carry it yet.
     let mut bench = Bench::new();
     bench.thrust_n = 0.3 * WEIGHT_N;
     bench.wait(1500, State::default());

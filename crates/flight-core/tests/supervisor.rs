@@ -185,7 +185,7 @@ fn readiness_names_the_first_reason_against_it() {
         // Reasons from outside the flight core come last.
         let inhibited = ArmingInputs { inhibited: Refusal::OutsideFence.into(), ..standing };
         assert_eq!(limits.against(&inhibited).verdict(), expected.and(Err(Refusal::OutsideFence)));
-        // An own estimate names what it lacks.
+        // A vehicle with its own estimator names what the estimate lacks.
         let missing = Some(Refusal::HeadingUnknown);
         let unknown = ArmingInputs { state: None, missing, ..standing };
         assert_eq!(limits.against(&unknown).verdict(), Err(Refusal::HeadingUnknown));

@@ -249,9 +249,9 @@ impl Memory {
         if let Some(reset) = given.reset.filter(|_| self.was_seen) {
             self.shift(reset, settings.flying.within_m);
         }
-        // Must precede `decide`, which updates `was_armed`.
+        // Home must be found before `decide`, which updates `was_armed`.
         self.find_home(state, given.rested, armed);
-        // Must precede the orders, which may select an item of the new mission.
+        // A new mission must be noticed before the orders are carried out, which may select one of its items.
         if orders.leg.is_some_and(|leg| self.mission.begins_anew(leg.upload)) {
             self.lands_item = None;
         }

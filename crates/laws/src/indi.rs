@@ -206,7 +206,7 @@ impl<const N: usize> FlightController<N> for Indi<N> {
     #[inline]
     fn decide(&self, memory: &mut Memory<N>, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
         let r = r_earth_body(&state.attitude_rad);
-        // Normalised, because sines are off by up to 1.7e-4.
+        // The axis is normalised, because sines are off by up to 1.7e-4.
         let body_z = unit(&r.column(2).into());
 
         // Present rotor forces by the model, and the measured reaction of the vehicle.

@@ -129,7 +129,7 @@ proptest! {
             prop_assert_eq!(decoded(framed(&start(version, "x"))), foreign.clone());
         }
         prop_assert_eq!(decoded(frame_of(&body(&record))), Ok(record.clone()));
-        // Longer than a record of this version.
+        // The record is longer than a record of this version.
         let longer = |record: &Record| [body(record), vec![1; more]].concat();
         prop_assert_eq!(decoded(frame_of(&longer(&start(version, "x")))), foreign);
         if !matches!(record, Record::Start(_)) {

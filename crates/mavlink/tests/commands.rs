@@ -175,7 +175,7 @@ fn circles_are_read_and_reported() {
     for [p1, p2, p3, p4] in [
         [f32::INFINITY, 2.0, 0.0, 0.0],
         [10.0, f32::INFINITY, 0.0, 0.0],
-        // Yaw by radio control, and invalid yaw behaviours.
+        // These rows have yaw by radio control, and invalid yaw behaviours.
         [10.0, 2.0, 4.0, 0.0],
         [10.0, 2.0, 6.0, 0.0],
         [10.0, 2.0, 0.5, 0.0],

@@ -90,7 +90,7 @@ mod tests {
             let mean = 10.5 + 100.0 * f32::from(round);
             assert_eq!(sample.at_us, 19_900);
             assert_eq!((sample.rates_rad_s.x, sample.specific_force_m_s2.z), (mean, -mean));
-            // The tenth and the twentieth reading.
+            // The field is the mean of the tenth and the twentieth reading.
             let field = (round != 2).then(|| Vector3::repeat(mean + 4.5));
             assert_eq!(sample.field_ut, field);
         }

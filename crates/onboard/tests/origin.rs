@@ -97,9 +97,9 @@ proptest! {
             bench.tick(if ms < 2000 { Vector3::zeros() } else { push(ms - 2000) }, None, 0);
         }
         let state = bench.stand(4000, place_m, 0.5);
-        // Noise of the first fix, and rounding: 2 mm at 20 km.
+        // The tolerance covers the noise of the first fix, and rounding: 2 mm at 20 km.
         prop_assert!(state.position_m.amax() < 2.0 * NOISE_M + 0.01, "{}", state.position_m);
-        // Moves from rest to rest in two seconds.
+        // The vehicle moves from rest to rest in two seconds.
         let (mut velocity, mut moved) = (Vector3::zeros(), Vector3::zeros());
         let mut state = State::default();
         for ms in 0..2000 {

@@ -163,7 +163,7 @@ fn start(elf: &Path) -> Result<(Qemu, Gdb), Error> {
 
 /// Returns the address of the idle loop's sleep instruction.
 fn idle(elf: &Path) -> Result<u32, Error> {
-    // WFI, then a branch back to it.
+    // The idle loop is WFI, then a branch back to it.
     const LOOP: [u8; 4] = [0x30, 0xBF, 0xFD, 0xE7];
     let bytes = std::fs::read(elf)?;
     let file = object::File::parse(bytes.as_slice()).map_err(|error| Error::Protocol(error.to_string()))?;

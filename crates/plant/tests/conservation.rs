@@ -110,7 +110,7 @@ proptest! {
         let end = fall(p, start, 1000).motion();
         let (s, c) = ((i.z - i.x) / i.x * rates.z).sin_cos(); // after 1 s
         let exact = Vector3::new(c * rates.x - s * rates.y, s * rates.x + c * rates.y, rates.z);
-        // Error of (5e-3)^5/120 per step, 1000 steps: 3e-11 of the rates.
+        // The integration error is (5e-3)^5/120 per step. After 1000 steps it is 3e-11 of the rates.
         prop_assert!(
             (end.rates_rad_s - exact).norm() <= 1e-10 * (1.0 + rates.norm()),
             "{} for {exact}",
@@ -230,7 +230,8 @@ fn a_flat_spin_turns_evenly() {
             let yaw = rate * f64::from(step) * DT_S;
             let error = plant.motion().attitude_rad.z - yaw;
             let error = error - core::f64::consts::TAU * (error / core::f64::consts::TAU).round();
-            // Error of (rate dt / 2)^5 / 120 per step, 8e-18 each, so the rounding of 60000 steps dominates.
+            // The integration error is (rate dt / 2)^5 / 120 = 8e-18 per step, so the rounding of 60000 steps
+            // dominates.
             assert!(error.abs() < 1e-11, "{error:e} rad after {step} steps");
         }
     }

@@ -136,7 +136,7 @@ fn drag_that_the_step_cannot_follow_is_refused() {
             .name
     };
     assert_eq!(refused(Drag { blade_n_s2_m: 0.01, ..none() }), "blade_n_s2_m");
-    // Stable for the mass, but not for the inertia that the hubs rotate.
+    // The step is stable for the mass, but not for the inertia that the hubs rotate.
     assert_eq!(refused(Drag { blade_n_s2_m: 2.4e-4, ..none() }), "blade_n_s2_m");
     assert_eq!(refused(Drag { area_m2: Vector3::new(0.0, 0.0, 1.0), ..none() }), "area_m2");
     assert_eq!(refused(Drag { centre_m: Vector3::new(0.0, 0.0, 5.0), ..none() }), "centre_m");

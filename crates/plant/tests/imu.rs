@@ -170,7 +170,7 @@ fn output_is_quantised_and_clipped() {
     }
     let different = samples.iter().map(|s| s.specific_force_m_s2.z.to_bits());
     assert!(different.collect::<std::collections::BTreeSet<_>>().len() > 50);
-    // Clipped on either side, with or without noise.
+    // The force is clipped on either side, with or without noise.
     let falling = |_| Truth { acceleration_m_s2: Vector3::new(50.0, -50.0, 0.0), ..rest() };
     let clipped = common::run(with(ImuModel { gyro, accel, ..ImuModel::DEFAULT }), 4, 10, falling);
     assert!(clipped.iter().all(|r| r.imu.unwrap().specific_force_m_s2.xy() == nalgebra::Vector2::new(20.0, -20.0)));

@@ -54,10 +54,11 @@ fn delays_are_spread_as_declared_and_stamps_show_them() {
         assert_eq!(fix.position_m.x, f64::from(taken(fix)), "the pose is that of the stamp");
         late.push(f64::from(k - taken(fix)) * STEP_S);
     }
-    // Uniform within 6.5 to 14.5 ms, rounded up: 7 to 15 ms.
+    // The delay is uniform within 6.5 to 14.5 ms. Rounded up, it is 7 to 15 ms.
     assert!(late.iter().all(|late| (0.0069..0.0151).contains(late)));
     let n = late.len() as f64;
-    // Eight whole steps: seven full ones and two halves at the ends, so rounding up adds half a step to the mean.
+    // The delay spans eight steps: seven full ones and two halves at the ends. So rounding up adds half a step to the
+    // mean.
     assert!((mean(&late) - 0.011).abs() < 5.0 * (0.004 / 3.0_f64.sqrt()) / n.sqrt() + 1e-5, "{}", mean(&late));
     let spread: Vec<f64> = late.iter().map(|late| late - 0.011).collect();
     let variance = 0.004_f64.powi(2) / 3.0 + STEP_S * STEP_S / 12.0;

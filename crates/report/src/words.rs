@@ -112,7 +112,7 @@ pub(super) fn change(change: &PlantParameterChange) -> String {
     if matches!(change.quantity, PlantParameter::RollMoment | PlantParameter::PitchMoment | PlantParameter::YawMoment) {
         return format!("{quantity} of the rotors times {}", change.factor);
     }
-    // Rounded to tenths of a percent.
+    // The change is rounded to tenths of a percent.
     let percent = ((change.factor - 1.0) * 1000.0).round() / 10.0;
     format!("{quantity} {percent:+} %")
 }

@@ -205,7 +205,7 @@ fn polynomials_are_flown_as_they_are() {
     let row = |duration: f64, x: [f64; 3]| {
         format!("{duration},{},{},{},0,0,0,0,0,{}1{}\n", x[0], x[1], x[2], "0,".repeat(8), ",0".repeat(15))
     };
-    // x = 0.5 t^2 for 2 s, then on at 2 m/s: 2 + 2 t.
+    // The first piece is x = 0.5 t^2 for 2 s. The second continues at 2 m/s: x = 2 + 2 t.
     let text = format!("{head}\n{}{}", row(2.0, [0.0, 0.0, 0.5]), row(1.0, [2.0, 2.0, 0.0]));
     let read = scenario(&folder, &text, "").unwrap();
     assert_eq!(

@@ -192,7 +192,7 @@ fn what_is_not_understood_is_refused_by_name() {
         }
     }
     assert_eq!(versions, 6);
-    // A fence in an old format, with other names.
+    // The fence has an old format with other names.
     let mut old = whole.clone();
     old["geoFence"] = json!({ "version": 1, "polygon": [at(-60.0, -60.0), at(60.0, -60.0), at(60.0, 60.0)] });
     let cure = "save the plan again in a current QGroundControl";

@@ -72,7 +72,7 @@ fn a_mission_is_read_as_its_plan_is() {
         assert_eq!(read(&text).unwrap(), expected);
         assert_eq!(read(&format!("\u{feff}{text}")).unwrap(), expected);
     }
-    // A file without a home position, and one with an unknown home position (zeros).
+    // A plan has no home if its file has no home position, or an unknown one (zeros).
     let no_home = QgcPlan { home: None, ..expected };
     assert_eq!(read(&text(120, "\t", "\n")).unwrap(), no_home);
     let unknown = text(110, " ", "\n").replacen(" -33.9 18.4 30 ", " 0 0 0 ", 1);

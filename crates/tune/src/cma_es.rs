@@ -83,7 +83,7 @@ impl CmaEs {
             c.step_path = (1.0 - c_step) * c.step_path + push;
             length += c.step_path * c.step_path;
         }
-        // Divided by the expected length of a vector of n normal numbers.
+        // The length is divided by the expected length of a vector of n normal numbers.
         let length = sqrt(length) / (sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n)));
         self.generation += 1;
         // The path starts at zero. This is its expected length until it has settled. libm computes the power, since the

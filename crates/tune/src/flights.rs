@@ -82,7 +82,7 @@ impl FlightBuilder<'_> {
             self.scenario(TrainingFlight { change: weak, ..TrainingFlight::new("weak", 8.0) })?,
             self.windy(eight("heavy", heavy))?,
             late,
-            // An outage at the onset of each gust and parameter change.
+            // An outage begins at the onset of each gust and parameter change.
             Scenario {
                 name: "outages".into(),
                 duration_s: 45.0,

@@ -60,7 +60,7 @@ fn what_is_not_a_rotation_is_rejected() {
             assert_eq!(with_attitude(&attitude), None, "{attitude:?}");
         }
     }
-    // A valid attitude with implausible motion.
+    // A valid attitude does not excuse an implausible motion.
     let (zero, level) = (Vector3::zeros(), Quaternion::identity());
     for wrong in [f32::NAN, f32::INFINITY, 2e5] {
         let wrong = Vector3::new(0.0, wrong, 0.0);

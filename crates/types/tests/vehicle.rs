@@ -59,7 +59,7 @@ proptest! {
         let wanted = moment.component_div(&vehicle.inertia_kg_m2);
         let [x, y, z] = [inputs.roll_n, inputs.pitch_n, inputs.yaw_n].map(f64::from);
         let turns = vehicle.effectiveness().component_mul(&Vector3::new(x, y, z));
-        // Six forces of up to 9 N at up to 10 arm lengths, each product rounded to 1e-6.
+        // Six forces of up to 9 N act at up to 10 arm lengths. Each product is rounded to 1e-6.
         let scale = vehicle.effectiveness() * (6.0 * 90.0 * 1e-6);
         prop_assert!((0..3).all(|i| (turns[i] - wanted[i]).abs() <= scale[i]), "{turns} for {wanted}");
         prop_assert!((f64::from(inputs.thrust_n) - thrust_n).abs() <= 1e-4);

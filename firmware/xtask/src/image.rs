@@ -200,7 +200,7 @@ mod tests {
             [|value: u16| value.to_le_bytes().to_vec(), |value: u16| u32::from(value).to_le_bytes().to_vec()];
         let count = segments.len() as u16;
         let mut file = b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0".to_vec();
-        // Executable file, machine Arm.
+        // The header states an executable file for an Arm processor.
         [half(2), half(40), word(1)].into_iter().for_each(|field| file.extend(field));
         file.extend(entry.to_le_bytes());
         [word(52), word(0), word(0), half(52), half(32), half(count), half(40), half(0), half(0)]

@@ -112,7 +112,7 @@ fn act(action: &ParamsAction, vehicle: &Vehicle) -> Result<(), CommandError> {
             let mut store = open(path, vehicle, FlashFile::open)?;
             store.make_room().map_err(|error| failed(path, &error))?;
             load(&mut table, &mut store, path)?;
-            // Applied again, on top of the stored values.
+            // The file is applied again, on top of the stored values.
             take(&mut table, file)?;
             for name in &changes {
                 keep(&table, &mut store, *name).map_err(|error| failed(path, &error))?;

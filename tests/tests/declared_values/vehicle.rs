@@ -181,7 +181,7 @@ fn base() -> Vehicle {
         land_slow_m: 2.0,
         ..flying
     };
-    // Large enough to lift the vehicle without feed-forward.
+    // The bound is large enough to lift the vehicle without feed-forward.
     vehicle.flight_gains.z.safeguards.theta_max = 80.0;
     Vehicle::read(&vehicle.document().text()).unwrap()
 }

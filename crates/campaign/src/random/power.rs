@@ -145,7 +145,8 @@ fn speed_share(vehicle: &Vehicle, battery: &BatteryModel) -> f64 {
     let half_v = 0.5 * (battery.empty_v + (battery.full_v - battery.empty_v) * battery.initial_charge);
     let reached = |share: f64| {
         let power_w = full_w * share * share * share / battery.efficiency + battery.avionics_w;
-        // The larger root of V^2 - V_open V + R P = 0. Beyond the battery's largest power, half of V_open.
+        // The voltage is the larger root of V^2 - V_open V + R P = 0. Beyond the battery's largest power, it is half of
+        // V_open.
         let voltage_v = half_v + sqrt((half_v * half_v - battery.resistance_ohm * power_w).max(0.0));
         voltage_v / battery.full_v
     };

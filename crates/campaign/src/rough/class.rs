@@ -8,9 +8,9 @@ use nalgebra::Vector3;
 /// Place of a flight, which decides which sensors aid the inertial sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Venue {
-    /// With a motion-capture system.
+    /// The vehicle is tracked by a motion-capture system.
     Indoors,
-    /// With a GNSS receiver and a magnetometer.
+    /// The vehicle has a GNSS receiver and a magnetometer.
     Outdoors,
 }
 

@@ -40,7 +40,7 @@ pub(crate) fn expected(message: &MavMessage) -> Expected {
         M::MISSION_SET_CURRENT(_) => Answer(&[42]),
         // "Response: DATA_STREAM". The streams themselves follow.
         M::REQUEST_DATA_STREAM(_) => Answer(&[67]),
-        // Logs, files, events, shells (with the flag "respond"), heights of the terrain.
+        // These messages request logs, files, events, shells (with the flag "respond") and heights of the terrain.
         M::LOG_REQUEST_LIST(_) => Answer(&[118]),
         M::LOG_REQUEST_DATA(_) => Answer(&[120]),
         M::FILE_TRANSFER_PROTOCOL(_) => Answer(&[110]),
@@ -113,7 +113,7 @@ pub(crate) fn expected(message: &MavMessage) -> Expected {
         | M::TRAJECTORY_REPRESENTATION_BEZIER(_)
         | M::TRAJECTORY_REPRESENTATION_WAYPOINTS(_) => None,
 
-        // Data for the receiver.
+        // These messages carry data for the receiver.
         M::ATT_POS_MOCAP(_)
         | M::AUTOPILOT_STATE_FOR_GIMBAL_DEVICE(_)
         | M::CANFD_FRAME(_)
@@ -140,7 +140,7 @@ pub(crate) fn expected(message: &MavMessage) -> Expected {
         | M::VISION_POSITION_ESTIMATE(_)
         | M::VISION_SPEED_ESTIMATE(_) => None,
 
-        // Identification of other aircraft, which they broadcast.
+        // Other aircraft broadcast these messages to identify themselves.
         M::ADSB_VEHICLE(_)
         | M::AIS_VESSEL(_)
         | M::COLLISION(_)

@@ -310,7 +310,7 @@ fn the_monitor_tells_what_it_sees() {
         let _ = freed.take(&other, &settings);
         assert!(!freed.health(1_017_000, &settings, stuck_us).stuck);
     }
-    // Clipped from 98 % of the range, reported for 200 ms.
+    // A reading counts as clipped from 98 % of the range on, and is reported for 200 ms.
     for (rate, force, clips) in [
         (0.97, 0.0, false),
         (0.99, 0.0, true),

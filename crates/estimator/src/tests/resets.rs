@@ -78,7 +78,7 @@ proptest! {
         let mut theirs = t * p * t.transpose();
         coordinates.for_each(|i| theirs[(6 + i, 6 + i)] += variance[i]);
         if axes != FusedAxes::Level {
-            // Forgotten, down to the smallest variance.
+            // The offset is forgotten, so its variance is the smallest one.
             theirs[(15, 15)] = 1e-8;
         }
         let ours = dense(&memory.covariance);

@@ -346,7 +346,8 @@ fn rest_is_a_measurement() {
             assert!(held || memory.nominal.velocity[k] == -speed);
         }
     }
-    // In the air, without aid for five seconds: weak zero velocity with a standard deviation of 25 m/s.
+    // In the air, five seconds without an aid start a weak measurement of zero velocity, with a standard deviation of
+    // 25 m/s.
     for (aided_us, weak) in [(5_000_000, false), (5_000_001, true)] {
         let mut memory = memory(&diagonal([1e-6, 625.0, 1e-2, 1e-8, 1e-6, 1e-2]), &V3::zeros());
         memory.nominal.velocity = Vector3::new(4.0, 0.0, 0.0);

@@ -455,7 +455,7 @@ fn poses_replace_states_that_are_missing_and_give_way_to_them() {
             assert!(off(&state, &at(bench.now_us)) < 0.4, "{ms} ms: {state:?}, not {:?}", at(bench.now_us));
         }
     }
-    // A state from the link, older than the observed one.
+    // The link sends a state that is older than the observed one.
     let outcome = bench.linked(3000);
     assert_eq!((outcome.health.observed, outcome.health.state_age_us), (false, 3000));
     assert_eq!(bench.memory.state(), Some(&at(bench.now_us - 3000)));
@@ -526,7 +526,7 @@ fn after_a_flight_its_memory_remains_and_no_trace() {
     assert_eq!(FlightCoreMemory::<Noted>::default().control(), None);
     assert_eq!(FlightCoreMemory::<Noted>::default().state(), None);
 
-    // Killed while blind: no trace either.
+    // A vehicle without a state has no trace either after it has been killed.
     let mut bench = Bench::flying(asks(1.0), false);
     for _ in 0..50 {
         let _ = bench.nothing();

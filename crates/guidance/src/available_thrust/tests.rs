@@ -105,7 +105,7 @@ proptest! {
             upwards = (upwards + lacks * dt / 0.2).clamp(-5.0, 5.0);
             let corrected = acceleration_m_s2.map(f64::from) + Vector3::new(sideways.x, sideways.y, upwards);
             let off = found.acceleration_m_s2.map(f64::from) - corrected;
-            // Accumulated errors of the sines.
+            // The errors of the sines accumulate.
             errors += 1e-3 * (1.0 + vertical * dt / 0.3);
             prop_assert!(off.norm() < errors, "{found:?}, not {corrected:?}");
             prop_assert_eq!(Setpoint { acceleration_m_s2, ..found }, setpoint);

@@ -170,7 +170,7 @@ fn what_is_no_area_is_refused() {
     assert_eq!(check(&[[0.0, 0.0], [9.0, 0.0], [9.0, 0.05]]), Some(PolygonFault::Degenerate));
     // One edge folds back onto another.
     assert_eq!(check(&[[0.0, 0.0], [9.0, 0.0], [4.0, 0.0]]), Some(PolygonFault::Degenerate));
-    // A vertex on another edge, and a bow tie.
+    // One polygon has a vertex on another edge. The other is a bow tie.
     let touching = [[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [4.0, 0.0], [0.0, 9.0]];
     assert_eq!(check(&touching), Some(PolygonFault::Crossing));
     assert_eq!(check(&[[0.0, 0.0], [9.0, 9.0], [9.0, 0.0], [0.0, 9.0]]), Some(PolygonFault::Crossing));

@@ -108,7 +108,7 @@ fn used(id: u16, first: f32) -> u8 {
         SELECT_MODE | SPEED => 0b111,
         SET_INTERVAL | REQUEST_MESSAGE => 0b100_0011,
         TAKE_OFF => 0b100_0001,
-        // The present position, or a given one.
+        // The first parameter selects the present position, or a given one.
         HOME if first == 1.0 => 0b1,
         HOME => 0b111_0001,
         REPOSITION => 0b111_1011,

@@ -312,7 +312,7 @@ fn stale_files_are_removed_and_foreign_ones_kept() {
     assert!(fs::symlink_metadata(scratch.0.join("paper-afbc.csv")).unwrap().is_file());
     assert!(!scratch.0.join("nowhere").exists());
 
-    // A folder of another command; and a marker file with any single bit flipped.
+    // A folder of another command is refused. So is a marker file with any single bit flipped.
     let refused = || Folder::open(&scratch.0, "other", "that", false).unwrap_err().to_string();
     assert!(refused().contains("the folder holds the results of `sitl test` for it;"), "{}", refused());
     let marker = scratch.0.join(".sitl.json");

@@ -70,7 +70,7 @@ impl Lines {
 /// Returns the timer counts between two samples.
 pub(crate) fn sample_counts(clock: TimerClock, rate: DshotRate) -> u16 {
     let [answer, frame] = RATE_RATIO;
-    // No overflow: four times 500 MHz fits.
+    // The product does not overflow, because four times 500 MHz fits.
     let samples_hz = rate as u32 * answer * u32::from(PER_BIT);
     ((clock.hz() * frame + samples_hz / 2) / samples_hz) as u16
 }

@@ -13,7 +13,7 @@ fn a_hold_is_where_it_comes_to_stand() {
     assert_eq!(stands.see(|inputs| hold.fly(inputs)).position_m, at_m);
     let later = Stage::at(Vector3::zeros()).see(|inputs| hold.fly(inputs));
     assert!(later.position_m == at_m && later.yaw_rad.is_nan() && later.speed_m_s == 4.0, "{later:?}");
-    // Place, heading and speed as ordered.
+    // The vehicle holds at the ordered place, with the ordered heading and speed.
     let mut ordered = Hold { at_m: Some(here()), yaw_rad: Some(0.4), speed_m_s: Some(7.0) };
     let aim = Stage { speed_m_s: 8.0, ..Stage::at(Vector3::zeros()) }.see(|inputs| ordered.fly(inputs));
     assert_eq!((aim.position_m, aim.yaw_rad, aim.speed_m_s), (here(), 0.4, 7.0));
