@@ -49,7 +49,7 @@ fn accuracy(scenario: &Scenario, flights: u64) -> (EstimateMetrics, Vector4<f64>
     (EstimateMetrics { position_m, velocity_m_s, attitude_rad, ..sum }, tracking)
 }
 
-/// The paper's trajectory with motion capture.
+/// The vehicle flies the paper's trajectory with motion capture.
 #[test]
 fn indoors() {
     let (estimate, tracking) = accuracy(&scenario("mocap"), 10);
@@ -59,9 +59,9 @@ fn indoors() {
     assert!(tracking.max() <= 0.01, "{tracking}");
 }
 
-/// The paper's trajectory with GNSS, barometer and magnetometer. No filter can know the receiver's slow error, so the
-/// position is as good as the receiver's. Where the receiver's error is noise, the position error is less than half of
-/// it.
+/// The vehicle flies the paper's trajectory with GNSS, barometer and magnetometer. No filter can know the receiver's
+/// slow error, so the position is as good as the receiver's. Where the receiver's error is noise, the position error is
+/// less than half of it.
 #[test]
 fn outdoors() {
     let scenario = scenario("outdoor");
@@ -363,8 +363,8 @@ fn consistent_outdoors() {
     }
 }
 
-/// Long flights, by default a tenth of an hour each; `HOURS=10` flies ten hours. The covariance stays positive and
-/// bounded, and no error grows beyond its standard deviation.
+/// Flights are long: by default a tenth of an hour each, and ten hours with `HOURS=10`. The covariance stays positive
+/// and bounded, and no error grows beyond its standard deviation.
 #[test]
 fn hours_of_flight() {
     let hours: f64 = std::env::var("HOURS").map_or(0.1, |hours| hours.parse().unwrap());

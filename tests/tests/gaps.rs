@@ -161,8 +161,7 @@ fn the_basis_is_accurate_where_the_printed_one_underflows() {
     }
 }
 
-/// The consequence: a roll rate of 2 rad/s, half a turn in 1.5 s, would make every estimate of the printed basis NaN
-/// forever.
+/// With the printed basis, a roll rate of 2 rad/s (half a turn in 1.5 s) would make every estimate NaN forever.
 #[test]
 fn a_fast_roll_leaves_the_estimates_finite() {
     let controller = Controller::new(

@@ -45,7 +45,8 @@ fn fly(scenario: &Scenario) -> (f64, f64) {
     (run.metrics.rmse.xyz().norm(), run.metrics.mean_abs_delta_u.max())
 }
 
-/// A lemniscate of 6 m at up to 4 m/s. Every derivative of the reference is known, so almost nothing is left to learn.
+/// The vehicle flies a lemniscate of 6 m at up to 4 m/s. Every derivative of the reference is known, so almost nothing
+/// is left to learn.
 #[test]
 fn a_fast_curve_is_no_disturbance() {
     let speed_m_s = 4.0;

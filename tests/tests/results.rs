@@ -33,8 +33,8 @@ fn the_results_page_is_what_the_code_does() {
     }
 }
 
-/// Compares the table of `sitl compare`: the standard contenders in `hardware`, with an asterisk at the best printed
-/// value of each column.
+/// Compares the printed table of `sitl compare` with new flights. It has the standard contenders in `hardware`, and an
+/// asterisk at the best printed value of each column.
 #[test]
 fn the_table_on_real_rotors_is_what_flies() {
     let scenario = built_in("hardware").unwrap().read().unwrap();

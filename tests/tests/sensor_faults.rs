@@ -161,7 +161,7 @@ fn no_fault_stops_the_motors_in_the_air_but_the_loss_of_the_attitude() {
     }
 }
 
-/// On a tracker's poses alone, the vehicle is flown with a model of itself, which may be wrong: half or twice the
+/// With a tracker's poses alone, the vehicle is flown with a model of itself. The model may be wrong: half or twice the
 /// thrust, 0.6 or 1.5 times the inertia, a payload of two fifths of the weight. Other trackers are tried as well: 30
 /// Hz, 40 ms late, noise of 5 mm and 0.01 rad, one outlier in fifty, a frame that jumps.
 #[test]

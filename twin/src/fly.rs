@@ -136,7 +136,7 @@ pub fn fly<M: Machine>(image: &Path, order: &FlightOptions<'_>) -> Result<(), Bo
     if let Some(receiver) = &receiver {
         println!("{}", receiver.summary());
     }
-    // Checked at the end, so that log and card of a failed flight are kept too.
+    // The flight is checked at the end, so that log and card of a failed flight are kept too.
     let verdict = pilot.verdict();
     let mut same = Ok(());
     if let (Some(log), Some(mut hearer)) = (log, hearer) {

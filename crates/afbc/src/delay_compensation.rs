@@ -35,7 +35,7 @@ impl DelayCompensation {
         let left = |w: f32| if w > 0.0 { math::max(lag_s + 2.0 / w - lead_s, 0.0) } else { lag_s };
         let share = 1.0 - math::exp(-bandwidth_rad_s * dt_s);
         DelayCompensation {
-            // A low-pass is behind a ramp of slope s by s dt / share.
+            // A low-pass lags behind a ramp of slope s by s dt / share.
             lead: left(smooth_tilt_rad_s) * share / dt_s,
             share,
             thrust_s: left(smooth_lift_rad_s),

@@ -84,7 +84,8 @@ fn same(before: &Stepped, after: &Stepped) -> Result<(), TestCaseError> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// For any inputs, tripped or not, engaged or not: finite commands within limits, and the right health flags.
+    /// Any inputs give finite commands within limits and the right health flags, whether the monitor has tripped or
+    /// AFBC is engaged again.
     #[test]
     fn any_input_gives_valid_motor_commands(
         gains in gains(),
@@ -181,8 +182,8 @@ proptest! {
         position_is_the_same(&last_of_fallback, &first_of_afbc)?;
     }
 
-    /// Hand-over without a jump for attitude, whose reference usually changes from step to step, so a filter at rest
-    /// holds it constant. With feed-forward, and with a law that also learns the weight.
+    /// The hand-over causes no jump of the attitude commands. Their reference usually changes from step to step, so a
+    /// filter at rest holds it constant. The law has feed-forward, or also learns the weight.
     #[test]
     fn hand_over_at_rest_is_bumpless_in_all_axes(
         height in -0.2_f32..0.2, yaw in -0.2_f32..0.2, feed_forward: bool,

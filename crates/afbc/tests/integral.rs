@@ -117,7 +117,8 @@ proptest! {
     }
 }
 
-/// As fast as AFBC with one rule and the same bound, with AFBC's hover thrust or else the weight.
+/// The integral law is as fast as AFBC with one rule and the same bound. It uses AFBC's hover thrust, or else the
+/// weight.
 #[test]
 fn it_stands_in_for_afbc() {
     let gains = Profile::Flight.gains();

@@ -188,7 +188,7 @@ proptest! {
         }
     }
 
-    /// (12), (13): e_2 is the remainder of e_1's dynamics.
+    /// By (12) and (13), e_2 is the remainder of e_1's dynamics.
     #[test]
     fn errors_obey_13(tracking in tracking(), alpha1 in 0.01_f32..10.0) {
         let errors = tracking.errors(alpha1);
@@ -260,7 +260,7 @@ proptest! {
         prop_assert!((f64::from(rate.delta()) - wanted).abs() <= f64::from(gains.eta) * e2.abs() * (1.4e-7 + 5.0 * U));
     }
 
-    /// The six subsystems: their fuzzy inputs (Section IV), the Euler step, and the freeze.
+    /// For all six subsystems, this checks the fuzzy inputs (Section IV), the Euler step and the freeze.
     #[test]
     fn a_step_uses_the_estimate_as_it_stood_and_then_moves_it(
         tracking in tracking(),

@@ -97,8 +97,8 @@ fn an_estimate_out_of_bounds_trips_within_six_steps() {
     }
 }
 
-/// The mean distance follows its definition, 1 - exp(-t/1 s) for a constant error of either sign, and trips by name
-/// beyond its bound.
+/// The mean distance follows its definition, 1 - exp(-t/1 s) for a constant error of either sign. Beyond its bound, the
+/// monitor trips and names the axis.
 #[test]
 fn large_errors_trip_when_they_last() {
     let bounds = bounds();

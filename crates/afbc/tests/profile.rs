@@ -12,7 +12,8 @@ use afbc_types::{Axis, Declared, Parameters, PerAxis};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-/// Section IV: alpha_1, alpha_2, gamma and eta of z and of the other five; Gaussians of attitude and of position.
+/// The profile has the numbers of section IV: alpha_1, alpha_2, gamma and eta of z and of the other five subsystems,
+/// and the Gaussians of attitude and position.
 #[test]
 fn the_printed_gains_are_those_of_section_iv() {
     let gains = Profile::Paper.gains();

@@ -243,8 +243,8 @@ fn leakage_forgets_at_its_rate() {
     assert_eq!(estimate, before);
 }
 
-/// A double integrator measured with noise: delta_hat as printed grows throughout the flight, that of the profile
-/// `flight` settles.
+/// A double integrator is measured with noise. The printed delta_hat grows throughout the flight. With the profile
+/// `flight`, delta_hat settles.
 #[test]
 fn noise_drives_the_printed_delta_hat_and_not_the_hardened() {
     const SECOND: u32 = 1000;

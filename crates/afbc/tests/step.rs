@@ -158,7 +158,8 @@ proptest! {
     }
 }
 
-/// Each field separately: NaN, infinite and slightly too large values are refused, the largest accepted value is not.
+/// For each field separately, NaN, infinite and slightly too large values are refused, but the largest accepted value
+/// is not.
 #[test]
 fn every_field_is_checked_for_plausibility() {
     type SetState = fn(&mut State, f32);

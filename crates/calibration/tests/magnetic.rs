@@ -63,9 +63,9 @@ fn mean(hands: &mut Hands, attitude: Rotation3<f64>) -> Vector3<f32> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// Hard and soft iron of a vehicle full of steel, anywhere on earth. The corrected field has the same strength in
-    /// every attitude, to three times the error that noise leaves with 144 readings, 1 %. The offset is that of the
-    /// hard iron.
+    /// The calibration finds hard and soft iron of a vehicle full of steel, anywhere on earth. The corrected field has
+    /// the same strength in every attitude, up to three times the error of 1 % that noise leaves with 144 readings. The
+    /// offset equals the hard iron.
     #[test]
     fn hard_and_soft_iron_are_found(
         seed: u64, strength_ut in 25.0..65.0, inclination_rad in -1.4..1.4, hard_iron_ut in 0.0..60.0,
@@ -135,7 +135,7 @@ proptest! {
     }
 }
 
-/// Readings of half a sphere, of a cone, and of one side alone.
+/// Readings of half a sphere, of a cone, or of one side alone are refused.
 #[test]
 fn too_few_directions_are_refused() {
     let spiral = |from: f32, to: f32| {

@@ -125,9 +125,9 @@ fn as_standard(scenario: &Scenario, own: &Contender) -> Option<Contender> {
     if own.name == kind.name() { [flies].into_iter().chain(printed).find(is_own) } else { None }
 }
 
-/// Default number of seeds of a comparison, where a seed changes anything. It is the least round number with which a
-/// signed rank test can tell eight laws that all differ from a ninth from chance: the smallest p is 2/2^10, times 8 by
-/// Holm's correction.
+/// Default number of seeds of a comparison, if the seed changes the flight. It is the least round number with which a
+/// signed rank test can distinguish eight different laws from a ninth. The smallest p is 2/2^10, times 8 by Holm's
+/// correction.
 pub const SEEDS: u64 = 10;
 
 /// Returns the default number of seeds for `scenario`: one if no seed changes the flight.

@@ -56,7 +56,7 @@ fn readings_are_filtered() {
     }
 }
 
-/// Cases of the fault table in the module's documentation.
+/// The cases are the rows of the fault table in the module's documentation.
 #[test]
 fn faults_are_no_reading() {
     let good = numbers(16.0, 20.0, 65_535);

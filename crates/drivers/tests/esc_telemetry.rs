@@ -143,7 +143,7 @@ proptest! {
     }
 }
 
-/// Check value of CRC catalogues, over "123456789".
+/// CRC catalogues have this check value over "123456789".
 #[test]
 fn the_checksum_is_crc_8_smbus() {
     let mut bytes = [0; ANSWER_LEN];

@@ -97,7 +97,7 @@ proptest! {
         prop_assert!(!fixes(&mut decoder, &again).is_empty());
     }
 
-    /// Fields with any content and a correct checksum.
+    /// Fields with any content and a correct checksum cause no panic.
     #[test]
     fn odd_fields_are_survived(text in "[0-9A-Z.,*$ -]{0,80}", kind in 0_usize..4) {
         let head = ["GNGGA", "GNRMC", "GPVTG", "GP"][kind];

@@ -233,8 +233,8 @@ fn refusals_are_survived() {
     }
 }
 
-/// Answers so late that each command is sent twice, on a line that loses one command: no answer to an earlier command
-/// counts for the next.
+/// The receiver answers so late that each command is sent twice, and the line loses one command. No answer to an
+/// earlier command counts for the next one.
 #[test]
 fn late_answers_are_not_taken_for_later_ones() {
     for generation in [Generation::Eight, Generation::Ten] {
@@ -324,7 +324,7 @@ fn a_reset_costs_seconds() {
     }
 }
 
-/// Epochs without a fix, and fixes with impossible numbers.
+/// Epochs without a fix and fixes with impossible numbers give no fix.
 #[test]
 fn no_fix_is_none() {
     let good = Truth::ZURICH;

@@ -37,7 +37,8 @@ fn measure(sensors: crate::common::Sensors, settings: Settings, seeds: u64) -> E
     errors
 }
 
-/// Accuracy with motion capture, for the settings of the bare sensor and the defaults for any vehicle.
+/// The accuracy with motion capture is tested with the settings of the bare sensor, and with the defaults for any
+/// vehicle.
 #[test]
 fn motion_capture() {
     for (name, settings) in [("part", settings(&ICM)), ("default", Settings::DEFAULT)] {

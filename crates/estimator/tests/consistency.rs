@@ -124,9 +124,8 @@ fn outdoor_with_iron() {
     check::<16>("outdoor with iron", 2000, sensors, settings, &OUTDOOR_AIDS);
 }
 
-/// A compass that was calibrated once, elsewhere, with an unknown hard iron of 0.04 gauss along each axis in a
-/// horizontal field of 0.2 gauss. With the defaults, the heading's standard deviation fits this error at rest and in
-/// flight.
+/// A compass was calibrated once, elsewhere. Its unknown hard iron is 0.04 gauss along each axis, in a horizontal field
+/// of 0.2 gauss. With the defaults, the heading's standard deviation fits this error at rest and in flight.
 #[test]
 fn a_heading_by_a_compass_is_as_good_as_compasses_are() {
     let sensors = Sensors { iron: Some(0.2), ..OUTDOOR };

@@ -9,7 +9,7 @@ fn asked(request: Request, ticket: usize) -> Ticketed<Request> {
     Ticketed { value: request, ticket: ticket as u8 }
 }
 
-/// One request per tick, in order, whether queued directly or merged.
+/// The inbox passes on one request per tick in order, whether it was queued directly or merged.
 #[test]
 fn requests_wait_for_their_turn() {
     let all = [Request::Arm, Request::Disarm, Request::Engage, Request::Kill];
@@ -117,7 +117,7 @@ fn a_setpoint_is_taken_whole() {
     }
 }
 
-/// Own estimate, own estimate without a position, and state from the link: each replaces the others.
+/// An own estimate, an own estimate without a position, and a state from the link replace one another.
 #[test]
 fn one_state_stands_at_a_time() {
     let at = |at_us| Stamped { value: State::default(), at_us };

@@ -59,7 +59,8 @@ fn disarmed_at_power_up() {
     assert!(!Mode::default().armed());
 }
 
-/// Transitions in flight by the age of the state alone: a row per mode, a column per age of `AGES_US`.
+/// In flight, the age of the state alone decides the mode. The table has a row per mode and a column per age of
+/// `AGES_US`.
 #[test]
 fn in_flight_the_age_decides() {
     use Mode::{Coasting, Descending, Disarmed, Flying};

@@ -164,7 +164,7 @@ fn the_estimates_of_one_flight_are_not_those_of_the_next() {
     assert_eq!(bench.memory.control().expect("flown").estimates, fresh);
 }
 
-/// Modes by the age of the state. The law's estimates are frozen while the vehicle is blind.
+/// The mode depends on the age of the state. The law's estimates are frozen while the vehicle has no state.
 #[test]
 fn a_lost_state_leads_to_coasting_descending_and_stopping() {
     let mut bench = Bench::airborne(State::default(), near());

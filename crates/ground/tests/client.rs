@@ -12,7 +12,7 @@ use line::{COMPANION, Line, OTHER_VEHICLE, VEHICLE};
 use proptest::prelude::*;
 
 const STATION: Address = Client::STATION;
-/// Long enough for every link in these tests.
+/// These retries last long enough for every link in these tests.
 const PATIENT: RetryPolicy = RetryPolicy { answer_ms: 600, tries: 60 };
 const LONG_MS: u64 = 60_000;
 /// Time after which no old frame is left on the line that could be taken for an answer to the next question \[ms\].

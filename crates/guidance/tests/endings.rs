@@ -82,7 +82,8 @@ fn it_asks_to_disarm_on_the_ground() {
     assert_eq!(asks(&mut fixture, 2000), []);
 }
 
-/// The guidance's own reasons against arming: battery unknown or low, failed sensors, outside the fence.
+/// The guidance has its own reasons against arming: the battery is unknown or low, sensors have failed, or the vehicle
+/// is outside the fence.
 #[test]
 fn what_bars_arming_has_its_limits() {
     let bars = |change: &dyn Fn(&mut Fixture)| {
@@ -309,8 +310,8 @@ fn a_mission_may_end_in_another_mode() {
     }
 }
 
-/// In altitude mode, horizontal position and velocity are the vehicle's own, the height is held, and the sticks command
-/// the lean.
+/// In altitude mode, the setpoint has the vehicle's own horizontal position and velocity. The height is held, and the
+/// sticks command the tilt.
 #[test]
 fn leaning_keeps_to_the_vehicle_horizontally() {
     let mut fixture = Fixture::flying(Settings::DEFAULT);

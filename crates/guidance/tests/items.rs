@@ -154,7 +154,7 @@ fn a_mission_flies_circles() {
     }
 }
 
-/// Absolute headings and relative angles, in both directions.
+/// Headings may be absolute or relative, in both directions.
 #[test]
 fn a_mission_turns() {
     let yaw = |yaw_rad, relative, direction| Item::Yaw { yaw_rad, relative, direction };

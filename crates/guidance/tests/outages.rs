@@ -129,7 +129,7 @@ impl Flight {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
-    /// Repeated outages of 0.2 to 60 s, with orders in between.
+    /// The state fails repeatedly for 0.2 to 60 s, and orders arrive in between.
     #[test]
     fn what_was_flown_goes_on_after_every_outage(
         flown in proptest::sample::select(FLOWN.to_vec()),
@@ -154,7 +154,7 @@ proptest! {
     }
 }
 
-/// Announcements around an outage of 6 s during a mission.
+/// The vehicle announces an outage of 6 s during a mission.
 #[test]
 fn an_outage_is_announced_from_its_beginning_to_its_end() {
     let mut flight = Flight::new(FlightMode::Mission);

@@ -174,7 +174,7 @@ fn check(flown: &Flown, second_flies: bool, works: [bool; 2], what: &str) {
     assert_eq!((flown.second_flies, flown.works), (second_flies, works), "{what}: {flown:?}");
 }
 
-/// For either sensor, and faults of any quantity, axis, size, time and onset, with or without a compass: the wrong
+/// Either sensor fails with a fault of any quantity, axis, size, time and onset, with or without a compass. The wrong
 /// sensor is soon out of use, and the right one never is.
 #[test]
 fn the_right_one_flies_of_two_that_disagree() {

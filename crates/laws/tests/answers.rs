@@ -141,8 +141,8 @@ fn turning_the_scene_about_the_vertical_changes_nothing_for_the_body() {
     }
 }
 
-/// PID's tilt is that of \[a_x, a_y, g\], whatever the height error does to the thrust. The thrust compensates the loss
-/// of vertical force by the tilt.
+/// PID tilts along \[a_x, a_y, g\], so the height error does not change the tilt. The thrust compensates the loss of
+/// vertical force by the tilt.
 #[test]
 fn the_height_of_pid_does_not_tilt_it_and_its_tilt_costs_no_height() {
     let mut random = Random(7);

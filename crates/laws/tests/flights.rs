@@ -91,7 +91,7 @@ fn all_follow_a_step() {
     steps("mpc", &mpc());
 }
 
-/// A circle of 2 m radius in 6 s with the nose along the velocity: 2.1 m/s, 2.2 m/s2.
+/// The vehicle flies a circle of 2 m radius in 6 s, with the nose along the velocity: 2.1 m/s and 2.2 m/s2.
 #[test]
 fn all_fly_a_circle() {
     let start = at([2.0, 0.0, 2.0], core::f64::consts::FRAC_PI_2);
@@ -107,8 +107,8 @@ fn all_fly_a_circle() {
     within("mpc", &figures(&mpc(), start), [0.001, 0.001, 0.001, 0.001]);
 }
 
-/// The paper's flight with its gusts and all four sign combinations of its uncertainties, with lag, delay and noise,
-/// evaluated from 5 s to 60 s.
+/// The laws fly the paper's flight with its gusts and all four sign combinations of its uncertainties, with lag, delay
+/// and noise. Errors count from 5 s to 60 s.
 #[test]
 fn all_fly_the_papers_flight() {
     for (inertia, thrust) in [(1.75, 0.6), (1.75, 1.4), (0.25, 0.6), (0.25, 1.4)] {
@@ -144,7 +144,7 @@ fn integrals_remove_the_steady_state_error() {
     assert!(left(&Dfbc::new(vehicle(), SETTINGS, dfbc::Gains::SUN_2022).unwrap()) > 0.05);
 }
 
-/// Starts rolled and pitched over, rotating and falling.
+/// The vehicle starts rolled and pitched over, rotating and falling.
 #[test]
 fn all_catch_a_vehicle_that_was_thrown() {
     fn figures<C: FlightController>(controller: &C) -> Figures {
@@ -249,7 +249,7 @@ fn jerk_and_snap_keep_indi_on_its_path() {
     }
 }
 
-/// The same for DFBC: without jerk and snap it is far off.
+/// DFBC without jerk and snap is far off, too.
 #[test]
 fn jerk_and_snap_keep_dfbc_on_its_path() {
     let gains = dfbc::Gains { rotor_time_constant_s: 0.0, ..dfbc::Gains::PAPER_VEHICLE };

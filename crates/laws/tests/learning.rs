@@ -122,7 +122,7 @@ fn l1_estimates_what_the_model_does_not_explain() {
     }
 }
 
-/// Rotation about one axis only: d rate/dt = (d/b)/Iz U3 + disturbance, with rotor lag.
+/// The vehicle rotates about one axis only: d rate/dt = (d/b)/Iz U3 + disturbance, with rotor lag.
 #[test]
 fn increments_cancel_a_constant_moment() {
     let controller = indi();

@@ -160,7 +160,7 @@ pub trait FrameHandler<M> {
     fn handle(&mut self, from: Address, message: M, payload: &[u8]);
 }
 
-/// A pair of closures handles frames by the first, which accepts them, and the second, which gets the message.
+/// In a pair of closures, the first accepts frames, and the second handles their messages.
 impl<M, A: FnMut(&ReceivedFrame<'_>) -> bool, H: FnMut(Address, M, &[u8])> FrameHandler<M> for (A, H) {
     fn accepts(&mut self, frame: &ReceivedFrame<'_>) -> bool {
         (self.0)(frame)

@@ -23,7 +23,7 @@ impl MissionType {
     pub const FENCE: MissionType = MissionType(1);
     /// Rally points.
     pub const RALLY: MissionType = MissionType(2);
-    /// All of these; only for clearing.
+    /// Mission, geofence and rally points together. Only a request to clear may use it.
     pub const ALL: MissionType = MissionType(255);
 }
 

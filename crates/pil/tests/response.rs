@@ -16,8 +16,8 @@ fn responses(tasks: &[PeriodicTask]) -> Vec<Option<u64>> {
     (0..tasks.len()).map(|index| worst_response_ns(tasks, index)).collect()
 }
 
-/// Examples of Burns and Wellings, Real-Time Systems and Programming Languages. Periods 7, 12, 20 and costs 3, 3, 5
-/// give responses 3, 6, 20. Periods 80, 40, 20 and costs 40, 10, 5 give responses 80, 15, 5 at a load of 1.
+/// The examples are from Burns and Wellings, Real-Time Systems and Programming Languages. Periods 7, 12, 20 and costs
+/// 3, 3, 5 give responses 3, 6, 20. Periods 80, 40, 20 and costs 40, 10, 5 give responses 80, 15, 5 at a load of 1.
 #[test]
 fn textbook_examples() {
     assert_eq!(responses(&tasks(&[(1, 7, 3), (2, 12, 3), (3, 20, 5)])), [Some(3), Some(6), Some(20)]);

@@ -158,7 +158,7 @@ fn rest_is_felt_as_gravity_upward() {
     }
 }
 
-/// Drag of the paper's vehicle that slides through still air: blades and body, written out.
+/// The drag of the paper's vehicle that slides through still air is calculated separately for blades and body.
 #[test]
 fn drag_is_felt() {
     let initial = Motion { velocity_m_s: Vector3::new(4.0, 0.0, 0.0), ..Motion::default() };

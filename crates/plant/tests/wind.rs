@@ -131,7 +131,7 @@ fn coarse_steps_have_the_dryden_autocovariance() {
     check_turbulence(1.0, 50.0, 0.02);
 }
 
-/// The slope of the longitudinal spectrum, from the structure function at one millisecond: E (du)^2 = 2 sigma^2 V dt/L.
+/// The structure function at one millisecond gives the slope of the longitudinal spectrum: E (du)^2 = 2 sigma^2 V dt/L.
 #[test]
 fn a_millisecond_of_turbulence_is_as_rough_as_it_should_be() {
     let (height_m, speed, step_s, n) = (5.0, 6.0, 0.001, 1_000_000_u32);

@@ -205,7 +205,7 @@ fn a_footer_or_flag_that_is_none_spoils_a_frame() {
     }
 }
 
-/// Values computed by hand from the specification's table.
+/// The values are computed by hand from the specification's table.
 #[test]
 fn link_statistics_are_read() {
     let payload = [80, 70, 99, (-5i8) as u8, 1, 2, 3, 90, 98, 4];
@@ -226,7 +226,7 @@ fn link_statistics_are_read() {
     assert_eq!(crsf(raw.data()), [CrsfFrame::LinkStatistics(expected)]);
 }
 
-/// Payloads as specified: big-endian, in the protocol's units, pitch before roll.
+/// The payloads are as specified: big-endian, in the protocol's units, pitch before roll.
 #[test]
 fn telemetry_is_laid_out_as_specified() {
     let payload = |telemetry: CrsfTelemetry<'_>| {

@@ -146,7 +146,7 @@ fn declared(formats: &[String], times: u16) -> Vec<u8> {
     log.bytes
 }
 
-/// A few bytes that declare very much: each would take minutes, or all memory, if laid out as declared.
+/// A few bytes declare very long messages. Each log would take minutes, or all memory, if it were laid out as declared.
 #[test]
 fn what_would_take_for_ever_does_not() {
     let nested = |count: usize, many: &str| -> Vec<String> {

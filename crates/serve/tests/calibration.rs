@@ -235,8 +235,8 @@ fn calibration_and_flight_exclude_each_other() {
     assert!(served.parameters.is_empty());
 }
 
-/// Reasons of failures: a dead sensor, a vehicle that is tilted, missing magnetometer readings, and a calibration that
-/// does not exist.
+/// A failed calibration tells its reason: a dead sensor, a tilted vehicle, missing magnetometer readings, or a
+/// calibration that does not exist.
 #[test]
 fn reasons_are_told() {
     let mut served = Served::new(cheap, 13);

@@ -123,7 +123,8 @@ fn velocity_and_rates_are_those_of_the_plant() {
     }
 }
 
-/// The Crazyflie's and the racer's rotor lags: the observer assumes the true lag, then the paper's.
+/// The vehicle has the rotor lag of the Crazyflie, then of the racer. The observer assumes the true lag, then the
+/// paper's.
 #[test]
 fn rates_are_observed_better_with_the_vehicles_own_rotors() {
     for (lag_s, gain) in [(0.072, 1.3), (0.033, 1.04)] {

@@ -52,7 +52,7 @@ impl FleetArgs<'_> {
                 );
             }
         }
-        // Checked before the search, which takes hours.
+        // The files are checked before the search, which takes hours.
         if let Some(folder) = self.write {
             written(&vehicles).try_for_each(|vehicle| with_gains(folder, &vehicle.name, "").map(drop))?;
         }

@@ -30,9 +30,9 @@ static WIRINGS: LazyLock<[Vec<Wire>; 2]> = LazyLock::new(|| {
 #[derive(Debug)]
 pub struct BoardChip {
     pub stm32: Stm32f427,
-    /// Bus slot of the sensors' I2C, with control and count registers of the DMA stream that receives from it; below,
-    /// the slot of DMA1.
+    /// Bus slot of the sensors' I2C, with the control and count registers of the DMA stream that receives from it.
     i2c: Option<(usize, [Register; 2])>,
+    /// Bus slot of DMA1.
     dma: usize,
 }
 

@@ -454,7 +454,7 @@ fn rough_samples_count_for_a_while() {
     assert!(!memory.stands());
 }
 
-/// Every plausibility limit, in every coordinate and with both signs.
+/// Every plausibility limit is tested in every coordinate and with both signs.
 #[test]
 fn the_door_has_bounds() {
     let one = |k: usize, x: f32| Vector3::from_fn(|i, _| if i == k { x } else { 0.0 });

@@ -380,7 +380,7 @@ fn a_start_in_the_air_is_as_told() {
     assert_eq!(memory.covariance.slow.variance, SlowErrors::zeros());
 }
 
-/// Each limit of the alignment, just within and just beyond.
+/// Each limit of the alignment is tested just within and just beyond.
 #[test]
 fn an_alignment_has_limits() {
     let settings = Settings::DEFAULT;

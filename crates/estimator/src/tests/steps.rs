@@ -363,7 +363,7 @@ fn rest_is_a_measurement() {
     }
 }
 
-/// Each limit of validity, in every coordinate.
+/// Each limit of validity is tested in every coordinate.
 #[test]
 fn validity_has_limits() {
     let s = Settings::DEFAULT;

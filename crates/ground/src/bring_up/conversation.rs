@@ -89,7 +89,7 @@ impl<'a> Conversation<'a> {
         loop {
             match self.client.state(command) {
                 Some(CommandState::Waiting) => self.exchange()?,
-                // The answer came during the last millisecond: count this one, too.
+                // The answer came during the last millisecond, so this millisecond counts too.
                 Some(CommandState::Answered { answer, after_ms }) => return Ok(Some((answer, after_ms + 1))),
                 Some(CommandState::Silent) | None => return Ok(None),
             }

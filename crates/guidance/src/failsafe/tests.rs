@@ -144,7 +144,7 @@ fn what_is_new_is_announced() {
     }
 }
 
-/// Hysteresis: the vehicle stays "outside" until it is inside by a margin. Unknown positions change nothing.
+/// A vehicle that was outside stays "outside" until it is inside by a margin. Unknown positions change nothing.
 #[test]
 fn a_fence_is_left_and_entered_with_a_margin() {
     let failsafe = FailsafeSettings { fence_radius_m: 10.0, fence_height_m: 20.0, ..FailsafeSettings::DEFAULT };

@@ -40,7 +40,7 @@ impl Page {
     fn new(a: f32, j: f32) -> Self {
         let (a, j) = (f64::from(a), f64::from(j));
         let (b, eased) = (0.7 * a, 0.9 * j);
-        // c = 2 B^2/J', unless k1 = B/c would exceed its limit.
+        // c is 2 B^2/J', but large enough that k1 = B/c does not exceed its limit.
         let c = (2.0 * b * b / eased).max(b / 12.0);
         let k2 = 4.0 * b / c;
         let settling = 0.55 * j;

@@ -60,7 +60,8 @@ mod tests {
         }
     }
 
-    /// Gaps of any length, old values of slow topics at the beginning, slow topics alone, and logs of a few messages.
+    /// Logs may have gaps of any length, old values of slow topics at the beginning, slow topics alone, or only a few
+    /// messages.
     #[test]
     fn what_real_logs_have_is_kept() {
         let gap: Vec<u64> = (0..100).map(|index| 10_000 * index + if index < 50 { 0 } else { 3_600_000_000 }).collect();

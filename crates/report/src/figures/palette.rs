@@ -207,7 +207,7 @@ mod tests {
         libm::sqrt(dl * dl + dc * dc + dh * dh + rotation * dc * dh)
     }
 
-    /// Pairs of the table in Sharma, Wu and Dalal 2005.
+    /// The pairs are from the table in Sharma, Wu and Dalal 2005.
     #[test]
     fn differences_of_colors_are_the_published_ones() {
         for (a, b, published) in [

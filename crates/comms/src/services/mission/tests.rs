@@ -144,7 +144,7 @@ fn only_the_station_in_control_changes_it() {
     assert_eq!(missions.hear(MissionMessage::SetCurrent(0), B, false, 0, &NOWHERE), Heard::default());
     let denied = |plan| (MissionMessage::Ack(MissionResult::DENIED, plan), B);
     assert_eq!(said(&mut missions), [denied(PLAN), denied(MissionType::ALL)]);
-    // Nor can another station add items to the upload.
+    // Another station cannot add items to the upload.
     missions.hear(MissionMessage::Count(2, PLAN), A, true, 0, &NOWHERE);
     said(&mut missions);
     missions.hear(MissionMessage::Item(waypoint(0), PLAN), B, false, 0, &NOWHERE);

@@ -136,7 +136,8 @@ fn a_takeoff_item_climbs_to_its_height() {
     }
 }
 
-/// A landing item begins to land over its place, within 1 m and slow; without a place, at once.
+/// A landing item begins to land when the vehicle is slow and within 1 m of its place. Without a place, it begins at
+/// once.
 #[test]
 fn a_landing_item_flies_over_its_place() {
     let place = Vector3::new(20.0, 30.0, -7.0);
