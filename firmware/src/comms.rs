@@ -168,7 +168,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
                 if radio::is_possible::<B>()
                     && let Some(radio) = radio
                 {
-                    // Called without bytes too, so that a silent receiver is noticed.
+                    // The receiver is called without bytes too, so that a silent receiver is noticed.
                     if let Some(news) = radio.receive(comms, &[], table) {
                         pass_on::<B>(&news, log);
                     }
@@ -215,7 +215,7 @@ fn look_at_sensors<B: Board>(comms: &mut Comms, table: &ParameterTable, now_us: 
     }
     report_self_tests(comms, &mut aux);
     comms.set_aux_sensors(aux);
-    // Also passed on when there is no battery state any more.
+    // The battery is also passed on when there is no battery state any more.
     let battery = comms.battery();
     control::with_mail(|inputs| inputs.battery = battery);
 }
@@ -255,7 +255,7 @@ fn hear<B: Board>(
 ) -> ControlInputs {
     match black_box {
         Some(black_box) if B::HAS_LOG => comms.receive_with_logs(decoder, bytes, &mut black_box.server),
-        // Unreachable on a board with logs; spares its image a second copy of the receiver.
+        // This arm is unreachable on a board with logs. It spares the image a second copy of the receiver.
         _ if B::HAS_LOG => ControlInputs::EMPTY,
         _ => comms.receive(decoder, bytes),
     }

@@ -85,8 +85,8 @@ pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
     let (mut messages, mut inputs, mut before) = (ControlInputs::EMPTY, TickInputs::default(), TickBefore::default());
     let mut details = if recording::is_possible::<B>() { ticks::details_in() } else { None };
     loop {
-        // Not a `Ticker`, whose periods begin when it is created. Alarms are due just after a control period starts,
-        // so a ticker would tick twice in every second period.
+        // A `Ticker` is not used, because its periods begin when it is created. Alarms are due just after a control
+        // period starts, so a ticker would tick twice in every second period.
         Timer::at(time::next_period()).await;
         let stopwatch = Stopwatch::start();
         let report = tick(flight, &mut messages, &mut inputs, &mut before, board);
@@ -183,7 +183,7 @@ fn tick<B: Board>(
         let (mail, next) = &mut *shared;
         mail.take_into(messages);
         if recording::is_possible::<B>() {
-            // Stored in place: returned with the report, the number would make the tick copy the report.
+            // The number is stored in place. Returned with the report, it would make the tick copy the report.
             inputs.number = *next;
             *next = next.wrapping_add(1);
         }

@@ -83,7 +83,7 @@ pub(crate) fn reports(table: &ParameterTable) -> &'static mut EscReports {
 
 /// Requests that the notch filter be moved before the next tick.
 pub(crate) fn move_notch(notch: VelocityNotch) {
-    // Set before the flag, since the control tick may run in between.
+    // The notch is set before the flag, since the control tick may run in between.
     NOTCH.lock(|cell| cell.set(Some(notch)));
     MOVES.store(true, Ordering::Relaxed);
 }

@@ -74,8 +74,8 @@ pub fn run<B: Board>(
     let configuration = table.configuration();
     board.set_motor_protocol(configuration.outputs.protocol, configuration.escs.answers);
     let flight = control::make(table.configuration());
-    // Not started earlier, because the start may erase flash for half a second or more, during which no tick feeds the
-    // watchdog.
+    // The watchdog does not start earlier, because the start may erase flash for half a second or more, during which no
+    // tick feeds it.
     board.unleash_watchdog();
     time::start(core.SYST, B::CORE_HZ);
     comms(executors.comms, parts, links);

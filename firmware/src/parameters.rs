@@ -85,7 +85,7 @@ impl<M: NorFlash> NorFlash for Gate<M> {
     const ERASE_SIZE: usize = M::ERASE_SIZE;
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), Shut> {
-        // Not gated: flash is erased only at the start, before the vehicle can arm.
+        // Erasing is not gated, because flash is erased only at the start, before the vehicle can arm.
         self.0.erase(from, to).map_err(|error| Shut::Flash(error.kind()))
     }
 

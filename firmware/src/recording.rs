@@ -47,7 +47,8 @@ impl ExactLog {
         Some(log)
     }
 
-    // Not generic, since code generic in the board is compiled in the board's crate and optimized for speed.
+    // This function is not generic, since code generic in the board is compiled in the board's crate and optimized for
+    // speed.
     #[inline(never)]
     fn start(&mut self, table: &ParameterTable) {
         self.queue.start([NAME, LAW], table);

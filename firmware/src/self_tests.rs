@@ -25,7 +25,7 @@ pub struct Asked(u32);
 impl Asked {
     /// True once per request, if the vehicle is disarmed.
     pub fn is_new(&mut self) -> bool {
-        // Also stored while armed, so that the self-test does not begin later, when the vehicle disarms.
+        // The request is also stored while armed, so that the self-test does not begin later, when the vehicle disarms.
         let asked = ASKED.load(Ordering::Relaxed);
         core::mem::replace(&mut self.0, asked) != asked && !control::armed()
     }

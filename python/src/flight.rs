@@ -55,7 +55,7 @@ impl PyFlight {
 #[pyfunction]
 pub(crate) fn _flight(py: Python<'_>, told: FlightSummary, columns: Py<PyDict>) -> PyResult<PyFlight> {
     let kept = PyOnceLock::new();
-    // Cannot fail, since the cell is new and empty.
+    // The call cannot fail, since the cell is new and empty.
     let _ = kept.set(py, columns);
     Ok(PyFlight { told, flown: None, columns: kept })
 }

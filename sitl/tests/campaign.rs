@@ -26,7 +26,7 @@ const BAD: [(&str, &str, &str); 22] = [
     ("flights = 150", "flights = 1.5", ":3: flights: 1.5 is not a whole number"),
     ("flights = 150", "flight = 150", ":3: flight: unknown key; did you mean flights?"),
     ("seed = 7", "seed = -1", ":4: seed: -1 is out of range"),
-    // Must not be rounded to the nearest float, which may be the largest seed or one above it.
+    // A seed must not be rounded to the nearest float, which may be the largest seed or one above it.
     ("seed = 7", "seed = 9007199254740992", ":4: seed: 9007199254740992 is out of range: it must lie within 0 to 9.0"),
     ("seed = 7", "seed = 9007199254740993", ":4: seed: 9007199254740993 is out of range"),
     ("seed = 7", "seed = 0x20000000000000", ":4: seed: 0x20000000000000 is out of range"),

@@ -362,7 +362,7 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
     }
 
     /// Computes the input of one subsystem and its errors.
-    // Always inlined, so that all subsystems share common computations.
+    // This function is always inlined, so that all subsystems share common computations.
     #[inline(always)]
     fn input(
         &self,

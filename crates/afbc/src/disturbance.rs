@@ -264,7 +264,7 @@ impl MomentObserver {
         let rest = bandwidth.map(|w| 1.0 - math::exp(-w * dt_s));
         let lag_s = settings.disturbance_lag_s + AGE_S;
         let effectiveness = vehicle.effectiveness();
-        // As much as the rotors can compensate.
+        // The observed acceleration is limited to what the rotors can compensate.
         let acceleration_max = effectiveness * (0.5 * thrust_max_n);
         (tilt + yaw > 0.0).then(|| MomentObserver {
             rate: rest * 2.0,

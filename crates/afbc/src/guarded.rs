@@ -81,7 +81,7 @@ impl<const N: usize> Guarded<N> {
     /// Returns the first parameter, setting, gain or bound that is out of range. Also returns `rotor_force_max_n` if
     /// the rotors cannot lift the vehicle [with a margin](afbc_control::mixer::HOVER_MARGIN), `theta_max` of z if it
     /// leaves no room for a hover on weak rotors, and [`HOVER_AUTHORITY`] if the rotors turn the vehicle too slowly.
-    // Always inlined: otherwise the result would be on the firmware's start-up stack twice.
+    // This function is always inlined: otherwise the result would be on the firmware's start-up stack twice.
     #[inline(always)]
     pub fn new(
         vehicle: impl Into<Airframe<N>>,

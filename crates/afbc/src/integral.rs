@@ -88,7 +88,7 @@ impl SubsystemLaw for IntegralBackstepping {
         if let Some(input) = integral.resume.take() {
             integral.value = input - fixed;
         }
-        // Limited where it is used, because the input to resume may also ask for more than the bound.
+        // The integral is limited where it is used, because the input to resume may also ask for more than the bound.
         let i = math::min(math::max(integral.value, -integral_max), *integral_max);
         let winds_up = errors.e2 * context.unallocated[axis] > 0.0;
         integral.value = if context.adapt && !winds_up { i + kappa * errors.e2 * context.dt_s } else { i };
@@ -100,7 +100,7 @@ impl SubsystemLaw for IntegralBackstepping {
     }
 
     fn hover_thrust_n(&self, z: &IntegralMemory, weight_n: f32, _: f32) -> f32 {
-        // Not weight plus integral, which would include the thrust of manoeuvres.
+        // The weight plus the integral would include the thrust of manoeuvres.
         z.hover_thrust_n.unwrap_or(weight_n)
     }
 }

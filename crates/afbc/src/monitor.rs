@@ -259,7 +259,7 @@ impl Monitor {
             Axis::Pitch => Some(pitch),
             Axis::Yaw => Some(yaw),
             Axis::Z => Some(thrust),
-            // X has no input of its own, so the round of U3 ends in its step.
+            // X has no input of its own, so the round of the yaw input ends in the step of X.
             Axis::X => {
                 yaw.advance(figures.yaw.end_round(self.follow), swing_n);
                 None

@@ -174,7 +174,7 @@ proptest! {
         for _ in 0..lasting {
             last_of_fallback = step(&controller, &mut memory, &state, &setpoint);
         }
-        // Otherwise the vehicle may stand on the ground by then, where nothing trips.
+        // With less thrust, the vehicle may stand on the ground by then, where nothing trips.
         prop_assume!(last_of_fallback.trace.inputs.thrust_n >= LIFT_SHARE * WEIGHT_N);
         controller.engage(&mut memory.control);
         let first_of_afbc = step(&controller, &mut memory, &state, &setpoint);

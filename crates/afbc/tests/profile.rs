@@ -26,7 +26,7 @@ fn the_printed_gains_are_those_of_section_iv() {
         assert_eq!(membership, Membership { centre, width }, "{axis:?}");
         assert_eq!((epsilon, backstepping.stiffness, safeguards), (0.001, 1.0, Safeguards::NONE), "{axis:?}");
     }
-    // Nothing that is not in the paper.
+    // The paper's profile has nothing that is not in the paper.
     let Settings { limits, tilt_by_thrust, anti_windup, freeze_on_ground, bumpless, feed_forward, .. } =
         Profile::Paper.settings();
     assert_eq!(limits, PositionControlLimits::NONE);
@@ -63,7 +63,7 @@ fn the_robust_term_leaves_half_of_the_limit() {
     }
 }
 
-/// As slow as the rotors, but no faster than those for which the profile is tuned.
+/// The profile is as slow as the rotors, but never faster than the rotors for which it is tuned.
 #[test]
 fn slowness_is_the_delay_over_that_of_the_papers_vehicle() {
     assert_eq!([0.0, 0.5, 1.0].map(|share| slowness(share * LAG_S)), [1.0; 3]);

@@ -14,9 +14,10 @@ const RESIDUAL_MAX: f64 = 0.06;
 /// The ellipsoid is used only if its squared residuals are below this share of the sphere's, because it has five more
 /// parameters.
 const WORTH: f64 = 0.8;
-/// Smallest 27 det C of the directions' second moments C (1 if even), and largest norm of their mean (0 if even). A
-/// ring at a third of the radius has 0.5 and 0.33, half a sphere 1 and 0.5.
+/// Smallest 27 det C, where C has the second moments of the directions. Even directions have 1, a ring at a third of
+/// the radius 0.5, half a sphere 1.
 const EVENNESS_MIN: f64 = 0.7;
+/// Largest norm of the mean direction. Even directions have 0, a ring at a third of the radius 0.33, half a sphere 0.5.
 const MEAN_MAX: f64 = 0.25;
 /// Smallest number of readings.
 const READINGS_MIN: f64 = 30.0;

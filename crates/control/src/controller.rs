@@ -67,7 +67,7 @@ pub trait FlightController<const N: usize = 4> {
 
     /// Runs one step from a measurement that may be missing, implausible or not finite: [`FlightController::decide`]
     /// behind a [`Screen`](crate::Screen). [`Action::health`] reports rejected inputs.
-    // Always inlined: copying the action out of a call costs a tenth of a closed-loop step.
+    // This function is always inlined: copying the action out of a call costs a tenth of a closed-loop step.
     #[inline(always)]
     fn step(&self, memory: &mut Validated<Self::Memory>, measured: Option<&State>, setpoint: &Setpoint) -> Action<N> {
         let mut screened = Health::default();

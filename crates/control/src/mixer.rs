@@ -240,7 +240,7 @@ impl<const N: usize> Mixer<N> {
 
     /// Returns rotor forces that give `inputs` within the rotors' limits. NaN counts as 0, and is reported as
     /// saturation.
-    // Always inlined, like its callees: the allocation stays in registers instead of being copied.
+    // This function is always inlined, like its callees: the allocation stays in registers instead of being copied.
     #[inline(always)]
     pub fn allocate(&self, inputs: &Inputs) -> Allocation<N> {
         let tilt = self.tilt(inputs);

@@ -82,7 +82,7 @@ impl Smoother {
     }
 
     /// Returns the filtered inputs. Returns the first inputs, and inputs that are not finite, unchanged.
-    // Always inlined: a result returned in memory would be read back before it has been written.
+    // This function is always inlined: a result returned in memory would be read back before it has been written.
     #[inline(always)]
     pub fn advance(&self, last: &mut Option<Smoothed>, inputs: &Inputs) -> Inputs {
         let Some([tilt, yaw, lift]) = self.shares else { return *inputs };

@@ -21,7 +21,7 @@ fn even_sweep(from: f32, to: f32, count: u32) -> impl Iterator<Item = f32> {
 fn worst(points: impl Iterator<Item = f32>, error: impl Fn(f32) -> f64) -> (f64, f32) {
     points.fold((0.0, 0.0), |(largest, at), x| {
         let e = error(x);
-        // Written so that NaN counts as the worst.
+        // The comparison counts NaN as the worst.
         if e <= largest { (largest, at) } else { (e, x) }
     })
 }

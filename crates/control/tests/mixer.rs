@@ -317,7 +317,8 @@ proptest! {
             yaw * asked[2] >= -1e-5 * limit && yaw.abs() <= asked[2].abs() + 1e-5 * limit,
             "{yaw} for {asked:?}"
         );
-        // As much yaw as keeps the pair of rotors with the widest difference within the limit it moves towards.
+        // Yaw is given as far as the pair of rotors with the widest difference stays within the limit that it moves
+        // towards.
         let pair = |p: &Rotor, q: &Rotor| difference(p, q).abs() * share / 2.0;
         let (up, down) =
             if (asked[2] > 0.0) == a.pushes_left { (pair(&a, &c), pair(&b, &d)) } else { (pair(&b, &d), pair(&a, &c)) };

@@ -144,7 +144,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         if self.faults == 0 {
             return false;
         }
-        // Not for a part that is late or stuck: its registers may be correct, but only a set-up helps.
+        // A part that is late or stuck is not checked, since its registers may be correct, and only a set-up helps.
         let did_not_answer = matches!(
             self.last_fault,
             Some(

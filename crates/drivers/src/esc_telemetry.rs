@@ -181,7 +181,7 @@ impl EscLine {
             self.answer.clear();
         }
         self.heard_us = now_us;
-        // Cannot overflow: a complete answer ends the request, and the next request clears it.
+        // The answer cannot overflow. A complete answer ends the request, and the next request clears it.
         let _ = self.answer.push(byte);
         let answer: &[u8; ANSWER_LEN] = self.answer.as_slice().try_into().ok()?;
         let reading = EscReading::from_bytes(answer);

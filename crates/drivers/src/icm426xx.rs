@@ -60,8 +60,8 @@ impl<const IDENTITY: u8, const POLLED: bool> SensorPart for Icm426xx<IDENTITY, P
     const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0x80, write: 0, dummies: 0, clock_hz: 24_000_000 });
     const I2C: &'static [u8] = &[];
     const STUCK_AFTER: u32 = 20;
-    /// As in TDK's own driver for the family: 250 deg/s and 2 g, all six axes at once. The factory's responses are in
-    /// banks 1 and 2.
+    /// Self-test as in TDK's own driver for the family: 250 deg/s and 2 g, all six axes at once. The factory's
+    /// responses are in banks 1 and 2.
     const SELF_TEST: Option<SelfTest<InertialReading>> = Some(SelfTest {
         quiet: &[
             ScriptStep::Write(GYRO_CONFIG0, if POLLED { 0x64 } else { 0x66 }),

@@ -35,7 +35,7 @@ impl SensorPart for Lis3mdl {
     const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0xC0, write: 0x40, dummies: 0, clock_hz: 10_000_000 });
     const I2C: &'static [u8] = &[0x1E, 0x1C];
     const STUCK_AFTER: u32 = 20;
-    /// As in the data sheet: at 12 gauss and 80 Hz, the part applies a field of its own to each axis.
+    /// Self-test as in the data sheet. At 12 gauss and 80 Hz, the part applies a field of its own to each axis.
     const SELF_TEST: Option<SelfTest<MagneticReading>> = Some(SelfTest {
         quiet: &[ScriptStep::Write(CTRL_REG1, 0x1C), ScriptStep::Write(CTRL_REG2, 0x40), ScriptStep::Wait(20_000)],
         trims: &[],

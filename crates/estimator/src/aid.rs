@@ -102,9 +102,9 @@ impl FrozenPoseDetector {
 pub(crate) enum ResetDelay {
     /// A short time, because no other aid holds the state.
     Soon,
-    /// The full reacquire time, because another aid holds the state meanwhile.
+    /// The aid waits for the full reacquire time, because another aid holds the state meanwhile.
     Late,
-    /// Never while the contradicting aids are alive.
+    /// The aid never resets the state while the contradicting aids are alive.
     Never,
 }
 

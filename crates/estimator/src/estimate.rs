@@ -60,18 +60,18 @@ pub struct Resets {
 /// Number of measurements dropped before the gate, each up to `u32::MAX`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DroppedMeasurements {
-    /// Not finite, outside the plausible range, or with an unusable standard deviation.
+    /// Measurements that were not finite, outside the plausible range, or with an unusable standard deviation.
     pub implausible: u32,
-    /// Older than 270 ms when its turn came, or older than the oldest stored state.
+    /// Measurements older than 270 ms when their turn came, or older than the oldest stored state.
     pub late: u32,
-    /// More than 20 ms in the future.
+    /// Measurements more than 20 ms in the future.
     pub early: u32,
-    /// Not newer than the last measurement of the same kind.
+    /// Measurements that were not newer than the last one of the same kind.
     pub overtaken: u32,
-    /// Pushed out of the full queue.
+    /// Measurements that were pushed out of the full queue.
     pub crowded: u32,
-    /// Magnetic field whose strength or inclination differs from that at the start. Every field counts if the vehicle's
-    /// own field may be as large as the earth's.
+    /// Magnetic fields whose strength or inclination differs from that at the start. Every field counts if the
+    /// vehicle's own field may be as large as the earth's.
     pub disturbed: u32,
     /// Pose of a tracker or field of a magnetometer that has repeated for too long.
     pub frozen: u32,

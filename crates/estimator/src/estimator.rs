@@ -110,7 +110,8 @@ impl Estimator {
     /// Runs one step; call it every millisecond. Takes the newest IMU sample if there is one, predicts the covariance
     /// or fuses measurements, and returns the estimate at the time of the last sample. `now_us` is the time since
     /// power-up. The step cannot fail: the estimate is finite for any input.
-    // Always inlined, so that the caller computes only the parts of the estimate that it uses and copies none.
+    // This function is always inlined, so that the caller computes only the parts of the estimate that it uses and
+    // copies none.
     #[inline(always)]
     #[must_use = "the estimate is its only result"]
     pub fn step(&self, memory: &mut Memory, now_us: u64, imu: Option<&ImuSample>) -> Estimate {

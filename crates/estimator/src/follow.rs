@@ -172,7 +172,8 @@ impl Memory {
         self.nominal.turn_to(normalized(&(turn * self.nominal.attitude)));
         // Rotates the attitude at the covariance's time too, since the next prediction averages both.
         self.rotation = matrix(&turn) * self.rotation;
-        // Not added to the linear sum of corrections, for which the turn may be too large. Position and velocity stay.
+        // The turn is not added to the linear sum of corrections, for which it may be too large. Position and velocity
+        // stay.
         self.history.correct(&turn, &NONE, &NONE, &NONE);
         self.covariance.turn(&matrix(&turn));
         self.yaw_bank.turn_at_once(by);

@@ -32,7 +32,7 @@ pub const BACK_COUNT: u8 = 3;
 pub const BACK_US: u64 = 15_000;
 /// Largest spread of these messages' offsets \[us\].
 pub const BACK_SPREAD_US: u64 = 3_000;
-/// As [`AHEAD_COUNT`], among the first [`NEW_COUNT`] messages of a sender, which may all have been late.
+/// Like [`AHEAD_COUNT`], for the first [`NEW_COUNT`] messages of a sender, which may all have been late.
 pub const AHEAD_COUNT_NEW: u8 = 2;
 /// Number of a sender's first messages to which [`AHEAD_COUNT_NEW`] applies.
 pub const NEW_COUNT: u8 = 10;
@@ -104,7 +104,7 @@ impl SourceClock {
             known.arrived_us = arrived_us;
             return Some(arrived_us);
         }
-        // Cannot underflow: older and equal stamps have returned above.
+        // The difference cannot underflow, because older and equal stamps have returned above.
         known.tick_us = known.tick_us.min(sent_us - known.sent_us);
         let at_us = known.stamp(sent_us, arrived_us);
         if !goes_on_back {
@@ -156,7 +156,7 @@ impl KnownOffset {
         } else {
             self.least_us = [offset_us.min(present_us), before_us];
         }
-        // Never negative: this offset is in the window. Larger than u64 means as late as can be.
+        // The delay is never negative, because this offset is in the window. Beyond u64, it is as late as can be.
         let late_us = u64::try_from(offset_us - self.fastest_us()).unwrap_or(u64::MAX);
         // A coarse stamp may be early by up to the clock's resolution, which is no delay.
         let doubt_us = if arrived_us < self.coarse_until_us { self.tick_us } else { 0 };
@@ -171,7 +171,7 @@ impl KnownOffset {
         let step = self.step.filter(goes_on).unwrap_or(new);
         // Use the slowest: with the fastest, one outlier among them would make all later messages look late.
         let slowest_us = step.offset_us.max(offset_us);
-        // Cannot overflow: the step is complete at the fifth message.
+        // The count cannot overflow, because the step is complete at the fifth message.
         let (count, needed) = (step.count + 1, if self.heard < NEW_COUNT { AHEAD_COUNT_NEW } else { AHEAD_COUNT });
         // Do not keep an outlier's stamp: the next correct one would count as out of order.
         self.arrived_us = arrived_us;

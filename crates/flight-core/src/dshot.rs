@@ -71,7 +71,7 @@ impl Timing {
     /// Computes the pulse lengths for a timer that counts at `clock`.
     pub const fn new(clock: TimerClock, rate: DshotRate) -> Self {
         const fn counts(clock: TimerClock, rate: DshotRate, numerator: u32, denominator: u32) -> u16 {
-            // Cannot overflow: three times 500 MHz and half a divisor are below 2^32.
+            // The sum cannot overflow: three times 500 MHz and half a divisor are below 2^32.
             let rate_hz = rate as u32 * denominator;
             ((clock.hz() * numerator + rate_hz / 2) / rate_hz) as u16
         }

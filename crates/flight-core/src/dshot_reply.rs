@@ -101,7 +101,7 @@ impl DshotReply {
         let (mut code, mut at) = (0_u32, 0_u32);
         for time in times {
             let counts = u32::from(time.wrapping_sub(*last));
-            // Not zero: `bit_counts` was checked above.
+            // The divisor is not zero, since `bit_counts` was checked above.
             let bits = (counts + u32::from(bit_counts) / 2) / u32::from(bit_counts);
             if bits == 0 {
                 return Err(ReplyError::Timing);

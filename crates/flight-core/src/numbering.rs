@@ -32,7 +32,7 @@ pub fn rotors_of_outputs<const OUTPUTS: usize>(numbering: [Corner; 4], rotors: &
     let rotor_in = |corner| rotors.iter().position(|rotor| self::corner(&rotor) == Some(corner));
     let is_x = rotors.count() == numbering.len() && numbering.iter().all(|corner| rotor_in(*corner).is_some());
     array::from_fn(|output| match numbering.get(output) {
-        // Always found: `is_x` has checked every corner.
+        // The rotor is always found, since `is_x` has checked every corner.
         Some(corner) if is_x => rotor_in(*corner).unwrap_or(output),
         _ => output,
     })

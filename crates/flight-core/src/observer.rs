@@ -117,7 +117,7 @@ impl PoseObserver {
     pub fn advance(&mut self, dead_reckoning: &DeadReckoning, reckoning: &Reckoning, applied: &Inputs) {
         let DeadReckoning { dt_s, rotor_share, .. } = *dead_reckoning;
         let (least, most) = (TRIM_SHARE.0 * dead_reckoning.weight_n, TRIM_SHARE.1 * dead_reckoning.weight_n);
-        // Must not be zero, since it is a divisor below: the trimmed thrust may fall to nothing.
+        // The trim is a divisor below, so it must not be zero. The trimmed thrust may fall to nothing.
         let trim_n = min(max(reckoning.trim.thrust_n, least), most);
         self.thrust_n = settled(self.thrust_n + (applied.thrust_n - self.thrust_n) * rotor_share);
         self.yaw_n = settled(self.yaw_n + (applied.yaw_n - self.yaw_n) * rotor_share);
@@ -145,7 +145,7 @@ impl PoseObserver {
         let since_us = pose.at_us.saturating_sub(self.pose.at_us);
         self.pose = *pose;
         let [w, x, y, z] = pose.value.attitude;
-        // Must not be zero, since it is a divisor: the first pose may be older than the starting state.
+        // The period is a divisor, so it must not be zero. The first pose may be older than the starting state.
         let since_s = since_us.max(1_000) as f32 * 1e-6;
         // Extrapolate back to the time of the pose.
         let late_s = pose.age_us(now_us).min(LATE_US) as f32 * 1e-6;

@@ -108,7 +108,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
     ///
     /// # Errors
     /// As [`new`](Self::new), and the rotors' time constant out of range.
-    // Always inlined: otherwise the result is twice on the stack of the firmware's start-up.
+    // This function is always inlined: otherwise the result is twice on the stack of the firmware's start-up.
     #[inline(always)]
     pub fn with_rotors(
         parameters: Parameters,
@@ -132,7 +132,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
     }
 
     /// Runs one tick. Call it every millisecond. `now_us` is the time since power-up, and never goes back. Cannot fail.
-    // Always inlined: copying the outcome out of a call costs a hundred instructions.
+    // This function is always inlined: copying the outcome out of a call costs a hundred instructions.
     #[inline(always)]
     #[must_use = "the motors need the rotor speeds"]
     pub fn tick(&self, memory: &mut FlightCoreMemory<C::Memory>, now_us: u64, inbox: &Inbox) -> TickOutcome<N> {
@@ -191,7 +191,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
         if ended.is_some() && observed.airborne {
             *rest_us = 0;
         }
-        // Not `next`, which would check the end of the flight a second time.
+        // `next` would check the end of the flight a second time.
         *mode = if ended.is_some() { Mode::Disarmed } else { mode.onward(&observed) };
         let mode = *mode;
         // The tick of arming only sets up the flight, with motors idling: a step of the law as well would take too

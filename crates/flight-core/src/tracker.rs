@@ -81,7 +81,7 @@ impl Tracker {
         let Refused { overtaken, late, elsewhere } = &mut self.refused;
         let refused = match (at_us, self.in_use) {
             (None, _) => overtaken,
-            // Cannot underflow: the clock returns no time after the arrival.
+            // The difference cannot underflow, because the clock returns no time after the arrival.
             (Some(at_us), _) if arrived_us - at_us > age_max_us => late,
             (_, Some((id, news_us))) if id != sender && arrived_us.saturating_sub(news_us) <= silent_us => elsewhere,
             (Some(at_us), in_use) => {

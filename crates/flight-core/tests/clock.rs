@@ -425,7 +425,7 @@ fn the_sender_that_is_silent_longest_is_forgotten() {
         }
         says(&mut tracker, 5, 30_000, 30_000);
         for sender in 1..=5 {
-            // Sent 30 ms ago: late only for a sender whose clock is known.
+            // The message was sent 30 ms ago. It is late only for a sender whose clock is known.
             let late = says(&mut tracker.clone(), sender, 40_000, 70_000);
             assert_eq!(late, sender != silent, "sender {sender}, silent {silent}");
         }

@@ -218,7 +218,8 @@ impl Guidance {
     }
 
     /// Returns what it has against arming, as it was while the vehicle was disarmed.
-    // Not in what a tick gives, of which the firmware has a queue: the flight core's reasons include these.
+    // These reasons are not in the output of a tick, of which the firmware has a queue, because the flight core's
+    // reasons include them.
     pub fn arming_refusals(&self) -> Reasons {
         self.memory.against
     }

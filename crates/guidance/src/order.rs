@@ -12,7 +12,7 @@ pub enum OrbitHeading {
     /// Towards the centre.
     #[default]
     Centre,
-    /// As before the orbit.
+    /// Keep the heading from before the orbit.
     Kept,
     /// Along the circle.
     Along,

@@ -354,7 +354,7 @@ impl Host {
         let action = self.comms.escs(&mut self.esc_reports, &heard, &report);
         // Applied between two ticks, as on the board: the next tick is the first with the new notch.
         action.notch.iter().for_each(|notch| self.flight.move_notch(notch));
-        // Taken before anything changes that the details contain.
+        // The details are taken before anything in them changes.
         let details = (self.black_box.is_some() || self.files.is_some()).then(|| self.details());
         if let Some(ExactLog { recorder, write }) = &mut self.log {
             recorder.tick(&self.took, &report, write);

@@ -93,7 +93,7 @@ impl StoredLogs {
         let mut options = OpenOptions::new();
         do_not_follow(options.read(true));
         let file = options.open(path)?;
-        // Checked again: the file may have been replaced before it was opened.
+        // The file is checked again, because it may have been replaced before it was opened.
         only_file(file.metadata()?)?;
         Ok(file)
     }

@@ -65,7 +65,8 @@ impl<const N: usize> NominalVehicle<N> {
     }
 
     /// Returns the action for `demand` after the filters, its trace, and the unallocated part of U1..U3 \[N\].
-    // Always inlined: a result returned in memory would be read back while its stores are still pending.
+    // This function is always inlined: a result returned in memory would be read back while its stores are still
+    // pending.
     #[inline(always)]
     pub(crate) fn act(&self, demand: &Demand, smoothed: &mut Option<Smoothed>) -> (Action<N>, Trace, Vector3<f32>) {
         let wanted = demand.angular_acceleration_rad_s2.component_div(&self.effectiveness);

@@ -106,7 +106,7 @@ impl Gains {
     /// Tuned gains (the defaults), with integrals raised by hand.
     pub const TUNED: Self = Self::DEFAULT;
 
-    /// Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
+    /// Gains tuned by hand for the paper's vehicle with a rotor lag of 20 ms.
     pub const PAPER_VEHICLE: Self = Gains {
         position_p_1_s2: 12.0,
         position_d_1_s: 6.0,

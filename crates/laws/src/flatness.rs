@@ -61,7 +61,7 @@ impl DesiredFrame {
 
 /// Returns the attitude along a specific force with two derivatives \[m/s2, m/s3, m/s4\], at the setpoint's heading.
 /// The specific force must point up.
-// Always inlined: a result returned in memory would be read back while its stores are still pending.
+// This function is always inlined: a result returned in memory would be read back while its stores are still pending.
 #[inline(always)]
 pub fn flat(specific_force: [Vector3<f32>; 3], setpoint: &Setpoint) -> AttitudeReference {
     let [s, s_dot, s_ddot] = specific_force;

@@ -99,10 +99,10 @@ impl Gains {
         ..Self::BASE
     };
 
-    /// Tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
+    /// Gains tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
     pub const TUNED: Self = Self::DEFAULT;
 
-    /// Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
+    /// Gains tuned by hand for the paper's vehicle with a rotor lag of 20 ms.
     pub const BY_HAND: Self = Gains {
         geometric: Self::BASE,
         predictor_1_s: 5.0,

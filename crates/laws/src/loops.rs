@@ -119,7 +119,8 @@ impl AttitudeLoop {
     }
 
     /// Computes one step in the attitude `r`, towards `desired`, with `feed_forward_rad_s` in the body frame.
-    // Always inlined: a result returned in memory would be read back while its stores are still pending.
+    // This function is always inlined: a result returned in memory would be read back while its stores are still
+    // pending.
     #[inline(always)]
     pub(crate) fn output(
         &self,

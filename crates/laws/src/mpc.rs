@@ -116,10 +116,10 @@ parameters! {
 }
 
 impl Gains {
-    /// Tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
+    /// Gains tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
     pub const TUNED: Self = Self::DEFAULT;
 
-    /// Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
+    /// Gains tuned by hand for the paper's vehicle with a rotor lag of 20 ms.
     pub const PAPER_VEHICLE: Self = Gains {
         position_weight_1_s4: 80.0,
         velocity_weight_1_s2: 10.0,

@@ -128,10 +128,10 @@ parameters! {
 }
 
 impl Gains {
-    /// Tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
+    /// Gains tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
     pub const TUNED: Self = Self::DEFAULT;
 
-    /// Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
+    /// Gains tuned by hand for the paper's vehicle with a rotor lag of 20 ms.
     pub const PAPER_VEHICLE: Self = Gains {
         position_p_1_s: 2.0,
         velocity_p_1_s: 5.0,

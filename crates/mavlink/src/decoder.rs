@@ -142,7 +142,7 @@ const HELD_MAX: usize = SIGNED_FRAME_MAX + 1;
 enum FrameScan<M> {
     /// Undecided until this number of bytes is in the buffer.
     Incomplete(usize),
-    /// Not a frame, or a frame to be skipped with this fault.
+    /// Bytes that are no frame, or a frame to be skipped with this fault.
     Garbage(Option<FrameFault>),
     /// A frame of `length` bytes that is damaged or cannot be verified, followed by a start byte.
     Opaque { length: usize, fault: FrameFault },
@@ -219,7 +219,7 @@ impl<M: MessageSet> Decoder<M> {
     /// with its payload.
     pub fn feed_to(&mut self, handler: &mut impl FrameHandler<M>, bytes: &[u8]) {
         for &byte in bytes {
-            // Cannot overflow: `advance` always removes something from a full buffer.
+            // The buffer cannot overflow, because `advance` always removes something from a full buffer.
             if let Some(next) = self.buffer.get_mut(self.length) {
                 *next = byte;
                 self.length += 1;

@@ -64,6 +64,6 @@ pub(crate) const fn frame(datum: Datum) -> u8 {
 
 /// Converts degrees to units of 1e-7 degrees. NaN becomes "not given"; other invalid angles stay invalid.
 pub(crate) fn e7(degrees: f32) -> i32 {
-    // Clamped to beyond any angle, but below the value for "not given".
+    // The limits are beyond any angle, but below the value for "not given".
     if degrees.is_nan() { GlobalPosition::AS_IT_IS } else { (f64::from(degrees) * 1e7).clamp(-2e9, 2e9) as i32 }
 }

@@ -259,11 +259,11 @@ impl MissionMessage {
 /// Converts degrees, or metres in a local frame, to the units of MISSION_ITEM_INT.
 fn in_units(number: f32, frame: u8) -> i32 {
     let units = if LOCAL_FRAMES.contains(&frame) { 1e4 } else { 1e7 };
-    // Not given, which is not the same as 0.
+    // The number is not given, which is not the same as 0.
     if number.is_nan() {
         return GlobalPosition::AS_IT_IS;
     }
-    // Clamped to beyond any position, but below the value for "not given".
+    // The limits are beyond any position, but below the value for "not given".
     let scaled = (f64::from(number) * units).clamp(-2e9, 2e9);
     (scaled + if scaled < 0.0 { -0.5 } else { 0.5 }) as i32
 }

@@ -85,7 +85,7 @@ impl Configuration {
     ///
     /// # Errors
     /// The first parameter, setting or gain out of range. Also if there are not `N` rotors.
-    // Always inlined: otherwise the controller is on the stack of the firmware's start-up twice.
+    // This function is always inlined: otherwise the controller is on the stack of the firmware's start-up twice.
     #[inline(always)]
     pub fn controller<const N: usize>(&self) -> Result<Guarded<N>, OutOfRange> {
         let Configuration { parameters, settings, gains, .. } = self;

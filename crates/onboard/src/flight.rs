@@ -96,7 +96,7 @@ impl<const N: usize> Flight<N> {
 
 impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
     /// Creates the vehicle, disarmed, from a prepared flight.
-    // Always inlined, so that the vehicle is on the stack of the firmware's start-up only once.
+    // This function is always inlined, so that the vehicle is on the stack of the firmware's start-up only once.
     #[inline(always)]
     pub fn of(prepared: Prepared<N, C>) -> Self {
         let Prepared { vehicle, estimator, output_filter, corrections, motor, guide } = prepared;
@@ -196,7 +196,7 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
 
     /// Runs one control tick. Call it every millisecond, with the inputs from messages and the readings of the
     /// vehicle's own sensors. `now_us` is the time since power-up. Cannot fail.
-    // Always inlined: copying the report out of a call costs a hundred instructions.
+    // This function is always inlined: copying the report out of a call costs a hundred instructions.
     #[inline(always)]
     pub fn tick(&mut self, now_us: u64, inputs: &mut ControlInputs, readings: &Readings) -> Report {
         // Comes before the front end, which removes the pose from the inbox.

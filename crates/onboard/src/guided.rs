@@ -49,7 +49,7 @@ impl GuidanceStage {
 
     /// Takes over new settings for the same number of rotors. Mode, mission and home stay.
     pub(crate) fn adopt(&mut self, prepared: &GuidanceStage) {
-        // Cannot fail: `prepared` was made from these settings.
+        // The call cannot fail, because `prepared` was made from these settings.
         let _ = self.guidance.set(*prepared.guidance.settings());
         (self.lift, self.mass_kg) = (prepared.lift, prepared.mass_kg);
     }

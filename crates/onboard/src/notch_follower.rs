@@ -56,7 +56,7 @@ impl NotchFollower {
         let mean = mean(now_us, speeds).filter(|_| follows);
         let mut notch = *home;
         if let Some(mean_rad_s) = mean {
-            // Not `clamp`: its panic message prints numbers, which would take 24 kB of flash.
+            // `clamp` is not used, because its panic message prints numbers, which would take 24 kB of flash.
             let wanted_rad_s = max(LEAST * home_rad_s, min(mean_rad_s, GREATEST * home_rad_s));
             if (wanted_rad_s - self.now_rad_s).abs() <= DIFFERS * self.now_rad_s {
                 return None;

@@ -25,7 +25,7 @@ pub(crate) const CORE_MHZ: u32 = 168;
 
 /// Converts core cycles, counted by SysTick, to instructions of 2^`shift` ns.
 pub(crate) fn instructions(cycles: u32, shift: u32) -> u32 {
-    // Rounded, since an instruction of 8 ns takes 1.344 cycles.
+    // The result is rounded, since an instruction of 8 ns takes 1.344 cycles.
     let cycles_per_thousand = u64::from(CORE_MHZ << shift);
     ((u64::from(cycles) * 1000 + cycles_per_thousand / 2) / cycles_per_thousand) as u32
 }

@@ -78,7 +78,7 @@ pub fn search(emulator: Emulator, source: StateSource, seed: u64, candidates: u6
                 None => flight.arm()?,
             }
         }
-        // Also accept equal candidates, so that the climb can cross plateaus.
+        // The search also accepts equal candidates, so that the climb can cross plateaus.
         if instructions >= height {
             (summit, height) = (numbers, instructions);
         }

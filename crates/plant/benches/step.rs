@@ -108,7 +108,7 @@ fn drag_in_still_air(bencher: Bencher, model: PlantModel) {
     fly(bencher, Plant::with_realism(model, start(), environment(), &realism, STEP_S).unwrap());
 }
 
-/// As in a campaign: usual effects and sensors.
+/// The plant has the usual effects and sensors of a campaign.
 #[divan::bench(sample_count = 200, sample_size = 2000)]
 fn lag_drag_turbulence_sensors(bencher: Bencher) {
     let mut plant = Plant::with_realism(PlantModel::RigidBody, start(), environment(), &usual(), STEP_S).unwrap();

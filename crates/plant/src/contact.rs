@@ -118,7 +118,7 @@ impl SimulatedGround {
     }
 
     /// Returns force, earth frame \[N\], and moment, body frame \[N m\], on a moving vehicle at `height_m`.
-    // Not inlined, because it is only called near the ground.
+    // This function is not inlined, because it is only called near the ground.
     #[inline(never)]
     pub(crate) fn wrench(
         &self,

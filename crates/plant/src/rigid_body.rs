@@ -96,7 +96,8 @@ pub(crate) fn body_axes(v: &RigidBodyVector) -> BodyAxes {
 }
 
 /// Returns [`derivative`] with the forces that depend on position and velocity.
-// Always inlined, with its callees: passing a state through memory costs a fifth of this function's time.
+// This function is always inlined, with its callees: passing a state through memory costs a fifth of this function's
+// time.
 #[inline(always)]
 pub(crate) fn derivative_in(v: &RigidBodyVector, load: &Load, surroundings: &AirAndGround) -> RigidBodyVector {
     let (velocity, rates) = (Vector3::new(v[3], v[4], v[5]), Vector3::new(v[10], v[11], v[12]));

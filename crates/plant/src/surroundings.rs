@@ -33,7 +33,7 @@ impl<'a> AirAndGround<'a> {
     }
 
     /// Returns the contributions to d^2 xi/dt^2 \[m/s2\], earth frame, and to d Omega/dt \[rad/s2\], body frame.
-    // Always inlined: passing its vectors through memory costs more than its arithmetic.
+    // This function is always inlined: passing its vectors through memory costs more than its arithmetic.
     #[inline(always)]
     pub(crate) fn accelerations(
         &self,

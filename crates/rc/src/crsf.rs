@@ -135,7 +135,7 @@ impl CrsfDecoder {
         }
         self.last_us = now_us;
         for byte in bytes {
-            // Cannot overflow: a frame of maximum length was removed already.
+            // The buffer cannot overflow, because a frame of maximum length was removed already.
             let _ = self.held.push(*byte);
             while self.advance(&mut take) {}
         }
@@ -164,7 +164,7 @@ impl CrsfDecoder {
             return self.drop_first(1);
         }
         let Some((content, _)) = rest.split_at_checked(length) else { return false };
-        // Never fails: the accepted lengths include type and checksum.
+        // The split never fails, because the accepted lengths include type and checksum.
         let Some(([kind, payload @ ..], checksum)) = content.split_last().map(|(last, content)| (content, *last))
         else {
             return self.drop_first(1);

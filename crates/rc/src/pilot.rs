@@ -47,11 +47,11 @@ pub enum PilotNotice {
     Heard,
     /// The radio link is lost.
     Lost,
-    /// Not armed: the throttle is up.
+    /// The vehicle was not armed, because the throttle is up.
     ThrottleUp,
-    /// Not armed: the kill switch is on.
+    /// The vehicle was not armed, because the kill switch is on.
     KillSwitchOn,
-    /// Not armed: the radio link has only just come back.
+    /// The vehicle was not armed, because the radio link has only just come back.
     JustHeard,
 }
 
@@ -84,7 +84,7 @@ pub struct RadioPilot {
 
 impl RadioPilot {
     /// Processes the receiver's channels. To be called after each frame and at least every 20 ms.
-    // Not inlined: with five callers, each copy would cost a kilobyte of flash.
+    // This function is not inlined: with five callers, each copy would cost a kilobyte of flash.
     #[inline(never)]
     pub fn step(&mut self, settings: &RadioSettings, link: &mut RadioLink, inputs: &PilotInputs) -> PilotOutput {
         let now_us = inputs.now_us;

@@ -106,7 +106,7 @@ impl SbusDecoder {
             if self.waits {
                 continue;
             }
-            // Cannot overflow: a complete frame is removed with its last byte.
+            // The buffer cannot overflow, because a complete frame is removed with its last byte.
             let _ = self.held.push(*byte);
             if let Some(frame) = self.held.first_chunk::<FRAME>() {
                 let read = SbusFrame::read(frame).filter(|(_, footer)| {

@@ -47,7 +47,7 @@ impl CrsfTelemetry<'_> {
     pub fn encode(&self) -> Vec<u8, FRAME_MAX> {
         let mut payload: Vec<u8, FRAME_MAX> = Vec::new();
         let mut put = |bytes: &[u8]| {
-            // Never fails: every payload fits.
+            // This never fails, because every payload fits.
             let _ = payload.extend_from_slice(bytes);
         };
         // `as` saturates and converts NaN to 0.

@@ -47,7 +47,7 @@ proptest! {
     #[test]
     fn channels_are_read(ticks in prop::array::uniform16(0..2_048_u16), is_later in any::<bool>(), cut in 1..25_usize) {
         let bytes = frame(RC_CHANNELS_PACKED, &packed(&ticks));
-        // Rounded towards the centre.
+        // Pulse lengths are rounded towards the centre.
         let us = ticks.map(|ticks| (1500.0 + (0.625 * (f64::from(ticks) - 992.0)).trunc()) as u16);
         let (mut decoder, mut read) = (CrsfDecoder::default(), Vec::new());
         // The rest of a frame is not joined to its beginning after a long pause.

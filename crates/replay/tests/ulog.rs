@@ -253,7 +253,7 @@ fn a_heading_is_as_good_as_the_field() {
             let sigma = f64::from(ours.sigmas.attitude_rad.z);
             inside += usize::from(turn.z.abs() < 3.0 * sigma);
             all += 1;
-            // Checked until the vehicle flies: its motion then reveals the heading, too.
+            // The heading is checked until the vehicle flies. Its motion then reveals the heading, too.
             assert!(gauss < 0.5 || ours.at_us > 53_000_000 || !ours.validity.heading, "{stray:?}: {sigma} rad");
         }
     }

@@ -287,7 +287,7 @@ pub trait Choice: Copy + PartialEq + 'static {
 
     /// Returns the variant's index in [`ALL`](Self::ALL).
     fn index(self) -> usize {
-        // Always found, since ALL has every variant.
+        // The variant is always found, since ALL has every variant.
         Self::ALL.iter().position(|one| *one == self).unwrap_or_default()
     }
 

@@ -24,10 +24,10 @@ impl Vehicle {
 
     /// Returns the values of the configuration as a JSON object, by field.
     fn values(&self) -> Value {
-        // Cannot fail: the file's reader has checked the number of rotors.
+        // The call cannot fail, because the file's reader has checked the number of rotors.
         let Ok(configuration) = self.configuration() else { return Value::Null };
-        // Left out: sensor calibration and motor controllers, which belong to an individual vehicle, and link and
-        // radio, which belong to the board.
+        // Sensor calibration and motor controllers are left out, because they belong to an individual vehicle. Link and
+        // radio are left out, because they belong to the board.
         let Configuration {
             parameters,
             rotors: _,

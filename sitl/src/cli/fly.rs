@@ -77,8 +77,8 @@ impl FlyArgs {
         let name = scenario.name.clone();
         let is_logged = self.mcap.is_some() || self.exact_log.is_some() || self.ulog.is_some();
         let firmware = is_logged.then(|| firmware_flight(&scenario, self.flying.duration)).transpose()?;
-        // Checked before the flights, so that a file that cannot be written costs no flight; created once everything
-        // else is right.
+        // The files are checked before the flights, so that a file that cannot be written costs no flight. They are
+        // created once everything else is right.
         let mcap = FlightMcap::plan(self.mcap, &mut self.ulog)?;
         let outputs = LogOutputs::new(self.exact_log.as_deref(), self.ulog.as_deref())?;
         let mut logs = None;

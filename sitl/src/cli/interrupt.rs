@@ -38,6 +38,6 @@ fn ends(line: String, clean: fn()) -> Result<(), ctrlc::Error> {
 
 /// Makes Ctrl-C ineffective while results are written; the program then ends normally.
 pub(crate) fn is_too_late() {
-    // Never unlocked again: a handler that is already waiting for the lock waits until the program ends.
+    // The lock is never released again. A handler that is already waiting for it waits until the program ends.
     std::mem::forget(WRITING.lock().unwrap_or_else(PoisonError::into_inner));
 }

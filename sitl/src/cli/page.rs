@@ -22,7 +22,7 @@ pub(crate) fn write(
         };
         Ok(format!("{before}{table}{after}"))
     };
-    // Checked before the flights too.
+    // The page is checked before the flights, too.
     with("")?;
     let page = with(&table()?)?;
     // If the path is a symbolic link, its target is written, and the link stays.

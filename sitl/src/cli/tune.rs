@@ -119,7 +119,7 @@ impl TuneArgs {
             Some(vehicle) => (tune::training_on(vehicle)?, tune::held_out_on(vehicle)?, tune::conditions_on(vehicle)?),
             None => (tune::training()?, tune::held_out()?, tune::conditions()?),
         };
-        // Checked before the search, which may take long.
+        // The file is checked before the search, which may take long.
         let output = self.out.as_deref().map(|out| OutputFile::forcible(out, "--out", self.force)).transpose()?;
 
         let stop = Arc::new(AtomicBool::new(false));

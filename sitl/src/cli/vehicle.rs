@@ -50,7 +50,7 @@ impl VehicleArgs {
     pub(crate) fn for_firmware(&self) -> Result<Option<PathBuf>, CommandError> {
         let Some(path) = &self.vehicle else { return Ok(None) };
         let known = path.to_str().is_some_and(|name| built_in(name).is_some());
-        // Absolute, since the build script runs in its package's folder.
+        // The path is absolute, since the build script runs in its package's folder.
         Ok(Some(if known { path.clone() } else { std::path::absolute(path)? }))
     }
 

@@ -22,7 +22,7 @@ fn decode<'a, M: MessageSet>(pieces: impl Iterator<Item = &'a [u8]>) -> (Vec<M>,
 
 fn check<M: MessageSet + core::fmt::Debug>(bytes: &[u8]) {
     let (messages, counters) = decode::<M>(core::iter::once(bytes));
-    // As text, since a NaN in telemetry is not equal to itself.
+    // The messages are compared as text, since a NaN in telemetry is not equal to itself.
     let whole = format!("{messages:?}");
     assert_eq!((whole, counters), {
         let (messages, counters) = decode::<M>(bytes.chunks(1));

@@ -97,7 +97,7 @@ impl FrameDecoder {
             self.first_us = at_us;
         }
         self.newest_us = at_us;
-        // Cannot overflow: `next` removes anything as long as the longest frame.
+        // The buffer cannot overflow, because `next` removes anything as long as the longest frame.
         if let Some(place) = self.bytes.get_mut(self.length) {
             *place = byte;
             self.length += 1;

@@ -84,7 +84,7 @@ impl<'a> Table<'a> {
             if !wanted(declaration) {
                 return Ok(());
             }
-            // Must precede reading the value, since an error names the unit.
+            // The unit is stored before the value is read, since an error names the unit.
             self.units.push((range.name, unit));
             match value {
                 DeclaredValueMut::Single([number]) => {

@@ -9,7 +9,7 @@ pub enum Verdict {
     Passed,
     /// A check failed.
     Failed,
-    /// Not done: nobody was there to do it, or the board lacks the device.
+    /// The check was not done, because nobody was there to do it, or the board lacks the device.
     Skipped,
 }
 

@@ -139,7 +139,7 @@ impl Memory {
     }
 
     /// Returns the limited setpoint for the mode's output; none if it is not plausible.
-    // Always inlined: copying the setpoint out of a call costs sixty instructions per tick.
+    // This function is always inlined: copying the setpoint out of a call costs sixty instructions per tick.
     #[inline(always)]
     fn shaped(
         &mut self,

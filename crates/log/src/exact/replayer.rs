@@ -156,7 +156,7 @@ impl<P: Prepare> Replayer<P> {
                 if self.coming.is_full() {
                     self.coming.pop_front();
                 }
-                // Always fits: the oldest inputs have been removed.
+                // The inputs always fit, because the oldest ones have been removed.
                 let _ = self.coming.push_back((*tick, inputs.clone()));
                 ReplayStep::Nothing
             }

@@ -63,7 +63,8 @@ impl CardKeeper<'_> {
             self.reader.open = Some((place, volumes.open_file_in_dir(root, name, Mode::ReadOnly)?));
         }
         let (Some(volumes), Some((_, file))) = (&self.volumes, self.reader.open) else { return Err(Error::BadHandle) };
-        // Checked first: a seek beyond the end is an error in `embedded-sdmmc`, and an error would give up the volume.
+        // The offset is checked first. A seek beyond the end is an error in `embedded-sdmmc`, and an error would give
+        // up the volume.
         if offset > volumes.file_length(file)? {
             return Ok(KeeperAnswer::Is(0));
         }

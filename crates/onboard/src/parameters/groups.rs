@@ -136,7 +136,7 @@ impl Configuration {
                 }
                 DeclaredValueMut::Whole(number) => *number = value as u32,
                 DeclaredValueMut::Switch(switch) => *switch = value != 0.0,
-                // Not negative: `put` has checked the range, which begins at `first`.
+                // The index is not negative, because `put` has checked the range, which begins at `first`.
                 DeclaredValueMut::Choice(index, _) => *index = (value - first) as usize,
             }
             Err(Found)

@@ -10,7 +10,7 @@ pub fn start_or_skip<T>(image: FirmwareImage, start: impl FnOnce(PathBuf) -> Res
     match image.find().and_then(start) {
         Ok(started) => Some(started),
         Err(error) if error.is_missing() && std::env::var_os("CI").is_none() => {
-            // Not println!, which the test harness would hide.
+            // The test harness would hide the text of println!.
             let _ = writeln!(std::io::stderr(), "SKIPPED, nothing was tested: {error}");
             None
         }

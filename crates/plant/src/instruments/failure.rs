@@ -302,7 +302,7 @@ impl SimulatedFailures {
                 _ => {}
             }
         }
-        // Stored with the failures applied: a sensor that sticks later repeats this reading.
+        // The reading is stored with the failures applied, because a sensor that sticks later repeats it.
         self.last.imu = Some(seen);
         alive.then_some(seen)
     }

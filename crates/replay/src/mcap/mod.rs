@@ -48,7 +48,7 @@ pub fn convert(path: &Path, to: impl Write + Seek) -> Result<McapSummary, FileEr
 
 /// Writes the log in `bytes` to `to` as MCAP.
 fn write(bytes: &[u8], to: impl Write + Seek) -> Result<McapSummary, String> {
-    // Not compressed, since the compressors are C code.
+    // The file is not compressed, since the compressors are C code.
     let library = concat!("sitl ", env!("CARGO_PKG_VERSION"));
     let options = WriteOptions::new().compression(None).profile("ros2").library(library);
     let writer = options.create(to).map_err(unwritten)?;

@@ -122,7 +122,7 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
         contenders,
     };
     root.finish()?;
-    // Checked separately and first, so that the error can name leaving out `flight_core` as a cure.
+    // The flight core is checked separately and first, so that the error can name leaving out `flight_core` as a cure.
     if let Err(error) = scenario.check_flight_core() {
         let problem = format!(
             "the vehicle cannot fly with {}; change that parameter, or leave flight_core out",

@@ -41,7 +41,7 @@ macro_rules! any_controller {
                 }
             }
 
-            // Not inlined, so that it is compiled only once instead of in each crate that flies.
+            // This function is not inlined, so that it is compiled only once instead of in each crate that flies.
             #[inline(never)]
             fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
                 self.begin(memory);

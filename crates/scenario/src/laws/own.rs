@@ -165,7 +165,7 @@ impl OwnKind {
     }
 
     fn controller(self, vehicle: &OwnVehicle) -> Box<dyn OwnController> {
-        // Not called under the lock, since `make` may wait for a thread that registers a law.
+        // `make` is not called under the lock, since it may wait for a thread that registers a law.
         let make = Arc::clone(&self.0.make.read().unwrap_or_else(PoisonError::into_inner));
         make(vehicle)
     }

@@ -22,7 +22,7 @@ impl<C: FlightController<N>, const N: usize> LawOnly<C, N> {
 impl<C: FlightController<N>, const N: usize> FlightSoftware for LawOnly<C, N> {
     type Error = Infallible;
 
-    // Always inlined: copying a sample into and out of calls takes a fifth of the loop's time.
+    // This function is always inlined: copying a sample into and out of calls takes a fifth of the loop's time.
     #[inline(always)]
     fn step(&mut self, world: &mut World) -> Result<Sample, Infallible> {
         let view = world.look();

@@ -29,7 +29,7 @@ pub struct FlightEnd {
 ///
 /// # Errors
 /// Returns the pilot's error.
-// Always inlined, so that each flight has a single loop that includes its pilot's step.
+// This function is always inlined, so that each flight has a single loop that includes its pilot's step.
 #[inline(always)]
 pub fn lockstep<P: FlightSoftware>(
     world: &mut World,

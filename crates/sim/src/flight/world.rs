@@ -145,7 +145,7 @@ impl World {
     }
 
     /// Measures without moving the vehicle.
-    // Always inlined: copying a view into and out of calls takes a fifth of the loop's time.
+    // This function is always inlined: copying a view into and out of calls takes a fifth of the loop's time.
     #[inline(always)]
     pub fn look(&mut self) -> WorldView {
         let time_s = self.plant.time_s();
@@ -167,7 +167,7 @@ impl World {
             Some(measurement) => measurement.fresh.then_some(measurement.state),
         };
         let reference = self.trajectory.at(time_s);
-        // Checked first, since most flights have no outage and then need no call of cold code.
+        // The empty list is checked first, since most flights have no outage and then need no call of cold code.
         let lost = !self.outages.is_empty() && is_lost(&self.outages, time_s);
         let telemetry = self.plant.telemetry();
         let new = measurement.is_none_or(|measurement| measurement.new);

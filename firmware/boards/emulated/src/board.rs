@@ -80,7 +80,7 @@ impl Board for Emulated {
         false
     }
 
-    /// Always false, since a panic ends the emulator.
+    /// Returns false, since a panic ends the emulator.
     fn task_has_failed(&self) -> bool {
         false
     }

@@ -97,7 +97,7 @@ where
         dma: Peri<'static, D>,
         irqs: I,
     ) -> Self {
-        // Not `expect`, since printing the error would take a tenth of the flash.
+        // `expect` is not used, since printing the error would take a tenth of the flash.
         let Ok(clock) = TimerClock::new(rcc::frequency::<T>().0) else { panic!("the timer's clock is out of range") };
         let timer = Timer::new(timer);
         timer.set_counting_mode(CountingMode::EdgeAlignedUp);

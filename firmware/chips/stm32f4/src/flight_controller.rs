@@ -356,7 +356,7 @@ macro_rules! flight_controller {
         @new_log $p:ident, card $card:ident, $sck:ident, $mosi:ident, $miso:ident, $select:ident, $($quiet:ident),*
     ) => {{
         $(
-            // Kept forever, since dropping a pin would make it an input again.
+            // The pin is kept forever, since dropping it would make it an input again.
             core::mem::forget(embassy_stm32::gpio::Output::new(
                 $p.$quiet,
                 embassy_stm32::gpio::Level::High,
