@@ -80,8 +80,8 @@ impl Bench {
     }
 }
 
-/// Noise of position and velocity is that of motion capture; noise of attitude and rates is that of a small inertial
-/// sensor.
+/// The noise of position and velocity is typical of motion capture. The noise of attitude and rates is typical of a
+/// small inertial sensor.
 const NOISE: Deviations = Deviations { position_m: 0.002, velocity_m_s: 0.01, attitude_rad: 0.002, rates_rad_s: 0.02 };
 
 /// In the paper's flight with gusts and uncertainty, the robust terms with the printed epsilon of 1 mm/s chatter once

@@ -46,7 +46,7 @@ struct BootObserver {
     feeds: Vec<u64>,
     /// Number of samples, for each motor, in which its pin carried a pulse.
     pulses: Vec<u64>,
-    /// Number of samples, and pulses other than those of a stopped motor.
+    /// Number of samples, and pulses that differ from the pulse of a stopped motor.
     looks: u64,
     wrong: Vec<String>,
     /// First word of the parameters' flash at the end.

@@ -350,7 +350,7 @@ fn an_error_is_approached_at_the_speed_that_the_law_holds() {
         for approach in
             [adaptive.approach(axis, Some(&model)), fixed.approach(axis, None), integral.approach(axis, None)]
         {
-            // At e_1 = 1 m and this approach speed, the only input is the one against f.
+            // At e_1 = 1 m and this approach speed, the input only compensates f.
             let tracking = SubsystemTracking { x2: approach, e1: 1.0, ..SubsystemTracking::default() };
             let errors = tracking.errors(of.alpha1);
             let u = ideal(&of, &errors, 0.0, &dynamics) + proportional(of.alpha2, &errors);

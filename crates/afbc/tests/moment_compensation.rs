@@ -65,7 +65,7 @@ impl Vehicle {
         moment.component_div(&self.parameters.inertia_kg_m2)
     }
 
-    /// Moves one step under this angular acceleration in addition to the rotors'.
+    /// Moves one step under this angular acceleration and the angular acceleration by the rotors.
     fn advance(&mut self, asked: &Inputs, moment_rad_s2: &Vector3<f32>) {
         let share = 1.0 - (-DT_S / LAG_S).exp();
         let Inputs { roll_n, pitch_n, yaw_n, thrust_n } = &mut self.given;
@@ -85,8 +85,9 @@ impl Vehicle {
         *attitude_rad = Vector3::new(roll, pitch, yaw);
     }
 
-    /// Flies `steps` steps under `moment_rad_s2` in addition to the drag's moment. Returns for each step the angular
-    /// acceleration asked of the rotors beyond the law's own inputs, and that by the drag \[rad/s2\].
+    /// Flies `steps` steps under `moment_rad_s2` in addition to the drag's moment. Returns two angular accelerations
+    /// for each step \[rad/s2\]: the one asked of the rotors beyond the law's own inputs, and the one caused by the
+    /// drag.
     fn fly(&mut self, steps: u16, moment_rad_s2: &Vector3<f32>) -> Vec<[Vector3<f32>; 2]> {
         let (mut memory, mut smoothed) = (Validated::default(), None);
         let mut made_up = |number: u16| {

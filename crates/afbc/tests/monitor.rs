@@ -230,7 +230,7 @@ proptest! {
         prop_assert_eq!(trip, None);
     }
 
-    /// The norms, updated for one subsystem per step, are those of the estimates.
+    /// The monitor's norms equal the norms of the estimates. Each step updates one subsystem.
     #[test]
     fn norms_are_those_of_the_estimates(theta in prop::array::uniform9(-0.1_f32..0.1), delta in 0.0_f32..0.05) {
         let estimate = AdaptiveEstimate { theta: Matrix3::from_row_slice(&theta), delta };

@@ -66,7 +66,7 @@ proptest! {
         prop_assert!(found.iter().all(|e| e.abs() <= 2.0005), "{found:?}");
     }
 
-    /// The desired rates and accelerations are those of the desired attitude, in the axes of a turning body.
+    /// The desired rates and accelerations match the motion of the desired attitude, in the axes of a turning body.
     #[test]
     fn rates_and_accelerations_are_those_of_the_desired_attitude(
         now in attitude(),

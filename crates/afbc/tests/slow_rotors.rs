@@ -1,4 +1,4 @@
-//! Gains and settings for rotors with more lag than those of the paper's vehicle.
+//! Gains and settings for rotors with more lag than the rotors of the paper's vehicle.
 
 use afbc::disturbance::DisturbanceObserver;
 use afbc::{LAG_S, Profile, Settings, slowness};

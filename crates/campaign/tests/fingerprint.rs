@@ -329,7 +329,7 @@ fn every_key_of_a_vehicle_file_counts() {
     // With a named part, the estimator's settings follow from the part unless the file states them.
     let part = bare.replace("[imu]\n", "[imu]\npart = \"bmi270\"\n");
     let imu = ImuModel::PRESETS[0].settings;
-    // Large enough to stand out from the other errors, and from the least accepted value.
+    // These errors are large enough to stand out from the other errors, and from the least accepted value.
     let gyro = GyroscopeModel { vibration_rad_s: 0.02, bias_rad_s: 0.1, ..imu.gyro };
     let accel = AccelerometerModel { vibration_m_s2: 0.5, lsb_m_s2: 0.5, ..imu.accel };
     let imu = ImuModel { gyro, accel, ..imu };

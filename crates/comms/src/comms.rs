@@ -275,7 +275,7 @@ impl Comms {
     pub fn battery(&self) -> Option<BatteryReading> {
         self.status.aux.battery.map(|battery| BatteryReading {
             voltage_v: f32::from(battery.voltage_mv) * 1e-3,
-            // Negative means not measured.
+            // A negative current means that it is not measured.
             current_a: f32::from(battery.current_ca.max(0)) * 1e-2,
             charge: (battery.remaining_percent >= 0).then(|| f32::from(battery.remaining_percent) * 1e-2),
         })

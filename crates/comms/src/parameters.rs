@@ -89,8 +89,8 @@ impl Service {
         Ok(RecordChange::Restored)
     }
 
-    /// Returns the next value to be sent at `now_us` over a link of `link_bytes_s` bytes per second. To be called until
-    /// it returns none. Answers to PARAM_SET are sent at once, all others use at most [`LINK_SHARE`] of the link.
+    /// Returns the next value to be sent at `now_us` over a link of `link_bytes_s` bytes per second. Call it until it
+    /// returns none. Answers to PARAM_SET are sent at once; all others use at most [`LINK_SHARE`] of the link.
     pub fn next_value(&mut self, now_us: u64, link_bytes_s: u32, table: &ParameterTable) -> Option<ParameterValue> {
         const COST: u64 = VALUE_BYTES as u64 * 100_000_000;
         // One second fills the budget, and the limit prevents an overflow of the product below.

@@ -82,7 +82,7 @@ fn sent() -> impl Strategy<Value = Sent> {
 
 /// Returns the command in a frame, if it is for the vehicle.
 fn command(sent: &Sent) -> Option<VehicleCommand> {
-    // Of a longer payload only the known part is read.
+    // Only the known part of a longer payload is read.
     let known = sent.payload.len().min(Uplink::format(sent.id)?.length_max);
     match Uplink::read(sent.id, &sent.payload[..known], VEHICLE) {
         Ok(Uplink::Command(command)) => Some(command),
@@ -184,7 +184,7 @@ proptest! {
     }
 }
 
-/// The commands that need no control are those of docs/security.md. They change nothing but the messages that are sent.
+/// docs/security.md lists the commands that need no control. They change nothing but the messages that are sent.
 #[test]
 fn commands_that_do_not_need_control() {
     let free = [

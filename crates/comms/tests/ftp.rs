@@ -184,7 +184,7 @@ fn a_session_has_the_number_that_its_station_wants() {
     assert_eq!(bench.read(B, 140, 0, 239).expect("read").len(), 5);
 }
 
-/// A burst loses packets and the missing blocks are read afterwards. Then the checksum is that of the file.
+/// A burst loses packets, and the missing blocks are read afterwards. Then the checksum matches the file.
 #[test]
 fn a_burst_with_losses_is_mended() {
     for size in [0, 1, 238, 239, 240, 239 * 256, 239 * 256 + 1, 200_000] {

@@ -111,7 +111,7 @@ fn everything_at_full_rate_fits_the_line() {
     }
 }
 
-/// While rotor commands are sent, the rest of the line is theirs.
+/// Rotor commands get the rest of the line while they are sent.
 #[test]
 fn rotor_commands_have_the_rest_of_a_fast_line() {
     let mut bench = on(921_600);

@@ -612,7 +612,7 @@ pub(crate) fn largest_sigma(variances: &Vector3<f32>) -> f32 {
     sqrt(max(max(variances.x, variances.y), variances.z))
 }
 
-/// Limits a variance to that of a completely unknown angle.
+/// Limits a variance to the variance of a completely unknown angle.
 pub(crate) fn angle_variance(variance: f32) -> f32 {
     min(variance, THETA.most)
 }

@@ -117,7 +117,7 @@ impl Settings {
             gyro_walk_rad_s_rts: within(gyro_walk, 1e-6, 0.01),
             accel_walk_m_s2_rts: within(accel_walk, 1e-5, 0.1),
             accel_bias_m_s2: within(accel_bias, 1e-3, 1.0),
-            // Five sigma, because alignment refuses any larger rate as a turn.
+            // The limit is five sigma, because alignment refuses any larger rate as a turn.
             gyro_bias_max_rad_s: within(5.0 * gyro.bias, 0.35, 1.0),
             baro_walk_m_rts: barometer
                 .map_or(default.baro_walk_m_rts, |(drift_m, time_s)| within(markov(drift_m, time_s), 1e-4, 1.0)),

@@ -73,7 +73,7 @@ pub struct DroppedMeasurements {
     /// Magnetic fields whose strength or inclination differs from that at the start. Every field counts if the
     /// vehicle's own field may be as large as the earth's.
     pub disturbed: u32,
-    /// Pose of a tracker or field of a magnetometer that has repeated for too long.
+    /// Poses of a tracker or fields of a magnetometer that have repeated for too long.
     pub frozen: u32,
 }
 

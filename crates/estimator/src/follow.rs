@@ -109,7 +109,7 @@ impl Estimator {
         memory.knows.heading = true;
     }
 
-    /// Replaces the errors of a position or velocity by those of the measurement.
+    /// Replaces the errors of a position or velocity by the measurement's errors.
     fn replace_motion(&self, memory: &mut Memory, part: &AidObservation, horizon: &FusionHorizon) {
         let expected = self.expected(memory);
         for at in VectorComponent::ALL.into_iter().filter(|at| part.axes.contain(*at)) {
@@ -124,7 +124,7 @@ impl Estimator {
         }
     }
 
-    /// Turns the heading by `by`, and replaces its error by that of `part` with the noise variance `variance`.
+    /// Turns the heading by `by`, and replaces its error by the error of `part`, with the noise variance `variance`.
     fn reset_heading(
         &self,
         memory: &mut Memory,

@@ -565,7 +565,8 @@ pub(crate) fn slow_position(at: VectorComponent) -> SlowErrors {
     SlowErrors::new(unit.x, unit.y, unit.z, 0.0, 0.0)
 }
 
-/// Returns the variance of the direction of a field's horizontal part; `variance` is that of one field coordinate.
+/// Returns the variance of the direction of a field's horizontal part. `variance` is the variance of one field
+/// coordinate.
 pub(crate) fn field_variance(field: &Vector3<f32>, variance: f32) -> f32 {
     let horizontal = field.x * field.x + field.y * field.y;
     let floor = 1e-6 * abs_max(field) * abs_max(field);

@@ -439,8 +439,8 @@ mod tests {
         }
     }
 
-    /// The gain is that of the analogue notch, (omega^2 - x^2)/(omega^2 - x^2 + j x omega/Q), times that of the lead,
-    /// within 2 %.
+    /// The gain is the product of the analogue notch's gain, (omega^2 - x^2)/(omega^2 - x^2 + j x omega/Q), and the
+    /// lead's gain, within 2 %.
     #[test]
     fn the_notch_hides_the_rotors_and_passes_the_flight() {
         for hover_rad_s in [65.0, 195.0, 600.0_f32] {

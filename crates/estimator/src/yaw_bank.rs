@@ -59,7 +59,7 @@ impl YawBank {
             self.begun = true;
             for (k, guess) in self.guesses.iter_mut().enumerate() {
                 let delta = wrap_angle(TAU / FILTERS as f32 * k as f32);
-                // Half the distance to the next filter.
+                // The standard deviation is half the distance to the next filter.
                 let dd = (0.5 * TAU / FILTERS as f32) * (0.5 * TAU / FILTERS as f32);
                 *guess = YawHypothesis { delta, dd, weight: 1.0 / FILTERS as f32, ..YawHypothesis::default() };
             }

@@ -105,8 +105,8 @@ fn outdoor() {
     check::<16>("outdoor", 1000, OUTDOOR, settings(&ICM), &OUTDOOR_AIDS);
 }
 
-/// A receiver whose slow error is much larger than its noise: the position's standard deviation is that of the slow
-/// error, the innovations' is that of the noise.
+/// A receiver's slow error is much larger than its noise. The position's standard deviation then equals the slow error.
+/// The innovations' standard deviation equals the noise.
 #[test]
 fn outdoor_with_a_slow_error() {
     let gnss = Some((0.4, 0.4, 0.1));
@@ -115,8 +115,8 @@ fn outdoor_with_a_slow_error() {
     check::<16>("outdoor with a slow error", 1000, sensors, settings, &OUTDOOR_AIDS);
 }
 
-/// A vehicle whose own field turns the heading much more than the noise does, so that the heading's standard deviation
-/// is that of the own field.
+/// A vehicle's own field turns the heading much more than the noise does. The heading's standard deviation then equals
+/// the effect of the own field.
 #[test]
 fn outdoor_with_iron() {
     let sensors = Sensors { iron: Some(0.03), ..OUTDOOR };

@@ -77,7 +77,7 @@ impl<M> FlightCoreMemory<M> {
 }
 
 impl<M: Default> FlightCoreMemory<M> {
-    /// Clears the law's memory in flight, as at arming. For a change of the law.
+    /// Clears the law's memory in flight, as at arming. This is needed for a change of the law.
     pub fn forget_law(&mut self) {
         if let Some(flight) = &mut self.flight {
             flight.control = M::default();

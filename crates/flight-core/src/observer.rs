@@ -112,7 +112,7 @@ impl PoseObserver {
         self.pose.age_us(now_us)
     }
 
-    /// Predicts one step with the commanded inputs. `reckoning` is that of the last step, in which it has
+    /// Predicts one step with the commanded inputs. `reckoning` comes from the last step, in which it has
     /// [measured](DeadReckoning::measure) this observer's state.
     pub fn advance(&mut self, dead_reckoning: &DeadReckoning, reckoning: &Reckoning, applied: &Inputs) {
         let DeadReckoning { dt_s, rotor_share, .. } = *dead_reckoning;

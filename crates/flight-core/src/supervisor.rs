@@ -247,7 +247,8 @@ impl Mode {
             Request::Arm if self.armed() => Err(Refusal::AlreadyArmed),
             Request::Arm => observed.ready,
             Request::Disarm if self.armed() && observed.airborne => Err(Refusal::InFlight),
-            // Accepted for a disarmed vehicle, too: a station repeats a command whose answer was lost.
+            // The request is accepted for a disarmed vehicle, too, since a station repeats a command whose answer was
+            // lost.
             Request::Disarm => Ok(()),
             Request::Engage if !self.armed() => Err(Refusal::NotArmed),
             Request::Engage => Ok(()),

@@ -53,7 +53,7 @@ fn every_error_is_answered_in_the_right_direction() {
         change(&mut state);
         state
     };
-    // Below the setpoint: more thrust. Rising: less thrust.
+    // A vehicle below the setpoint gets more thrust, and a rising one gets less.
     of_each(&moved(|s| s.position_m.z = -0.1), &hold, |name, (_, c)| assert!(c.inputs.thrust_n > WEIGHT_N, "{name}"));
     of_each(&moved(|s| s.velocity_m_s.z = 0.1), &hold, |name, (_, c)| assert!(c.inputs.thrust_n < WEIGHT_N, "{name}"));
     // Behind the setpoint along x: a positive pitch (nose down) tilts the thrust forward. Along y: a negative roll.

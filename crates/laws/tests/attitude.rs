@@ -49,7 +49,8 @@ fn the_tilt_comes_first_and_yaw_by_its_weight() {
         let r = Rotation3::from_scaled_axis(vector(&mut random, 1.5));
         let r_d = Rotation3::from_scaled_axis(vector(&mut random, 1.5));
         let (a, b) = (r.matrix().cast(), r_d.matrix().cast());
-        // By geometry: the shortest rotation of the thrust, then the remaining rotation about the thrust.
+        // The expected error consists of the shortest rotation of the thrust, then the remaining rotation about the
+        // thrust.
         let (z, z_d) = (r * Vector3::z(), r_d * Vector3::z());
         let tilt = Rotation3::rotation_between(&z, &z_d).unwrap();
         let left: Rotation3<f64> = (tilt * r).inverse() * r_d;

@@ -78,7 +78,7 @@ fn first(gains: Gains, state: &State, setpoint: &Setpoint) -> Vector3<f64> {
     Vector3::new(x.into(), y.into(), f64::from(trace.inputs.thrust_n) / 0.486 - 9.81)
 }
 
-/// Near the reference no bound is reached, and the first step is that of the best plan.
+/// Near the reference no bound is reached, and the first step equals the first step of the best plan.
 #[test]
 fn small_errors_are_answered_by_the_best_plan() {
     let mut random = Random(5);

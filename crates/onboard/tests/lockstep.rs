@@ -25,7 +25,7 @@ fn fields_are_little_endian_and_in_order() {
 }
 
 fn number() -> impl Strategy<Value = f32> {
-    // Any bits, including numbers that no sensor gives.
+    // The number may have any bits, including numbers that no sensor gives.
     any::<f32>().prop_filter("a NaN equals nothing", |x| !x.is_nan())
 }
 

@@ -45,7 +45,7 @@ pub fn worst_response_ns(tasks: &[PeriodicTask], index: usize) -> Option<u64> {
         // The window only grows, so the loop settles or leaves the horizon.
         loop {
             let others_ns = others().map(|other| {
-                // At least one release, since each of these tasks may run first.
+                // Each other task counts with at least one release, since it may run first.
                 (window_ns + other.jitter_ns).div_ceil(other.period_ns).max(1) * other.cost_ns
             });
             let next_ns = own_ns + others_ns.sum::<u64>();

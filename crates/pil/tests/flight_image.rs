@@ -18,7 +18,7 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// Far longer than needed, even on a busy machine.
+/// This time is far longer than needed, even on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
 /// Interval between states sent to the board \[us\]: QEMU's USART handles some 8 kB/s.
 const EVERY_US: u64 = 30_000;

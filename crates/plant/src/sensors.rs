@@ -79,7 +79,7 @@ parameters! {
 /// Measurement in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StateMeasurement {
-    /// Newest state that has arrived; with `gyro`, its rates are those of this step.
+    /// Newest state that has arrived. With `gyro`, its rates are from this step.
     pub state: State,
     /// Age of that state, apart from a gyro's rates \[s\]. The first state also stands for those before it.
     pub age_s: f64,

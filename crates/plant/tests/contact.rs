@@ -182,7 +182,7 @@ fn a_payload_brings_its_mass_and_its_inertia() {
     };
     let thrust = P.thrust_factor_n_s2 * (3.0 * 4e4 + 210.0 * 210.0);
     let moment = P.arm_m * P.thrust_factor_n_s2 * (210.0 * 210.0 - 4e4);
-    // Two point masses 0.1 m apart about their common centre: m1 (h m2/M)^2 + m2 (h m1/M)^2.
+    // Two point masses are 0.1 m apart. About their common centre they have the inertia m1 (h m2/M)^2 + m2 (h m1/M)^2.
     let total = P.mass_kg + 0.2;
     let ix = P.inertia_kg_m2.x + P.mass_kg * (0.1 * 0.2 / total).powi(2) + 0.2 * (0.1 * P.mass_kg / total).powi(2);
     for k in 0..1500 {

@@ -75,7 +75,7 @@ fn autocovariances(height_m: f64, wind_m_s: f64, step_s: f64, samples: usize, la
     let mut series = [const { Vec::new() }; 3];
     for _ in 0..samples {
         let eddies = air(&mut plant, step_s) - steady_m_s;
-        // Along +y, to its left -x, up.
+        // The three directions are along the wind (+y), to its left (-x), and up.
         for (series, value) in series.iter_mut().zip([eddies.y, -eddies.x, eddies.z]) {
             series.push(value);
         }

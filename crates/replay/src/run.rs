@@ -261,7 +261,7 @@ fn between(before: &Estimate, now: &Estimate, at_us: u64) -> Option<Estimate> {
         return None;
     }
     let (from_us, to_us) = (before.at_us, now.at_us);
-    // A time of zero is that of the default estimate, before the first step.
+    // A time of zero means the default estimate, before the first step.
     if !(from_us..=to_us).contains(&at_us) || to_us - from_us > GAP_US || from_us == 0 {
         return (to_us == at_us).then_some(*now);
     }

@@ -13,7 +13,7 @@ use afbc_types::{Axis, OutOfRange};
 /// Largest number of changes of one kind that act at the same time. Each change costs every step a little time.
 const ACTIVE_MAX: usize = 256;
 
-/// Weather and faults that act on a vehicle now, and those of its scenario.
+/// Weather and faults that act on a vehicle now, and the scenario's weather and faults.
 pub(crate) struct WorldChanges {
     suite: InstrumentSuite,
     scenario_wind: Wind,

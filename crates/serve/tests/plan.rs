@@ -159,7 +159,7 @@ fn what_is_not_understood_is_refused_by_name() {
     fn objects(value: &Value, path: &str, found: &mut Vec<String>) {
         match value {
             Value::Object(object) => {
-                // Of a complex item, only the list of computed simple items is flown.
+                // Only the list of computed simple items of a complex item is flown.
                 let is_described = path.ends_with("/items/6") || path.contains("TransectStyle");
                 if !is_described || path.ends_with("/Items/0") {
                     found.push(path.into());

@@ -408,11 +408,11 @@ impl Checker {
 /// End of a flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// Disarmed on the ground, with the motors still.
+    /// The vehicle is disarmed on the ground, with the motors still.
     Disarmed,
-    /// In the air and nearly still, in hold.
+    /// The vehicle is in the air and nearly still, in hold.
     Holds,
-    /// In the air, in another mode or moving.
+    /// The vehicle is in the air, in another mode or moving.
     Flies,
     /// None of the above.
     Lost,

@@ -166,7 +166,7 @@ fn fastest_rad_s(trajectory: &Trajectory) -> f64 {
             let legs = waypoints.iter().zip(waypoints.iter().skip(1));
             legs.map(|(from, to)| TAU / (to.time_s - from.time_s)).fold(0.0, f64::max)
         }
-        // Treats the largest jerk and the largest acceleration as those of a single sine.
+        // The largest jerk and the largest acceleration are treated as if they belonged to a single sine.
         Trajectory::Polynomials(pieces) => {
             let [_, acceleration, jerk, _] = peaks(pieces, SAMPLES);
             if acceleration > 0.0 { jerk / acceleration } else { 0.0 }

@@ -93,7 +93,7 @@ proptest! {
         prop_assert!(predicted_m < 1.6 * flown_m + 0.1 * v.norm() + 1.0, "{predicted_m} m of {flown_m} m");
     }
 
-    /// The distance of a path from an edge is that of its nearest point, found by sampling.
+    /// The distance of a path from an edge equals the distance of its nearest point, found by sampling.
     #[test]
     fn a_way_nears_an_edge_as_its_points_do(
         (a, b) in (place(), place()),

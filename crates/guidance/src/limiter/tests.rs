@@ -68,7 +68,8 @@ proptest! {
     }
 
     /// Two messages fit if the first's motion leads to the second's position and velocity with a linear change of the
-    /// acceleration. The tolerance is half of that of a passing stream. If they fit, the jerk is that between them.
+    /// acceleration. The tolerance is half of the tolerance for a passing stream. If they fit, the stream has the jerk
+    /// between them.
     #[test]
     fn two_messages_fit_by_the_trapezium_rule(
         first in any_complete(), speed in vector(3.0), change in vector(1.0), interval_s in 0.005..0.49f32,

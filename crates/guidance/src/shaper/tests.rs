@@ -173,7 +173,8 @@ fn of_one(v: &Vector2<f32>) -> Vector1<f32> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 3000, ..ProptestConfig::default() })]
 
-    /// A step's jerk is that of the formulas, for two coordinates, and for one with different limits in each direction.
+    /// A step's jerk follows the formulas, for two coordinates, and for one coordinate with different limits in each
+    /// direction.
     #[test]
     fn a_step_is_that_of_the_page(
         motion in any_motion(), goal in any_goal(), reach in any_reach(), a in 0.5..8.0f32, jerk_s in 0.5..60.0f32,

@@ -11,7 +11,7 @@ pub(super) const START: Range = Range::new("start_s", 0.0, 36_000.0);
 /// Refuses the key if a controller would refuse a sample of the reference, or if the reference lasts longer than the
 /// longest flight.
 pub(super) fn flyable(table: &Table<'_>, key: &str, trajectory: &Trajectory) -> Result<(), FileError> {
-    // First, since an unknown key may be a misspelt one that changes the path.
+    // Unknown keys are refused first, since one may be a misspelt key that changes the path.
     table.finish()?;
     let mut refused: Option<Reference> = None;
     trajectory.sample(&mut |at| {

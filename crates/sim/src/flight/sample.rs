@@ -35,7 +35,7 @@ pub struct Sample {
     pub estimates: Option<PerAxis<AdaptiveEstimate>>,
 }
 
-/// Returns AFBC's adaptive estimates, if `memory` is that of an AFBC controller; none for other laws.
+/// Returns AFBC's adaptive estimates if `memory` belongs to an AFBC controller; none for other laws.
 #[inline(always)]
 pub(super) fn estimates<const N: usize>(memory: &dyn Any) -> Option<PerAxis<AdaptiveEstimate>> {
     memory.downcast_ref().and_then(AnyControllerMemory::<N>::estimates)

@@ -282,7 +282,7 @@ where
         // Each update requests one transfer, instead of the burst that sends a row.
         self.timer.regs_gp16().dcr().modify(|burst| burst.set_dbl(0));
         self.timer.enable_update_dma(true);
-        // SAFETY: the address is that of a register that may be read at any time. Nothing else writes to the samples
+        // SAFETY: the address belongs to a register that may be read at any time. Nothing else writes to the samples
         // during the transfer, which ends at the latest when it is dropped.
         let transfer = unsafe { channel.read(request, port, samples, dma::TransferOptions::default()) };
         let deadline = Instant::from_micros(Instant::now().as_micros().wrapping_add(TRANSFER_MAX_US));

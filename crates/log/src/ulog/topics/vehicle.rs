@@ -29,7 +29,7 @@ message! {
 }
 
 impl VehicleState {
-    /// Returns the message. The two times are those of arming and of the last take-off \[us\].
+    /// Returns the message with the times of arming and of the last take-off \[us\].
     pub(crate) fn of(moment: &Moment<'_>, [armed_time, takeoff_time]: [u64; 2]) -> Self {
         let report = moment.report;
         VehicleState {
