@@ -303,7 +303,7 @@ fn receive(links: &mut impl Links, buffer: &mut [u8]) -> impl Future<Output = (u
     })
 }
 
-/// Sends all messages of a tick. Out of line, like the control tick, so that it can be identified in the image.
+/// Sends all messages of a tick. It is not inlined, like the control tick, so that it can be identified in the image.
 #[inline(never)]
 fn report(comms: &mut Comms, tick: &Tick, core_hz: u32, outgoing: &mut Vec<u8, REPORT_MAX>) {
     outgoing.clear();
@@ -311,8 +311,8 @@ fn report(comms: &mut Comms, tick: &Tick, core_hz: u32, outgoing: &mut Vec<u8, R
     comms.report(&tick.report, tick_us, |frame| drop(outgoing.extend_from_slice(frame)));
 }
 
-/// Reports the state of two inertial sensors. Out of line, and with its memory in a static of its own, so that boards
-/// with one sensor spend no memory on it.
+/// Reports the state of two inertial sensors. It is not inlined and has its memory in a static of its own, so
+/// that boards with one sensor spend no memory on it.
 #[inline(never)]
 fn report_imus(comms: &mut Comms, aux: &mut AuxSensors, now_us: u64) {
     static NEWS: Mutex<CriticalSectionRawMutex, RefCell<ImuNews>> = Mutex::new(RefCell::new(ImuNews::NEW));
@@ -325,7 +325,7 @@ fn report_imus(comms: &mut Comms, aux: &mut AuxSensors, now_us: u64) {
     }
 }
 
-/// Passes on a request for the sensors' self-tests, and reports their results. Out of line like `report`.
+/// Passes on a request for the sensors' self-tests, and reports their results. It is not inlined, like `report`.
 #[inline(never)]
 fn report_self_tests(comms: &mut Comms, aux: &mut AuxSensors) {
     if comms.wants_self_tests() {
@@ -339,7 +339,7 @@ fn report_self_tests(comms: &mut Comms, aux: &mut AuxSensors) {
 }
 
 /// Passes received motor controller telemetry on, requests the next answer and moves the notch filter. Returns the
-/// vehicle's reaction to a failed rotor, if any. Out of line like `report`.
+/// vehicle's reaction to a failed rotor, if any. It is not inlined, like `report`.
 #[inline(never)]
 fn listen_to_escs(
     comms: &mut Comms,
@@ -368,7 +368,7 @@ fn calibrator() -> &'static mut Calibrator {
     CALIBRATOR.init_with(Calibrator::new)
 }
 
-/// Advances a calibration, and sends raw sensor readings to ground stations. Out of line like `report`.
+/// Advances a calibration, and sends raw sensor readings to ground stations. It is not inlined, like `report`.
 #[inline(never)]
 fn calibrate(
     comms: &mut Comms,
@@ -381,7 +381,7 @@ fn calibrate(
 }
 
 /// Sends parameter values, passes on a changed parameter and changed signing records, and returns the changed
-/// parameter. Out of line like `report`.
+/// parameter. It is not inlined, like `report`.
 #[inline(never)]
 fn serve(
     comms: &mut Comms,

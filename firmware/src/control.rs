@@ -130,8 +130,8 @@ pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
     }
 }
 
-/// Stores the details of a tick that logs need besides its report. Out of line, since only boards that keep logs use
-/// it.
+/// Stores the details of a tick that logs need besides its report. It is not inlined, since only boards that keep logs
+/// use it.
 #[cold]
 #[inline(never)]
 fn write_details(
@@ -144,7 +144,7 @@ fn write_details(
     *slot = flight.details(inputs, before, messages);
 }
 
-/// Moves the notch filter if a new place is set, and returns its centre \[rad/s\]. Out of line like `tick`.
+/// Moves the notch filter if a new place is set, and returns its centre \[rad/s\]. It is not inlined, like `tick`.
 #[inline(never)]
 fn move_notch(flight: &mut Flight) -> Option<f32> {
     let notch = escs::moved_notch()?;
@@ -152,7 +152,7 @@ fn move_notch(flight: &mut Flight) -> Option<f32> {
     Some(notch.centre_rad_s())
 }
 
-/// Adopts the next configuration, if there is one, and returns its number. Out of line, since it runs rarely.
+/// Adopts the next configuration, if there is one, and returns its number. It is not inlined, since it runs rarely.
 #[inline(never)]
 fn adopt(flight: &mut Flight) -> Option<u16> {
     NEXT.lock(|next| {
@@ -166,8 +166,8 @@ fn adopt(flight: &mut Flight) -> Option<u16> {
 }
 
 /// Runs one control tick: takes the newest inputs; supervises, controls and gates the motors
-/// ([`afbc_flight_core::tick`]); drives them; checks the rate. Out of line, so that its stack and its instructions can
-/// be counted (`docs/budgets.md`).
+/// ([`afbc_flight_core::tick`]); drives them; checks the rate. It is not inlined, so that its stack and its
+/// instructions can be counted (`docs/budgets.md`).
 #[inline(never)]
 fn tick<B: Board>(
     flight: &mut Flight,

@@ -114,7 +114,7 @@ macro_rules! image {
             spawner.spawn($crate::executors::once(start_sampling(sampler)));
         }
 
-        // Out of line, so that the stacks of these functions are not used at the same time.
+        // These functions are not inlined, so that their stacks are not used at the same time.
         #[inline(never)]
         fn spawn_control(
             spawner: embassy_executor::SendSpawner,

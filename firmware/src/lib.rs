@@ -99,9 +99,9 @@ pub fn run<B: Board>(
     }
 }
 
-/// Reads the parameters, sets the links up by them, and creates the state of the link task. Out of line, so that the
-/// stack does not hold the parameters and the vehicle at the same time. Must run before the watchdog starts, since it
-/// reads every stored parameter.
+/// Reads the parameters, sets the links up by them, and creates the state of the link task. It is not inlined, so that
+/// the stack does not hold the parameters and the vehicle at the same time. Must run before the watchdog starts, since
+/// it reads every stored parameter.
 #[inline(never)]
 fn read<B: Board>(
     memory: B::Memory,

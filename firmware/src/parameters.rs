@@ -123,7 +123,7 @@ pub fn read<M: NorFlash>(memory: M, start: u32) -> (Keeper<M>, ParameterTable, S
     (Keeper(Some(store)), table, signing)
 }
 
-/// Returns the bits of a record. Out of line, since it is called for each part of the key.
+/// Returns the bits of a record. It is not inlined, since it is called for each part of the key.
 #[inline(never)]
 fn word<M: NorFlash>(store: &mut Store<Gate<M>>, name: RecordName) -> Option<u32> {
     store.get(name).ok().flatten().map(|(_, bits)| bits)
@@ -190,7 +190,7 @@ pub async fn run<M: NorFlash>(keeper: &mut Keeper<M>) -> ! {
     }
 }
 
-/// Writes a change. Out of line, so that it can be identified in the image.
+/// Writes a change. It is not inlined, so that it can be identified in the image.
 #[inline(never)]
 fn keep<M: NorFlash>(store: &mut Store<Gate<M>>, change: UnwrittenParameter) -> Result<(), Error<Shut>> {
     match change {

@@ -60,8 +60,8 @@ impl RadioLine {
         self.link
     }
 
-    /// Decodes bytes of the receiver, possibly none, and returns the pilot's inputs. Out of line, so that the image has
-    /// a symbol for it.
+    /// Decodes bytes of the receiver, possibly none, and returns the pilot's inputs. It is not inlined, so that the
+    /// image has a symbol for it.
     #[inline(never)]
     pub fn receive(&mut self, comms: &mut Comms, bytes: &[u8], table: &ParameterTable) -> Option<ControlInputs> {
         comms.pilot(&mut self.control, bytes, &table.configuration().radio)

@@ -110,8 +110,8 @@ fn put_selected(at_us: u64, select: impl FnOnce(&mut ImuSelector) -> Option<[Vec
     }
 }
 
-/// Cross-checks two inertial sensors after a tick that used `readings`. Out of line, so that it is not counted in the
-/// tick's stack and instructions.
+/// Cross-checks two inertial sensors after a tick that used `readings`. It is not inlined, so that it is not counted in
+/// the tick's stack and instructions.
 #[inline(never)]
 pub(crate) fn cross_check(flight: &Flight, readings: &Readings) {
     SELECTOR.lock(|selector| {

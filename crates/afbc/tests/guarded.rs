@@ -390,7 +390,7 @@ fn engaging_does_not_trip_by_itself() {
 fn a_reckoned_motion_shows_no_disturbance() {
     fn push<C: FlightController>(controller: &C, position_lost: bool) -> [f32; 2] {
         let (mut memory, mut state) = (Validated::<C::Memory>::default(), State::default());
-        // On its setpoint throughout, so that nothing is learnt from errors.
+        // The vehicle is on its setpoint throughout, so AFBC learns nothing from errors.
         let mut fly = |accelerates_m_s2: f32, position_lost| {
             let mut asked = 0.0;
             for _ in 0..1000 {

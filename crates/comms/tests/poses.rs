@@ -187,7 +187,7 @@ fn standard_deviations_count() {
 enum Left {
     States,
     Poses,
-    /// The same pose again and again.
+    /// The tracker sends the same pose again and again.
     Frozen,
     /// Poses with a large standard deviation.
     Unsure,

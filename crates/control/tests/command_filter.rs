@@ -9,7 +9,7 @@ use proptest::prelude::*;
 /// Relative rounding error of one `f32` operation.
 const U: f64 = 1.0 / (1 << 24) as f64;
 
-/// Any accepted bandwidth and time step, log-uniform, with the bounds drawn often.
+/// Draws any accepted bandwidth and time step, log-uniform, and the bounds often.
 fn bandwidth_and_step() -> impl Strategy<Value = (f32, f32)> {
     let over = |range: afbc_types::Range| {
         prop_oneof![

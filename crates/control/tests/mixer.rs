@@ -326,7 +326,7 @@ proptest! {
         prop_assert!(near(yaw.abs(), asked[2].abs().min(4.0 * room)), "{yaw} with {room} for {asked:?}");
     }
 
-    /// The same order on frames without symmetry, and on one with equal shares but no opposite rotors.
+    /// The order is the same on frames without symmetry, and on one with equal shares but no opposite rotors.
     #[test]
     fn uneven_frames_serve_in_the_same_order(
         frame in uneven(),

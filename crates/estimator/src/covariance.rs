@@ -140,7 +140,7 @@ struct VarianceBounds {
     most: f32,
 }
 
-/// From (1e-5 rad)^2 to the variance of a completely unknown angle.
+/// The variance is limited to (1e-5 rad)^2 and the variance of a completely unknown angle.
 const THETA: VarianceBounds = VarianceBounds { least: 1e-10, most: 3.3 };
 const VELOCITY: VarianceBounds = VarianceBounds { least: 1e-8, most: 1e4 };
 const POSITION: VarianceBounds = VarianceBounds { least: 1e-9, most: 1e8 };

@@ -14,13 +14,13 @@ use crate::rotation::identity;
 use afbc_control::math::{max, min};
 use nalgebra::Vector3;
 
-/// Time in which the watch forgets corrections, like that of a receiver's slow error \[s\].
+/// Time in which the watch forgets corrections: the usual time of a receiver's slow error \[s\].
 const FORGETS_S: f32 = 100.0;
 /// Longest time between two fixes over which corrections are summed \[s\].
 const APART_S: f32 = 1.0;
-/// Share of the receiver's variance that its slow error usually changes by within [`FORGETS_S`], and the variance by
-/// which a barometer's drift does \[m2\].
+/// Usual variance of the change of a receiver's slow error within [`FORGETS_S`], as a share of the receiver's variance.
 const CHANGES: f32 = 0.5;
+/// Usual variance of the change of a barometer's drift within [`FORGETS_S`] \[m2\].
 const DRIFTS_M2: f32 = 1.0;
 /// Corrections beyond this many standard deviations show that the receiver's height is wrong: while it is fused, and
 /// after its rejections for [`REJECTED_US`].

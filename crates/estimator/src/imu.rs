@@ -15,9 +15,9 @@ const SHARE: f32 = 0.01;
 /// Health of the IMU.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImuHealth {
-    /// No sample within the last 20 ms, or none yet.
+    /// There was no sample within the last 20 ms, or none yet.
     pub missing: bool,
-    /// The same numbers for too long.
+    /// The samples have had the same numbers for too long.
     pub stuck: bool,
     /// A coordinate was at the end of its range within the last 200 ms.
     pub clipped: bool,

@@ -20,7 +20,7 @@
 //! A step ahead takes five stamps in a row, or two among a sender's first messages. A step back takes three in a row
 //! that increase over 15 ms with offsets within 3 ms.
 
-/// Half of the window that determines the fastest message \[us\].
+/// Half of the window in which the fastest message is found \[us\].
 pub const WINDOW_US: u64 = 500_000;
 /// A stamp may lie at most this long ahead of the fastest message \[us\].
 pub const AHEAD_US: u64 = 2_000;

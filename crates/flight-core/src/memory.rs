@@ -235,7 +235,7 @@ impl<M> FlightCoreMemory<M> {
     }
 }
 
-/// Runs the fall check on the vehicle's own estimate. Out of line, to keep ticks without an own estimate fast.
+/// Runs the fall check on the vehicle's own estimate. It is not inlined, to keep ticks without an own estimate fast.
 #[inline(never)]
 fn check_fall(fall: &mut FallCheck, landing: &mut LandDetector, thrust_n: f32, state: &State, dt_s: f32) {
     if fall.stands(&state.velocity_m_s, landing.thrust_share(thrust_n), dt_s) {

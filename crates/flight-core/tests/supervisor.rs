@@ -14,7 +14,7 @@ const REQUESTS: [Option<Request>; 5] =
 /// Ages on both sides of each limit.
 const AGES_US: [u32; 8] = [0, COAST_US, COAST_US + 1, DESCEND_US, DESCEND_US + 1, GIVE_UP_US, GIVE_UP_US + 1, u32::MAX];
 
-/// In the air, with states fresh for long and no request.
+/// Inputs of a vehicle in the air, with states that have been fresh for long and without a request.
 const CALM: SupervisorInputs = SupervisorInputs {
     request: None,
     kill: false,

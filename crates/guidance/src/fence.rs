@@ -193,7 +193,7 @@ pub fn passes_edge(place_m: Vector2<f32>, a_m: Vector2<f32>, b_m: Vector2<f32>) 
 /// Reason to reject a polygon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PolygonFault {
-    /// Fewer than three vertices.
+    /// The polygon has fewer than three vertices.
     TooFew,
     /// Two consecutive vertices coincide, or an edge folds back onto the one before.
     Degenerate,

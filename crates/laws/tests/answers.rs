@@ -88,7 +88,7 @@ fn every_error_is_answered_in_the_right_direction() {
 fn turning_the_scene_about_the_vertical_changes_nothing_for_the_body() {
     let mut random = Random(1);
     for _ in 0..300 {
-        // Small enough that rounding cannot make a limit active in only one of the frames.
+        // The errors are small enough that rounding cannot make a limit active in only one of the frames.
         let (position, velocity) = (vector(&mut random, 0.5), vector(&mut random, 0.5));
         let attitude = Rotation3::from_scaled_axis(vector(&mut random, 0.4));
         let rates: Vector3<f32> = vector(&mut random, 0.5).cast();

@@ -50,7 +50,7 @@ fn decode<'a>(chunks: impl IntoIterator<Item = &'a [u8]>) -> (Vec<Uplink>, Count
 /// Length of the longest frame, which is signed \[bytes\].
 const LONGEST: usize = 280;
 
-/// Enough bytes for the decoder to decide about everything before them.
+/// Zeros after which the decoder has decided about everything before them.
 const FLUSH: [u8; LONGEST + 1] = [0; LONGEST + 1];
 
 /// Returns the `CRC_EXTRA` of a message of the `common` dialect.

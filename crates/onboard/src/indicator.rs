@@ -15,15 +15,15 @@ pub enum Indication {
     /// Starting up.
     #[default]
     Starting,
-    /// Disarmed, and cannot be armed: not at rest, without a position, or the like.
+    /// The vehicle is disarmed and cannot be armed: it is not at rest, has no position, or the like.
     NotReady,
-    /// Disarmed, and can be armed.
+    /// The vehicle is disarmed and can be armed.
     Ready,
     /// Armed.
     Armed,
-    /// Armed, and either a failsafe has taken over or the vehicle should land.
+    /// The vehicle is armed, and either a failsafe has taken over or the vehicle should land.
     Failsafe,
-    /// Disarmed, with a fault of a sensor, the clock or a task.
+    /// The vehicle is disarmed. A sensor, the clock or a task has a fault.
     Fault,
 }
 

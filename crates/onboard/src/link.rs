@@ -5,11 +5,11 @@ use afbc_types::{Choice, parameters};
 /// Times at which the black box is written, with PX4's numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LogMode {
-    /// From arming until one second after disarming, in each flight.
+    /// Logs from arming until one second after disarming, in each flight.
     Armed,
-    /// From power-up until one second after the first disarming, then as [`Armed`](Self::Armed).
+    /// Logs from power-up until one second after the first disarming, then as [`Armed`](Self::Armed).
     BootUntilDisarm,
-    /// From power-up until power-down.
+    /// Logs from power-up until power-down.
     Boot,
 }
 

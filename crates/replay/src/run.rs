@@ -31,12 +31,12 @@ const FRESH_US: u64 = 200_000;
 /// How the estimator started.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EstimatorStart {
-    /// By itself, at rest, at this time of the recording \[s\].
+    /// The estimator started by itself, at rest, at this time of the recording \[s\].
     AtRest(f64),
-    /// In the log's state at this time of the recording \[s\]. The reason is set if the estimator did not start by
-    /// itself at rest; it is none if the vehicle was in the air.
+    /// The estimator started in the log's state at this time of the recording \[s\]. The reason is set if the estimator
+    /// did not start by itself at rest; it is none if the vehicle was in the air.
     FromLog(f64, Option<Unready>),
-    /// It did not start.
+    /// The estimator did not start.
     Never(Unready),
 }
 

@@ -3,7 +3,7 @@
 use afbc_plant::{Deviations, Rotors, Sensing};
 use afbc_scenario::Scenario;
 
-/// Returns the name and value of each such part.
+/// Returns the name and value of each part that the scenario adds to the ideal vehicle.
 pub(super) fn rows(scenario: &Scenario) -> Vec<(&'static str, String)> {
     [rotors(scenario), air(scenario), sensors(scenario)].concat()
 }

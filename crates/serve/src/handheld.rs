@@ -12,9 +12,9 @@ const HEIGHT_M: f64 = 0.8;
 /// State of a vehicle in a person's hand: held, or put down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Grip {
-    /// Put down where the vehicle stood, and released.
+    /// The vehicle is put down where it stood, and released.
     Down,
-    /// Held in the air at this roll and pitch, and turned about the vertical.
+    /// The vehicle is held in the air at this roll and pitch, and turned about the vertical.
     Held {
         /// Roll and pitch \[rad\].
         level_rad: [f64; 2],

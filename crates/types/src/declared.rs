@@ -118,8 +118,8 @@ pub trait VisitorMut<E>: FnMut(&Declaration, DeclaredValueMut<'_>) -> Result<(),
 
 impl<E, F: FnMut(&Declaration, DeclaredValueMut<'_>) -> Result<(), E>> VisitorMut<E> for F {}
 
-/// Checks the range of a parameter. Out of line, with the error stored in `refused`, so that the code exists only once
-/// instead of once per parameter.
+/// Checks the range of a parameter. It is not inlined and stores the error in `refused`, so that the code exists only
+/// once instead of once per parameter.
 #[inline(never)]
 fn in_range(
     declaration: &Declaration,
@@ -130,8 +130,8 @@ fn in_range(
     if refused.is_ok() { Ok(()) } else { Err(()) }
 }
 
-/// Calls `visit` with a parameter of a group. Out of line: a copy of the declaration for each parameter would fill the
-/// flash.
+/// Calls `visit` with a parameter of a group. It is not inlined: a copy of the declaration for each parameter would
+/// fill the flash.
 ///
 /// # Errors
 /// The error that `visit` returns.

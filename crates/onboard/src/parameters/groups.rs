@@ -109,7 +109,7 @@ impl Configuration {
             return Err(Reason::on(name, "must be a whole number"));
         }
         let _ = self.write(parameter.place, value, parameter.range.min as f32);
-        // Read back: an f64 is rounded to the nearest f32, and a whole number has no -0.
+        // The value is read back, because an f64 is rounded to the nearest f32, and a whole number has no -0.
         self.parameter(Key::Place(parameter.place)).ok_or_else(|| Reason::on(name, "no such parameter"))
     }
 

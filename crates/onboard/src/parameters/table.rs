@@ -107,8 +107,8 @@ impl ParameterTable {
         self.could_fly(&self.now)
     }
 
-    /// Checks that the vehicle could fly with `candidate`. Out of line, since the firmware's budgets follow this call
-    /// through a pointer by name.
+    /// Checks that the vehicle could fly with `candidate`. It is not inlined, since the firmware's budgets follow this
+    /// call through a pointer by name.
     #[inline(never)]
     fn could_fly(&self, candidate: &Configuration) -> Result<(), OutOfRange> {
         (self.prepare)(candidate)
@@ -127,8 +127,8 @@ impl PartialEq for ParameterTable {
     }
 }
 
-/// Checks that a vehicle with `N` rotors could fly. Out of line, since the firmware's budgets follow the call of it by
-/// name.
+/// Checks that a vehicle with `N` rotors could fly. It is not inlined, since the firmware's budgets follow the call of
+/// it by name.
 #[inline(never)]
 fn check_rotors<const N: usize>(configuration: &Configuration) -> Result<(), OutOfRange> {
     Prepared::<N>::new(configuration).map(drop)

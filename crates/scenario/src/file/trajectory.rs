@@ -111,7 +111,7 @@ fn circle(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let radius_m = table.need_number(&RADIUS)?;
     let (acceleration_m_s2, period_s) = (table.number(&CENTRIPETAL)?, table.number(&PERIOD)?);
     let yaw_rad = yaw(table)?;
-    // First, since an unknown key may be a misspelt pace.
+    // Unknown keys are refused first, since one may be a misspelt pace.
     table.finish()?;
     match (acceleration_m_s2, period_s) {
         (Some(_), Some(_)) => {
@@ -158,7 +158,7 @@ fn lissajous(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
 fn waypoints(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let (mut waypoints, tables) = (Vec::<Waypoint>::new(), table.tables("waypoint")?);
     if tables.is_empty() && table.knows("waypoint") {
-        // First, since an unknown key may be a misspelt `waypoint`.
+        // Unknown keys are refused first, since one may be a misspelt `waypoint`.
         table.finish()?;
         return Err(table.missing("waypoint", "add [[trajectory.waypoint]] with time_s and position_m"));
     }

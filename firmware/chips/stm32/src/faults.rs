@@ -50,7 +50,7 @@ pub fn fault(stop_motors: fn()) -> ! {
 
 /// Waits until the watchdog resets the chip, which starts disarmed.
 fn wait_for_watchdog() -> ! {
-    // Otherwise control ticks could continue and feed the watchdog.
+    // With interrupts enabled, control ticks could continue and feed the watchdog.
     cortex_m::interrupt::disable();
     loop {
         cortex_m::asm::nop();

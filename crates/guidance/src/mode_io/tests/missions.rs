@@ -119,7 +119,8 @@ fn a_waypoint_on_the_ground_begins_with_a_climb() {
     assert!(!step.output.lifts);
 }
 
-/// A take-off climbs vertically to its height, or not at all if already higher, and is reached there.
+/// A take-off item climbs vertically to its height and is reached there. A vehicle that is already higher does not
+/// climb.
 #[test]
 fn a_takeoff_item_climbs_to_its_height() {
     for (z, top) in [(1.0, 6.0), (9.0, 9.0)] {
