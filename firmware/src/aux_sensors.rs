@@ -64,8 +64,8 @@ pub fn put_fix(at_us: u64, fix: Option<GnssReading>) {
         satellites: fix.satellites,
         sigma_mm: [fix.horizontal_sigma_m, fix.vertical_sigma_m].map(|sigma_m| (sigma_m * 1e3) as u32),
     });
-    // Computed outside the lock, because positions are in double precision and the lock holds up all interrupts. No
-    // other task changes the frame.
+    // The position is computed outside the lock, because positions are in double precision and the lock holds up all
+    // interrupts. No other task changes the frame.
     let mut frame = with(|known| known.frame).unwrap_or(FixFrame::NEW);
     let measured = fix.and_then(|fix| Some((fix, frame.measure(&fix)?)));
     let first = measured.filter(|(_, (_, is_first))| *is_first).map(|(fix, _)| fix);

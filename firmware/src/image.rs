@@ -58,7 +58,7 @@ macro_rules! image {
             $crate::parameters::run(&mut keeper).await
         }
 
-        // Spawned from within its executor, because the futures of sensor transfers are not Send.
+        // The task is spawned from within its executor, because the futures of sensor transfers are not Send.
         #[embassy_executor::task]
         async fn start_sampling(sampler: <$board as $crate::board::Board>::Sampler) {
             let task = $crate::executors::once(sampling(sampler));
@@ -141,7 +141,7 @@ macro_rules! image {
             spawner.spawn($crate::executors::once(parameters(keeper)));
         }
 
-        // Defined here because the type contains the core's clock rate.
+        // The driver is defined here because its type contains the core's clock rate.
         $crate::time::time_driver_impl!(
             static TIME: $crate::time::SysTickDriver<{ <$board as $crate::board::Board>::CORE_HZ / 1_000_000 }> =
                 $crate::time::SysTickDriver

@@ -115,7 +115,7 @@ impl Autopilot for NetworkBoard {
             }
             thread::sleep(left.min(NAP));
         }
-        // Counted from the former deadline, so that delays are made up for.
+        // The period counts from the former deadline, so that delays are made up for.
         self.deadline = Some(deadline + PERIOD);
         self.socket.write(uplink).map_err(failed)
     }

@@ -47,8 +47,8 @@ impl SerialBoard {
     fn listen(&mut self, deadline: Instant, hear: &mut dyn FnMut(&[u8])) -> io::Result<()> {
         let mut buffer = [0; 4096];
         loop {
-            // Read only if bytes are waiting: otherwise the read would block for the port's timeout, far longer than a
-            // millisecond.
+            // The port is read only if bytes are waiting. Otherwise the read would block for the port's timeout, far
+            // longer than a millisecond.
             if self.port.bytes_to_read()? > 0 {
                 let length = self.port.read(&mut buffer)?;
                 hear(buffer.get(..length).unwrap_or_default());
@@ -67,7 +67,7 @@ impl Autopilot for SerialBoard {
         let deadline = *self.deadline.get_or_insert_with(Instant::now);
         self.listen(deadline, hear).map_err(failed)?;
         self.late_max = self.late_max.max(deadline.elapsed());
-        // Counted from the former deadline, so that delays are made up for.
+        // The period counts from the former deadline, so that delays are made up for.
         self.deadline = Some(deadline + PERIOD);
         self.port.write_all(uplink).map_err(failed)
     }

@@ -25,7 +25,7 @@ fn says_how_far_the_estimates_are_apart() {
     assert!((number("heading_rms_deg") - 1.38).abs() < 0.2 && number("tilt_rms_deg") < 0.3, "{found:#}");
     assert!((number("velocity_rms_m_s") - 0.1).abs() < 0.02, "{found:#}");
     assert!((number("horizontal_rms_m") - 0.3).abs() < 0.05, "{found:#}");
-    // Compared over the second half of the time after the start, since that time is shorter than 20 s.
+    // The estimate is compared over the second half of the time after the start, since that time is shorter than 20 s.
     assert!((number("measured_from_s") - 8.0).abs() < 0.2, "{found:#}");
     for name in ["attitude.svg", "velocity.svg", "position.svg", "difference.svg"] {
         let text = fs::read_to_string(out.join(name)).unwrap();

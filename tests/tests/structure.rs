@@ -221,7 +221,7 @@ fn crates_to_be_published_have_complete_metadata() {
         let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
         let has = |start: &str| manifest.lines().any(|line| line.starts_with(start));
         if has("publish") {
-            // Inherited from the workspace, where publishing is off too.
+            // The key may be inherited from the workspace, where publishing is off too.
             assert!(has("publish.workspace = true") || has("publish = false"), "{}", folder.display());
             continue;
         }

@@ -260,7 +260,7 @@ impl Driver<MatekH743> for RestartRun {
             self.found.push((self.cut_ns, self.values));
             return self.next(session, stop, host);
         }
-        // Requested again and again, since a starting board does not receive yet.
+        // The parameters are requested again and again, since a starting board does not receive yet.
         if (stop.at.0 - self.started_ns) % (20 * MS) != 0 {
             return Some(VirtualNanos(stop.at.0 + MS));
         }

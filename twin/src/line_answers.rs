@@ -54,7 +54,8 @@ impl LineAnswers {
     /// Returns the time of the next step \[ns\].
     pub fn next_ns(&self) -> Option<u64> {
         let ([sampled_ns, begins_ns], bits) = self.now?;
-        // Counted from the first bit, so that rounding errors do not add up; after the last bit, the end of sampling.
+        // The time counts from the first bit, so that rounding errors do not add up. After the last bit, it is the end
+        // of sampling.
         let bit_ns = begins_ns + (bits as f64 * BIT_NS) as u64;
         Some(if bits <= BITS { bit_ns } else { sampled_ns + SAMPLED_NS })
     }

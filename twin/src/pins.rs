@@ -248,7 +248,7 @@ impl TimerFrames {
         }
         let taken = taken + 1;
         self.sampling = Sampling::Reads(first_ns, taken);
-        // Counted from the first bit, so that rounding errors do not add up.
+        // The time counts from the first bit, so that rounding errors do not add up.
         Some(first_ns + (taken as f64 * BIT_NS) as u64)
     }
 

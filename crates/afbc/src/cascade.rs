@@ -213,7 +213,7 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
         let observed_m_s2 = self.observe_forces(&mut filters.forces, state, &attitude, hover_n, conditions);
         let gyroscopic_rad_s2 = self.model.gyroscopic(&state.rates_rad_s, *rotor_residual_rad_s);
         let velocity_body_m_s = attitude.in_body(&state.velocity_m_s);
-        // Given to the moment observer, which would otherwise compensate the known moments a second time.
+        // The moment observer gets the known moments, which it would otherwise compensate a second time.
         let known_rad_s2 = gyroscopic_rad_s2 + self.drag_acceleration_rad_s2(&velocity_body_m_s, share);
         let observed_rad_s2 = self.observe_moments(&mut filters.moments, &state.rates_rad_s, &known_rad_s2, conditions);
         let context = StepContext {

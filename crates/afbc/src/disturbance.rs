@@ -313,8 +313,8 @@ impl MomentObserver {
             given_rad_s2: given,
             known_rad_s2,
         } = memory;
-        // Delayed to the assumed age of the rates; otherwise every change of the known moments would be observed as a
-        // disturbance.
+        // The known moments are delayed to the assumed age of the rates. Otherwise every change of them would be
+        // observed as a disturbance.
         *known_rad_s2 = (*known_rad_s2 + (known - *known_rad_s2) * self.age).map(math::settled);
         let off = rates_rad_s - *omega_hat;
         let found =

@@ -95,7 +95,8 @@ impl<const N: usize> Guarded<N> {
         let mixer = settings.common.mixer(vehicle)?;
         mixer.check_hover(weight_n)?;
         let hover = Range {
-            // Rounded up to four decimals, so that the number in the error is short and is accepted when entered.
+            // The bound is rounded up to four decimals, so that the number in the error is short and is accepted when
+            // entered.
             min: libm::ceil(f64::from(hover_theta(settings.feed_forward) * weight_n) * 1e4) / 1e4,
             ..Safeguards::THETAMAX.range
         };

@@ -424,7 +424,8 @@ fn a_reckoned_motion_shows_the_fallback_law_no_disturbance() {
     let asked = [false, true].map(|position_lost| {
         let ((_, mut memory), mut state) = (tripped(50, 0.0), State::default());
         let mut asked = 0.0;
-        // Pushed first, then not, if the motion were measured. On its setpoint, so nothing is learnt from errors.
+        // If the motion were measured, the vehicle would be pushed first, then not. It is on its setpoint, so nothing
+        // is learnt from errors.
         for accelerates_m_s2 in [1.0, 0.0] {
             for _ in 0..1000 {
                 if position_lost && accelerates_m_s2 == 0.0 {

@@ -292,7 +292,7 @@ fn what_an_operator_does_wrong_is_told() {
     let (_, told) = six_sides(&mut hands, &Mounting::PLAIN, &[Side::Down], |_| [0.8, 0.0]);
     assert_eq!(told, [CalibrationEvent::Pending(Sides::ALL), CalibrationEvent::Askew]);
 
-    // Put down elsewhere a second after the side was detected.
+    // The vehicle is put down elsewhere a second after the side was detected.
     let (mut accelerometer, mut told) = (AccelerometerCalibration::new(&Mounting::PLAIN, GRAVITY as f32), Vec::new());
     hands.put(Side::Up, [0.0; 2]);
     (0..60).for_each(|_| assert_eq!(accelerometer.step(&hands.sample(), keep(&mut told)), None));

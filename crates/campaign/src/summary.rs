@@ -91,7 +91,7 @@ pub struct CampaignSummary {
 impl CampaignSummary {
     /// Creates an empty summary.
     pub fn new(manifest: &Manifest) -> Self {
-        // Allocated at once, since only these lists grow with the number of flights.
+        // The lists are allocated at once, since only they grow with the number of flights.
         let values = || Vec::with_capacity(manifest.shard.count(manifest.flights) as usize);
         let tally = |contender: &String| ContenderSummary {
             contender: contender.clone(),

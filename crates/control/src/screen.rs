@@ -49,7 +49,7 @@ impl Screen {
             self.setpoint = Some(*setpoint);
         }
         let state = self.state.as_ref()?;
-        // Kept over the steps: the hold must not follow a vehicle that drifts away.
+        // The setpoint is kept over the steps: the hold must not follow a vehicle that drifts away.
         Some((state, self.setpoint.get_or_insert_with(|| Setpoint::hold(state))))
     }
 }

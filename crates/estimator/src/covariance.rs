@@ -541,7 +541,7 @@ impl Covariance {
         };
         self.subtract(k, &w);
         self.subtract(&w, k);
-        // Subtracted only once, because the slow errors have no gain.
+        // The slow errors are subtracted only once, because they have no gain.
         self.slow.subtract(k, y);
         // The two products are subtracted one after the other, and rounding makes the halves of a block differ.
         for block in [&mut self.tt, &mut self.vv, &mut self.pp, &mut self.gg, &mut self.aa] {

@@ -169,7 +169,8 @@ impl Estimator {
             return false;
         }
         let Some(gap_us) = since_us.filter(|since_us| *since_us < LOST_US) else {
-            // First sample after a start in the air, after lost samples or after a jump of the sample clock.
+            // This is the first sample after a start in the air, after lost samples or after a jump of the sample
+            // clock.
             if last_us.is_some() {
                 memory.restart(sample.at_us);
             }
@@ -205,7 +206,8 @@ impl Estimator {
         interval.turn = (memory.rotation + memory.nominal.rotation) * (0.5 * interval.time_s);
         let mut growth = self.growth;
         growth.velocity += self.linearization_error(memory);
-        // Rotated before the prediction, because the corrections were made at the beginning of the interval.
+        // The covariance is rotated before the prediction, because the corrections were made at the beginning of the
+        // interval.
         memory.covariance.turn(&matrix(&renormalized(&memory.turned)));
         memory.turned = identity();
         memory.covariance.predict(&interval, &growth);

@@ -49,7 +49,7 @@ impl GeodeticOrigin {
     /// ```
     #[must_use]
     pub fn local(&self, latitude_deg: f64, longitude_deg: f64, altitude_m: f64) -> Vector3<f32> {
-        // Subtracted in f64, because an f32 in degrees does not resolve centimetres.
+        // The difference is taken in f64, because an f32 in degrees does not resolve centimetres.
         let mut east_deg = longitude_deg - self.longitude_deg;
         // The shorter way across the date line.
         if east_deg > 180.0 {

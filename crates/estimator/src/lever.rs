@@ -293,7 +293,7 @@ impl LeverArm {
             let of_row = *p * row;
             let expected = row.dot(&of_row) + ALIKE * *variance;
             if rest * rest < GATE * GATE * expected {
-                // Subtracted as a square, so that the matrix stays symmetric.
+                // The term is subtracted as a square, so that the matrix stays symmetric.
                 let root = of_row / sqrt(expected);
                 *p -= root * root.transpose();
                 let before_m = self.lever_m;

@@ -21,7 +21,7 @@ fn measure(sensors: crate::common::Sensors, settings: Settings, seeds: u64) -> E
         let mut flight = Flight::with(&truth, ICM, sensors, 77 + seed, settings);
         for ms in 0..30_000 {
             let estimate = flight.step();
-            // Compared after 10 s with the truth at the same moment, because the estimate is of the present.
+            // The estimate is compared after 10 s with the truth at the same moment, because it describes the present.
             if ms >= 10_000 {
                 let validity = estimate.validity;
                 assert!(validity.attitude && validity.heading && validity.velocity && validity.position, "{ms} ms");

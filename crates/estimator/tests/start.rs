@@ -26,7 +26,7 @@ fn starts_at_rest_level_and_unbiased() {
 fn tells_why_it_does_not_start() {
     let why = |change: &dyn Fn(usize, &mut ImuSample)| at_rest(3000, NOTHING, change).0.unready;
     assert_eq!(why(&|_, _| ()), None);
-    // Carried about: a slow swing, and a turn about the vertical.
+    // The vehicle is carried about, with a slow swing and a turn about the vertical.
     let swing = |ms: usize, s: &mut ImuSample| {
         let (sine, cosine) = (ms as f32 * 2e-3).sin_cos();
         s.rates_rad_s.x += 0.2 * cosine;

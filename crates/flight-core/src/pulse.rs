@@ -41,7 +41,7 @@ pub struct PulseTiming {
 impl PulseTiming {
     /// Computes the pulse lengths for a timer with this clock.
     pub fn new(clock: TimerClock, format: PulseFormat) -> Self {
-        // In millionths of a clock. A period is at most 1.25 million clocks.
+        // `clocks` returns millionths of a clock. A period is at most 1.25 million clocks.
         let clocks = |us: u16| u64::from(clock.hz()) * u64::from(us);
         let longest = 1_000_000 * u64::from(u16::MAX);
         let divider = clocks(format.period_us).div_ceil(longest).max(1);

@@ -179,7 +179,8 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
             stands: flight.as_ref().is_some_and(|flight| flight.landing.stands()),
             tumbled: flight.as_ref().is_some_and(|flight| flight.tumble.is_lost()),
         };
-        // Answered for the mode before the transition: afterwards, the request that armed the vehicle would be refused.
+        // The request is answered for the mode before the transition. Afterwards, the request that armed the vehicle
+        // would be refused.
         let answer = asked.map(|asked| {
             let result = mode.answer(asked.value, &observed);
             RequestAnswer { ticket: asked.ticket, request: asked.value, result }
@@ -244,7 +245,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
         let dt_s = self.controller.dt_s();
         if inbox.idle_on_ground() {
             if airborne {
-                // Touched the ground, but not confirmed: the law keeps its memory.
+                // The vehicle has touched the ground, but the landing is not confirmed, so the law keeps its memory.
                 flight.applied = Inputs::default();
             } else {
                 flight.rest(&self.dead_reckoning, fresh.or(position_lost));

@@ -254,7 +254,7 @@ const CASES: &[Case] = &[
         f.push(disarm);
     }, &[(0, Flying)], |s| s.answers.is_empty() && s.counters.bad_checksum == 1),
 
-    // Reordered and repeated frames.
+    // These cases have reordered and repeated frames.
     ("states swapped in pairs", |f| delay_states(f, 0..1000, |at| if at % 2 == 0 { 2 } else { 0 }),
         &[(0, Flying)], |_| true),
     ("states in blocks of 10, back to front", |f| delay_states(f, FOREVER, |at| 9 - at % 10 + 9 - at % 10),

@@ -327,7 +327,7 @@ fn a_state_that_comes_back_near_the_ground_leads_the_descent_there() {
         state.position_m.z -= SINK_M_S * 1e-3;
     }
     state.velocity_m_s.z = 0.0;
-    // It stops on the ground. The thrust must be low as well, both for a second.
+    // The vehicle stops on the ground. It has landed when it has stood still with low thrust for a second.
     let mut uncarried_ms = 0;
     let ended = (0..3000).find_map(|_| {
         uncarried_ms += u32::from(bench.trace().inputs.thrust_n < 0.6 * WEIGHT_N);

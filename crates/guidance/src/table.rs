@@ -39,7 +39,7 @@ impl FailsafeAction {
             FlightMode::Hold => FailsafeAction::Hold,
             _ => FailsafeAction::Warn,
         };
-        // Compared by number, since the derived order is not const.
+        // The values are compared by number, since the derived order is not const.
         does as u8 >= self as u8
     }
 }

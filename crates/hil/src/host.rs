@@ -352,7 +352,7 @@ impl Host {
         let report = self.flight.tick(time_us, &mut self.taken, &readings);
         self.comms.report(&report, tick_us, &mut send);
         let action = self.comms.escs(&mut self.esc_reports, &heard, &report);
-        // Applied between two ticks, as on the board: the next tick is the first with the new notch.
+        // The notch moves between two ticks, as on the board. The next tick is the first with the new notch.
         action.notch.iter().for_each(|notch| self.flight.move_notch(notch));
         // The details are taken before anything in them changes.
         let details = (self.black_box.is_some() || self.files.is_some()).then(|| self.details());
@@ -371,7 +371,7 @@ impl Host {
         let change = self.comms.parameters(&mut self.table, &mut send);
         if change.is_some() {
             self.esc_reports.adopt(self.table.configuration());
-            // Adopted at once, because the vehicle is disarmed and each change has been checked.
+            // The configuration is adopted at once, because the vehicle is disarmed and each change has been checked.
             let adopted = self.flight.adopt(&self.law, self.table.configuration());
             debug_assert_eq!(adopted, Ok(true), "a checked change was not adopted");
         }
@@ -393,7 +393,7 @@ impl Host {
             stream.tick(tick, self.comms.esc_telemetry(), &self.table, change);
             stream.sent(time_us, &bytes);
         }
-        // Incremented before the following inputs are merged, which belong to the next tick.
+        // The number is incremented before the following inputs are merged, which belong to the next tick.
         self.next.number = self.next.number.wrapping_add(1);
         if let Some(news) = &action.inputs {
             self.merge(news);

@@ -129,8 +129,8 @@ impl Gains {
         smoothing: Smoothing::DEFAULT,
     };
 
-    /// Law with the integrals of 2013, tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms
-    /// (`docs/tuning.md`).
+    /// Gains of the law with the integral terms of 2013, tuned by `sitl tune` for the paper's vehicle with a rotor lag
+    /// of 20 ms (`docs/tuning.md`).
     pub const TUNED: Self = Self::DEFAULT;
 
     /// Gains of the law with the integral terms that Goodarzi published in 2013. They are tuned by hand for the paper's

@@ -241,7 +241,7 @@ impl<const N: usize> FlightController<N> for L1<N> {
         self.geometric.learn(&mut memory.geometric, &lesson, fresh, unallocated);
         memory.geometric.trace = trace;
 
-        // Advanced before the prediction, which spans the step that this command begins.
+        // The rotors advance before the prediction, which spans the step that this command begins.
         self.rotors.advance(&mut memory.rotors, &action.speeds);
         let now = self.rotors.inputs(body, &memory.rotors);
         memory.prediction = fresh.then(|| self.predict(memory, state, &body_z, &now));

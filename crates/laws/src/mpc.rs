@@ -189,7 +189,7 @@ impl RiccatiSolution {
         for _ in 0..RICCATI {
             let (_, _, closed) = step(&p);
             let next = q + a.tr_mul(&(p * closed));
-            // Made symmetric again, so that rounding errors do not build up over the iterations.
+            // The matrix is made symmetric again, so that rounding errors do not build up over the iterations.
             p = (next + next.transpose()) * 0.5;
         }
         let (gain, inverse, closed) = step(&p);

@@ -31,7 +31,7 @@ pub fn slowed<G: Declared>(mut gains: G, slowness: f32, lag_s: f32) -> G {
             if *id == ROTOR_LAG {
                 numbers.iter_mut().for_each(|number| *number = within(lag_s));
             } else if factor != 1.0 {
-                // Unchanged to the last bit for the lag for which the gains were tuned.
+                // The gains are unchanged to the last bit for the lag for which they were tuned.
                 numbers.iter_mut().for_each(|number| *number = within(*number * factor));
             }
         }

@@ -122,7 +122,7 @@ impl StateSensor {
         let period = whole_steps(sensing.period_s, step_s).max(1);
         Ok(StateSensor {
             noise: (sensing.noise != Deviations::default()).then_some(sensing.noise),
-            // Drawn even if the bias is zero, so that a bias does not change the later noise.
+            // The bias is drawn even if it is zero, so that a bias does not change the later noise.
             bias: sensing.bias.draw(&mut random),
             random,
             delay: DelayLine::new(steps, State::default()),
@@ -150,7 +150,7 @@ impl StateSensor {
     #[inline]
     pub fn measure(&mut self, motion: &Motion) -> StateMeasurement {
         let mut measured = sum(motion, &self.bias);
-        // Drawn in every step, sampled or not, so that the sampling rate does not change the noise.
+        // The noise is drawn in every step, sampled or not, so that the sampling rate does not change it.
         if let Some(spread) = &self.noise {
             measured = sum(&measured, &spread.draw(&mut self.random));
         }

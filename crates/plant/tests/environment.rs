@@ -172,7 +172,7 @@ fn a_parameter_change_acts_while_it_lasts() {
     ];
     for (quantity, changed) in cases {
         for step in 0..3_usize {
-            // A new vehicle at rest for each step, so that only the rotors act.
+            // Each step has a new vehicle at rest, so that only the rotors act.
             let (start, end) = (1.0 - step as f64, 2.0 - step as f64);
             let environment =
                 Environment::new(P, vec![change(quantity, 1.4, start * 1e-6, end * 1e-6)], vec![]).unwrap();

@@ -95,7 +95,7 @@ proptest! {
         prop_assume!(at + 1 < bumped.len());
         let [left, right] = [bumped[at].duration_s, bumped[at + 1].duration_s];
         let knot = |t: f64| -> PolynomialCoefficients {
-            // A septic with velocity 1 at 0 and all other end conditions zero.
+            // A polynomial of degree seven with velocity 1 at 0 and all other end conditions zero.
             [0.0, 1.0, 0.0, 0.0, -20.0 / t.powi(3), 45.0 / t.powi(4), -36.0 / t.powi(5), 10.0 / t.powi(6)]
         };
         for (i, c) in knot(right).iter().enumerate() {

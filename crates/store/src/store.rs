@@ -275,7 +275,7 @@ impl<F: NorFlash> Store<F> {
         let mut active = self.active.ok_or(Error::NeedsErase)?;
         while active.next < Self::PLACES {
             let place = active.next;
-            // Counted before the write: a failed write may leave the place not blank, and it is not tried again.
+            // The place is counted before the write. A failed write may leave it not blank, and it is not tried again.
             active.next += 1;
             self.active = Some(active);
             if self.write(active.sector, place, record)? {

@@ -276,7 +276,7 @@ impl FlightBuilder<'_> {
     fn payload(&self, name: &'static str, flight: TrainingFlight, ahead_m: f64) -> Result<Scenario, Box<dyn Error>> {
         let scenario = self.windy(TrainingFlight { name, ..flight })?;
         let VehicleScale { arm, .. } = self.scale;
-        // Scaled like 20 % more mass, so that the payload takes the same share of the reserve.
+        // The payload is scaled like 20 % more mass, so that it takes the same share of the reserve.
         let share = 0.2 * ((self.scale.mass(1.2) - 1.0) / (1.2 - 1.0));
         let payload = Payload {
             mass_kg: share * scenario.vehicle.mass_kg,

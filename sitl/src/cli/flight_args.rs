@@ -54,7 +54,7 @@ impl FlightArgs {
                 log_every.push(log_hz.steps(scenario, contender)?);
             }
         }
-        // Opened only now, so that a refused command leaves no folder behind.
+        // The folder is opened only now, so that a refused command leaves no folder behind.
         let folder = open()?;
         if self.log_hz.is_none() {
             let longest_s = scenarios.iter().map(|scenario| scenario.duration_s).fold(0.0, f64::max);

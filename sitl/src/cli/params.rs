@@ -107,7 +107,8 @@ fn act(action: &ParamsAction, vehicle: &Vehicle) -> Result<(), CommandError> {
         }
         ParamsAction::Import { file, of } => {
             let Some(path) = &of.store else { return Err("--store is missing; name the file to import into".into()) };
-            // First on a copy of the table, so that a rejected file neither creates nor changes a store.
+            // The file is first applied to a copy of the table, so that a rejected file neither creates nor changes a
+            // store.
             let changes = take(&mut table.clone(), file)?;
             let mut store = open(path, vehicle, FlashFile::open)?;
             store.make_room().map_err(|error| failed(path, &error))?;

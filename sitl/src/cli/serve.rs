@@ -162,7 +162,7 @@ impl ServeArgs {
         let stop = Arc::new(AtomicBool::new(false));
         let stopper = Arc::clone(&stop);
         ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
-        // Created only now, so that a refused command leaves no file behind.
+        // The files are created only now, so that a refused command leaves no file behind.
         let logs = exact_logs.iter().map(|output| Ok::<_, CommandError>((output.path(), LogFile::create(output)?)));
         let logs = logs.collect::<Result<Vec<_>, _>>()?;
         server.record(logs.iter().map(|(_, log)| log.clone()).collect());

@@ -139,7 +139,7 @@ impl TuneArgs {
         if let Some(output) = &output {
             let text = report()?;
             if let Err(error) = output.write(|to| to.write_all(text.as_bytes())) {
-                // Printed instead, so that the result of a long search is not lost.
+                // The result is printed instead, so that the result of a long search is not lost.
                 print(&text)?;
                 return Err(error.into());
             }

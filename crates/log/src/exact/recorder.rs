@@ -25,7 +25,7 @@ impl Recorder {
         self.configuration = 0;
         self.frame(&Record::Start(StartRecord::of(vehicle, law, table)), send);
         for parameter in table.iter() {
-            // Compared bit by bit: 0 and -0 are equal, but a replay must match to the last bit.
+            // The values are compared bit by bit: 0 and -0 are equal, but a replay must match to the last bit.
             let image = table.default_of(parameter.name).map(|parameter| parameter.value.to_bits());
             if image != Some(parameter.value.to_bits()) {
                 self.frame(&Record::Parameter { configuration: 0, name: parameter.name, value: parameter.value }, send);

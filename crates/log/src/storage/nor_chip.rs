@@ -18,9 +18,9 @@ const BUSY: u8 = 1 << 0;
 const ENABLED: u8 = 1 << 1;
 /// Longest wait \[us\]: twice the longest erasure of a block, 2 s. A page takes at most 3 ms (section 9.6).
 const PATIENCE_US: u64 = 4_000_000;
-/// The third byte n of the identification means 2^n bytes. Accepted values, from 128 KiB on; then the value of the
-/// largest size that three address bytes reach.
+/// Accepted values of the third byte n of the identification, which means 2^n bytes. The smallest is 128 KiB.
 const SIZES: RangeInclusive<u8> = 0x11..=0x22;
+/// Value of that byte for the largest size that three address bytes reach.
 const REACH: u8 = 0x18;
 
 /// A chip on an SPI bus.

@@ -159,7 +159,7 @@ impl<P: LogPages> LogStore for KeptLogs<P> {
         match self.ask(LogQuery::Erase) {
             Poll::Ready(KeeperAnswer::None) => Poll::Ready(true),
             Poll::Ready(KeeperAnswer::Failed) => Poll::Ready(false),
-            // Erased one by one, so that the blocks of a log never wait for all of them.
+            // Logs are erased one by one, so that the blocks of a log never wait for all of them.
             Poll::Ready(KeeperAnswer::Is(_)) => {
                 self.wait_for(LogQuery::Erase);
                 Poll::Pending

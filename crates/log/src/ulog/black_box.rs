@@ -122,7 +122,7 @@ impl BlackBox {
         if !self.definitions.is_done() {
             return;
         }
-        // Cut between letters, for readers expect UTF-8.
+        // The text is cut between letters, because readers expect UTF-8.
         let end = (0..=TEXT_MAX.min(text.len())).rfind(|end| text.is_char_boundary(*end)).unwrap_or_default();
         let text = text.get(..end).unwrap_or_default();
         let _ = self.dropouts.put(now_us, &mut ring.view(), &mut |ring| {

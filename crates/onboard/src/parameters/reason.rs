@@ -9,7 +9,7 @@ use heapless::String;
 pub const REASON_MAX: usize = 50;
 
 /// One line of at most 50 characters.
-// Made without `core::fmt`, whose calls the firmware's stack analysis cannot follow.
+// The text is made without `core::fmt`, whose calls the firmware's stack analysis cannot follow.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Reason(String<REASON_MAX>);
 

@@ -100,7 +100,7 @@ impl SimulatedGnssReceiver {
     pub(super) fn measure(&mut self, truth: &Truth, spoil: impl FnOnce(GnssFix) -> Option<GnssFix>) -> Vec<GnssFix> {
         let lost = self.loss.advance();
         if self.clock.ticks() {
-            // Generated even if it is lost, so that a loss does not change the errors of other fixes.
+            // The fix is generated even if it is lost, so that a loss does not change the errors of other fixes.
             let (fix, arrives_s) = self.take(truth);
             spoil(fix).filter(|_| !lost).into_iter().for_each(|fix| self.transit.send(arrives_s, fix));
         }

@@ -21,7 +21,7 @@ impl SampleClock {
 
     /// Returns true if the sensor samples in this step. Call it in every step.
     pub(super) fn ticks(&mut self) -> bool {
-        // Computed from the count of steps: a sum of periods would drift.
+        // The time is computed from the count of steps, because a sum of periods would drift.
         let due = (self.steps as f64 * self.per_step + TIME_SLACK_S) as u64 + 1;
         self.steps += 1;
         let ticks = due > self.taken;

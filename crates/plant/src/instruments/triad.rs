@@ -78,8 +78,8 @@ impl SimulatedTriad {
         self.walk += draw(random) * self.walk_per_step;
         let analogue = self.distortion * truth + self.bias() + draw(random) * self.white;
         let (range, lsb) = (self.range, self.lsb);
-        // Added after the filter, which works on samples: vibration above half the sampling rate would pass it as an
-        // alias.
+        // The vibration is added after the filter, which works on samples: vibration above half the sampling rate would
+        // pass it as an alias.
         (self.filter.pass(analogue) + vibration).map(|value| {
             let value = value.clamp(-range, range);
             // `rint`, because `round` takes three times as long.

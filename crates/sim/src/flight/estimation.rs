@@ -157,7 +157,7 @@ impl SimulatedEstimator {
     }
 
     fn see(&mut self, truth: &Truth) -> EstimatorView {
-        // Read before the step: a count that grows during the step shows the measurement that was judged.
+        // The count is read before the step: a count that grows during the step shows the measurement that was judged.
         let judged = self.judged();
         let estimate = self.step(truth);
         let valid = is_valid(&estimate);

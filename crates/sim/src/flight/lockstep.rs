@@ -41,7 +41,8 @@ pub fn lockstep<P: FlightSoftware>(
     let mut watch = LossDetector::new(world.faulty_from_s());
     for step in 0..=steps {
         let sample = pilot.step(world)?;
-        // Observed before the loss is judged, so that a log includes the step in which the vehicle was lost.
+        // The step is observed before the loss is judged, so that a log includes the step in which the vehicle was
+        // lost.
         let interrupted = observe(&sample).is_break();
         let reason = watch.lost(&sample, pilot.descends()).or_else(|| pilot.gave_up());
         let lost = reason.map(|reason| Lost { time_s: sample.time_s, reason });

@@ -99,7 +99,7 @@ impl ErrorType for SharedDevice<'_> {
 
 impl SpiDevice for SharedDevice<'_> {
     async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), spi::Error> {
-        // Locked until the end of the transfer, since the SPI has this part's clock meanwhile.
+        // The bus is locked until the end of the transfer, since the SPI has this part's clock meanwhile.
         let mut spi = self.spi.lock().await;
         // These settings are always valid.
         let _ = spi.set_config(&self.config);
@@ -236,7 +236,7 @@ impl InterruptPin {
         T::ExtiChannel: exti::Channel<IRQ = I>,
     {
         let number = usize::from(pin.pin());
-        // Pulled down, so that a broken wire reads low.
+        // The pin is pulled down, so that a broken wire reads low.
         InterruptPin { input: ExtiInput::new(pin, line, Pull::Down, irqs), line: number }
     }
 }
