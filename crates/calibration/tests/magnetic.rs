@@ -171,7 +171,7 @@ fn a_field_that_cannot_be_the_earths_is_refused() {
     assert_eq!(turned(&mut hands, &Side::ALL, 1.0, spoil).0, Some(Err(CalibrationFailure::TooLarge)));
 }
 
-/// Iron that is near on some sides and not on others.
+/// Iron near the vehicle on some sides and not on others makes the calibration fail.
 #[test]
 fn an_uneven_field_is_refused() {
     let mut hands = hands(Part::QMC5883L, 3);

@@ -14,7 +14,7 @@ proptest! {
     }
 }
 
-/// The bytes are as another program would read them.
+/// The bytes have the order that another program expects.
 #[test]
 fn fields_are_little_endian_and_in_order() {
     let throttles = [0x0102, 0, 0, 0, 0, 0, 0, 0x0304];
