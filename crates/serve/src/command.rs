@@ -285,7 +285,7 @@ fn grip(words: &mut CommandWords<'_>) -> Result<Grip, String> {
 
 /// Parses how an instrument fails, such as `gnss jumped 5 0 0`.
 fn fault(words: &mut CommandWords<'_>) -> Result<FailureKind, String> {
-    let instrument = words.word("name an instrument, as in: fault gnss lost")?;
+    let instrument = words.word("an instrument, as in: fault gnss lost")?;
     let of = |failure: &&FailureKind| failure.name().split_once('-').is_some_and(|(of, _)| of == instrument);
     let known: Vec<FailureKind> = FailureKind::ALL.iter().filter(of).copied().collect();
     if known.is_empty() {
@@ -294,7 +294,7 @@ fn fault(words: &mut CommandWords<'_>) -> Result<FailureKind, String> {
     }
     let kind = |failure: FailureKind| failure.name().split_once('-').map_or("", |(_, kind)| kind);
     let kinds = known.iter().map(|failure| kind(*failure)).collect::<Vec<_>>().join(", ");
-    let how = words.word(&format!("name the failure of the {instrument}: {kinds}"))?;
+    let how = words.word(&format!("a failure of the {instrument}: {kinds}"))?;
     let Some(failure) = known.iter().find(|failure| kind(**failure) == how) else {
         return Err(format!("fault {instrument}: {} is none of {kinds}", shown(how)));
     };

@@ -73,7 +73,7 @@ fn what_is_set_is_there_after_a_restart() {
     set(&mut server, "RTL_RETURN_ALT", 22.0);
     // The file is locked: only one program at a time may write it.
     let scenario = built_in("outdoor").unwrap().read().unwrap();
-    assert!(ParameterFile::open(&file, &scenario).err().unwrap().contains("in use"));
+    assert!(ParameterFile::open(&file, &scenario).err().unwrap().contains("another program uses"));
     drop(server);
 
     let mut server = served(&file);

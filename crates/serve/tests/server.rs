@@ -238,7 +238,7 @@ fn bad_lines_are_refused_in_one_line() {
         ("rotor 5 0.5", "rotor = 5, out of range: it must lie within 1 to 4"),
         ("rotor 2 1.5", "rotor: efficiency = 1.5, out of range: it must lie within 0 to 1"),
         ("battery", "battery SHARE: initial_charge is missing"),
-        ("fault", "fault INSTRUMENT FAILURE [NUMBERS] [SECONDS]: it needs name an instrument, as in: fault gnss lost"),
+        ("fault", "fault INSTRUMENT FAILURE [NUMBERS] [SECONDS]: it needs an instrument, as in: fault gnss lost"),
         ("fault gps lost", "fault: \"gps\" is no instrument; write imu, tracker, gnss, barometer or magnetometer"),
         ("fault gnss stuck", "fault gnss: \"stuck\" is none of lost, jumped, multipath"),
         ("fault tracker lost", "this vehicle has no tracker"),
@@ -246,7 +246,7 @@ fn bad_lines_are_refused_in_one_line() {
         ("turbulence strong", "turbulence: \"strong\" is not one of none, light, moderate, severe"),
         (
             "change weight 2",
-            "change: \"weight\" is not one of multiplies a quantity: mass, inertia, thrust-factor, drag-factor, \
+            "change: \"weight\" is not one of mass, inertia, thrust-factor, drag-factor, \
              roll-moment, pitch-moment, yaw-moment",
         ),
         ("vehicle 9 clear", "there is no vehicle 9; they are 1 to 2"),
@@ -314,7 +314,7 @@ fn every_command_is_helped_with_and_every_failure_is_known() {
 fn what_the_firmware_cannot_fly_is_refused() {
     let blind = Scenario { instruments: InstrumentSuite::default(), ..scenario("outdoor") };
     let refused = fleet(&blind, 1).unwrap_err().to_string();
-    assert!(refused.contains("outdoor: the vehicle has no sensors to fly on"), "{refused}");
+    assert!(refused.contains("outdoor: the vehicle has no sensors to fly with"), "{refused}");
     let mut heavy = scenario("outdoor");
     heavy.vehicle.mass_kg *= 1.5;
     assert!(fleet(&heavy, 1).unwrap_err().to_string().contains("another vehicle"));

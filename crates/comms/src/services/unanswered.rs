@@ -34,7 +34,7 @@ mod tests {
     fn each_is_told_now_and_then() {
         use UnansweredRequest::{Corrections, Follow, Shell, Tune};
         let mut unanswered = Unanswered::default();
-        for (wish, word) in [(Corrections, "RTK"), (Tune, "buzzer"), (Follow, "followed"), (Shell, "shell")] {
+        for (wish, word) in [(Corrections, "RTK"), (Tune, "buzzer"), (Follow, "follow-me"), (Shell, "shell")] {
             assert!(unanswered.text(wish, 5).is_some_and(|text| text.contains(word)));
             assert_eq!(unanswered.text(wish, QUIET_US + 4), None);
             assert!(unanswered.text(wish, QUIET_US + 5).is_some());
