@@ -36,7 +36,7 @@ fn every_unknown_incompatible_flag_is_refused_as_a_newer_format() {
             read(&file("newer.ulg", &newer)).map(|_| ()).unwrap_err().to_string(),
         ];
         for error in refused {
-            assert!(error.contains("newer.ulg: in a newer format than this program knows"), "{error}");
+            assert!(error.contains("newer.ulg: the log's format is newer than this program"), "{error}");
             assert!(error.contains(&format!("{:#x}", 1_u64 << bit)) && error.lines().count() == 1, "{error}");
         }
         // Compatible flags do not matter.

@@ -215,7 +215,7 @@ fn polynomials_are_flown_as_they_are() {
     assert_eq!((read.at(2.5).position_m.x, read.at(2.5).velocity_m_s.x, read.at(2.5).position_m.z), (3.0, 2.0, 1.0));
     let broken = format!("{head}\n{}{}", row(2.0, [0.0, 0.0, 0.5]), row(1.0, [2.5, 2.0, 0.0]));
     let refused = scenario(&folder, &broken, "").unwrap_err();
-    assert!(refused.contains("path.csv:3: duration: it begins 0.500 m"), "{refused}");
+    assert!(refused.contains("path.csv:3: duration: the piece begins 0.500 m"), "{refused}");
 }
 
 /// Tabs, and semicolons with decimal commas, as spreadsheets write in countries with decimal commas.
@@ -240,14 +240,14 @@ fn what_is_wrong_is_told_in_one_line() {
     let folder = folder("wrong");
     for (path, problem) in [
         ("", "path.csv"),
-        ("time_s,x_m,y_m\n0,0,0\n1,0,0\n", "no column z_m"),
+        ("time_s,x_m,y_m\n0,0,0\n1,0,0\n", "the column z_m is missing"),
         ("time_s,x_m,y_m,z_m\n0,0,0,1\n", "fewer than two lines"),
         ("time_s,x_m,y_m,z_m\n0,0,0,1\n1,a,0,1\n", "path.csv:3: x_m: \"a\" is no number"),
         ("time_s,x_m,y_m,z_m\n0,0,0,1\n1,nan,0,1\n", "path.csv:3: x_m: \"nan\""),
         ("time_s,x_m,y_m,z_m\n0,0,0,1\n1,1e9,0,1\n", "path.csv:3: x_m: \"1e9\""),
         ("time_s,x_m,y_m,z_m\n0,0,0,1\n1,0,0\n", "path.csv:3: the line has 3 values, but the first line names 4"),
         ("time_s,x_m,y_m,z_m\n1,0,0,1\n1,0,0,1\n", "path.csv:3: time_s: 1 is not later than 1"),
-        ("time_s,x_m,y_m,z_m\n-1,0,0,1\n1,0,0,1\n", "it begins at -1 s; set start_s"),
+        ("time_s,x_m,y_m,z_m\n-1,0,0,1\n1,0,0,1\n", "the path begins at -1 s; set start_s"),
         ("time_s,x_m,y_m,z_m\n0,0,0,1\n0.001,9000,0,1\n", "more than a controller accepts"),
         ("duration,x^0\n1,0\n", "its columns must be duration"),
     ] {
