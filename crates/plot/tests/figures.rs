@@ -225,7 +225,7 @@ fn columns_are_found_by_name_or_refused_in_one_line() {
     assert!(error.ends_with("no column xm; did you mean x_m?"), "{error}");
     for (text, expected) in [
         ("a,b\n", "has no rows of numbers"),
-        ("a,b\n1,2\n3\n", "line 3: not a CSV file"),
+        ("a,b\n1,2\n3\n", "line 3: this is not a CSV file"),
         ("PAR1nothing", "cannot be read as Parquet"),
         ("ULog\u{1}", "not"),
         ("", "has no rows"),
