@@ -47,7 +47,7 @@ const BAD: [(&str, &str, &str); 22] = [
     ("mass_ratio", "mas_ratio", ":10: spread.mas_ratio: unknown key; did you mean mass_ratio?"),
     ("[0.7, 1.3]", "[1.3, 0.7]", ":10: spread.mass_ratio: 1.3 is above 0.7; write the smaller number first"),
     ("[0.7, 1.3]", "[0.7, 130]", ":10: spread.mass_ratio: 130 is out of range: it must lie within 0.01 to 100"),
-    ("rotor_efficiency = [0.0, 1.0]\n", "", "spread.fault_rotor: it has no effect without rotor_efficiency"),
+    ("rotor_efficiency = [0.0, 1.0]\n", "", "spread.fault_rotor: the spread has no effect without rotor_efficiency"),
     ("[1, 4]", "[1.5, 4]", "spread.fault_rotor: only whole numbers are drawn"),
 ];
 
@@ -136,7 +136,7 @@ fn no_more_threads_than_useful() {
     let output = sitl(&folder, &["campaign", "few.toml", "--threads", "8000", "--out", "many"]);
     let error = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(0), "{error}");
-    assert!(error.contains(&format!("--threads 8000: flying on {}, since there are", cores.min(4))), "{error}");
+    assert!(error.contains(&format!("--threads 8000: using only {}, since there are", cores.min(4))), "{error}");
     let output = sitl(&folder, &["campaign", "few.toml", "--threads", "1", "--out", "one"]);
     assert!(!String::from_utf8(output.stderr).unwrap().contains("--threads"));
     assert_eq!(results_of(&folder.join("many")), results_of(&folder.join("one")));

@@ -553,8 +553,11 @@ fn random_flights_that_cannot_be_drawn_are_refused_in_one_line() {
         (&["compare", "--suite", "random", "--vehicle", "raser"], "vehicle: \"raser\" is no built-in vehicle"),
         (&["compare", "--suite", "random", "--vehicle", "./no.toml"], "./no.toml: no such file"),
         (&["compare", "--suite", "random", "--against", "sof"], "--against sof: does not fly; name one of afbc, "),
-        (&["compare", "--suite", "field", "--seed", "2"], "--seed: only --suite random has this option"),
-        (&["compare", "--suite", "field", "--vehicle", "racer"], "--vehicle: only --suite random has this option"),
+        (&["compare", "--suite", "field", "--seed", "2"], "--seed: this option needs --suite random or rough-estimate"),
+        (
+            &["compare", "--suite", "field", "--vehicle", "racer"],
+            "--vehicle: this option needs --suite random or rough-estimate",
+        ),
     ] {
         let line = refused(&sitl(&folder, arguments));
         assert!(line.starts_with(expected) && line.lines().count() == 1, "{line}");

@@ -95,8 +95,8 @@ impl CompareArgs {
             }
             let suite = suite_at(path)?;
             if let Some(option) = self.on.vehicle()?.map(|_| "--vehicle").or_else(|| random.given()) {
-                let cure = "this option needs --suite random or rough-estimate, but the suite is a file; leave the \
-                     option out";
+                let cure = "this option needs --suite random or rough-estimate, but this suite is not drawn; \
+                     leave the option out";
                 return Err(format!("{option}: {cure}").into());
             }
             return suite::run(&suite, &contenders, seeds, against.as_deref(), &output);

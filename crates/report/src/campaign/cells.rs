@@ -59,8 +59,8 @@ pub(super) fn bad(target: &str, tally: &ContenderSummary, bad: &WorstFlight) -> 
     let how = match &bad.lost {
         Some((time_s, reason)) => format!("lost at t = {time_s:.3} s: {reason}"),
         None => match bad.rmse_position_m {
-            Some(rmse_m) => format!("root mean square distance from the reference {rmse_m:.5} m"),
-            None => format!("the flight ended before {SETTLED_S} s, from which on errors count"),
+            Some(rmse_m) => format!("root mean square distance {rmse_m:.5} m"),
+            None => format!("ended before errors count, from {SETTLED_S} s on"),
         },
     };
     let quoted = |text: &str| if text.contains(' ') { format!("\"{text}\"") } else { text.to_owned() };
