@@ -254,7 +254,7 @@ fn an_error_names_the_path_and_the_cure() {
     let taken = scratch.0.join("taken");
     fs::create_dir_all(taken.join("summary.json/full")).unwrap();
     let error = Folder::open(&taken, "test", "it", false).unwrap_err().to_string();
-    assert!(error.contains("taken: not empty") && error.contains("--out") && error.contains("--force"), "{error}");
+    assert!(error.contains("taken: the folder is not empty") && error.contains("--out") && error.contains("--force"), "{error}");
     assert_eq!(fs::read_dir(&taken).unwrap().count(), 1, "nothing is touched");
     let error = write(&Folder::open(&taken, "test", "it", true).unwrap(), &[], &[]).unwrap_err().to_string();
     assert!(error.contains("summary.json") && error.contains("--out"), "{error}");
@@ -306,7 +306,7 @@ fn stale_files_are_removed_and_foreign_ones_kept() {
     write(&scratch.open(), &[], &[]).unwrap();
     std::os::unix::fs::symlink("nowhere", scratch.0.join("paper-afbc.csv")).unwrap();
     let error = write(&scratch.open(), std::slice::from_ref(&afbc), &[]).unwrap_err().to_string();
-    assert!(error.contains("paper-afbc.csv: in the way"), "{error}");
+    assert!(error.contains("paper-afbc.csv: a file that is not from `sitl test` is in the way"), "{error}");
     assert!(fs::symlink_metadata(scratch.0.join("paper-afbc.csv")).unwrap().is_symlink());
     write(&Folder::open(&scratch.0, "test", "it", true).unwrap(), &[afbc], &[]).unwrap();
     assert!(fs::symlink_metadata(scratch.0.join("paper-afbc.csv")).unwrap().is_file());
