@@ -48,7 +48,7 @@ const BAD: [(&str, &str, &str); 22] = [
     ("[0.7, 1.3]", "[1.3, 0.7]", ":10: spread.mass_ratio: 1.3 is above 0.7; write the smaller number first"),
     ("[0.7, 1.3]", "[0.7, 130]", ":10: spread.mass_ratio: 130 is out of range: it must lie within 0.01 to 100"),
     ("rotor_efficiency = [0.0, 1.0]\n", "", "spread.fault_rotor: the spread has no effect without rotor_efficiency"),
-    ("[1, 4]", "[1.5, 4]", "spread.fault_rotor: only whole numbers are drawn"),
+    ("[1, 4]", "[1.5, 4]", "spread.fault_rotor: only whole numbers can be drawn"),
 ];
 
 #[test]
@@ -71,10 +71,22 @@ fn a_bad_file_gets_one_line() {
         (&["campaign", "small.toml", "--flight", "1", "--contender", "me"], "it has: afbc, backstepping"),
         (&["campaign", "small.toml", "--shard", "3/2"], "a shard must be I/N"),
         (&["campaign", "small.toml", "--shard", "1/151"], "the campaign has only 150 flights"),
-        (&["campaign", "small.toml", "--threads", "0"], "--threads <N>': it must be a whole number from 1 on"),
-        (&["campaign", "small.toml", "--threads", "two"], "--threads <N>': it must be a whole number from 1 on"),
-        (&["campaign", "small.toml", "--threads", "1.5"], "--threads <N>': it must be a whole number from 1 on"),
-        (&["campaign", "small.toml", "--threads=-1"], "--threads <N>': it must be a whole number from 1 on"),
+        (
+            &["campaign", "small.toml", "--threads", "0"],
+            "--threads <N>': the number of threads must be a whole number from 1 on",
+        ),
+        (
+            &["campaign", "small.toml", "--threads", "two"],
+            "--threads <N>': the number of threads must be a whole number from 1 on",
+        ),
+        (
+            &["campaign", "small.toml", "--threads", "1.5"],
+            "--threads <N>': the number of threads must be a whole number from 1 on",
+        ),
+        (
+            &["campaign", "small.toml", "--threads=-1"],
+            "--threads <N>': the number of threads must be a whole number from 1 on",
+        ),
         (&["merge", "nowhere", "-o", "merged"], "nowhere: the folder holds no finished results"),
     ] {
         fs::write(folder.join("small.toml"), SMALL).unwrap();

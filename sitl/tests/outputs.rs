@@ -175,7 +175,7 @@ fn results_of_another_command_line_are_kept() {
     let ends: Vec<_> = children.into_iter().map(|child| child.join().unwrap()).collect();
     for end in ends.iter().filter(|end| !end.status.success()) {
         let error = String::from_utf8_lossy(&end.stderr);
-        assert!(error.contains("out/hover: another program is writing into it"), "{error}");
+        assert!(error.contains("out/hover: another program is writing into this folder"), "{error}");
     }
     assert!(ends.iter().any(|end| end.status.success()));
     succeeds(&sitl(&folder, &["again", "out/hover"]));

@@ -61,7 +61,7 @@ fn a_bad_line_gets_one_line_and_changes_nothing() {
         ("V_MASS half\n", "mine.params:1: V_MASS: \"half\" is no number"),
         ("V_MASS\n", "mine.params:1: 1 fields, neither"),
         ("1 1 V_MASS 0.5\n", "mine.params:1: 4 fields, neither"),
-        ("V_MASS 0.5\nV_MASS 0.6\n", "mine.params:2: V_MASS: a second value"),
+        ("V_MASS 0.5\nV_MASS 0.6\n", "mine.params:2: V_MASS: the parameter has two values"),
         ("C_BUMPLESS 0.5\n", "mine.params:1: C_BUMPLESS: must be a whole number"),
         ("V_MASS 3\n", "mine.params: rotor_force_max_n"),
         ("V_MASS_IN_KILOGRAMS 3\n", "mine.params:1: V_MASS_IN_KILOGRAMS: no such parameter"),

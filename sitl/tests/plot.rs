@@ -95,7 +95,10 @@ fn ulog_and_mcap_are_drawn_alike() {
     // Topics have different times, so they cannot be drawn over each other.
     let crossed = ["plot", "a.ulg", "--y", "vehicle_local_position.x", "--x", "vehicle_attitude.q[0]"];
     let line = refused(&sitl(&folder, &crossed));
-    assert!(line.contains("vehicle_attitude.q[0]: of another topic than vehicle_local_position.x"), "{line}");
+    assert!(
+        line.contains("vehicle_attitude.q[0]: the topic has other times than that of vehicle_local_position.x"),
+        "{line}"
+    );
 }
 
 #[test]

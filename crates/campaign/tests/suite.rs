@@ -98,7 +98,7 @@ fn mistakes_are_refused_line_by_line() {
         (FIRST.replace("rms_m = 0.1", "rms_m = -0.1"), "rms_m: -0.1 is out of range"),
         (FIRST.replace("differs = \"d\"", ""), "source.differs: missing"),
         (FIRST.replace("tilt_max_rad = 1.0", "tilt_max_rad = 1.3"), "tilt_max_rad: 1.3 is out of range"),
-        (second("controllers = [\"pid\"]"), "controllers: a suite is flown by those who are compared"),
+        (second("controllers = [\"pid\"]"), "controllers: a suite is flown by the contenders of `sitl compare`"),
         (second("trajectory = { radius = 3.0 }"), "radius: unknown key; did you mean radius_m"),
         (second("scenario = \"hardware\""), "unknown key"),
         (FIRST.replace("radius_m = 2.0, ", ""), "radius_m: missing"),

@@ -268,7 +268,7 @@ impl Checker {
             DISARMS => self.disarms_told = true,
             _ => {}
         }
-        self.station_told |= text.contains("station lost") && !text.contains("no longer");
+        self.station_told |= text.contains("station lost") && !text.contains("cleared");
         let Some((mode, reason)) = text.split_once(": ") else { return };
         let Some(mode) = FlightMode::ALL.into_iter().find(|it| it.name() == mode) else { return };
         let asked = |(_, command): &(Address, VehicleCommand)| wanted(command) == Some(mode);

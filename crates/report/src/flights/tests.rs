@@ -254,7 +254,10 @@ fn an_error_names_the_path_and_the_cure() {
     let taken = scratch.0.join("taken");
     fs::create_dir_all(taken.join("summary.json/full")).unwrap();
     let error = Folder::open(&taken, "test", "it", false).unwrap_err().to_string();
-    assert!(error.contains("taken: the folder is not empty") && error.contains("--out") && error.contains("--force"), "{error}");
+    assert!(
+        error.contains("taken: the folder is not empty") && error.contains("--out") && error.contains("--force"),
+        "{error}"
+    );
     assert_eq!(fs::read_dir(&taken).unwrap().count(), 1, "nothing is touched");
     let error = write(&Folder::open(&taken, "test", "it", true).unwrap(), &[], &[]).unwrap_err().to_string();
     assert!(error.contains("summary.json") && error.contains("--out"), "{error}");

@@ -202,7 +202,7 @@ fn sensor_faults_and_paces_that_contradict_themselves_are_refused() {
     assert!(fault("factor = -1").contains("axis: missing; name the axis"));
     let circle = "[trajectory]\nkind = \"circle\"\ncentre_m = [0, 0, 1]\nradius_m = 2\n";
     let both = refused(&format!("{circle}period_s = 3\nacceleration_m_s2 = 4"));
-    assert!(both.contains("period_s: a second pace"), "{both}");
+    assert!(both.contains("period_s: period_s and acceleration_m_s2 both set the pace"), "{both}");
     assert!(
         refused(&format!("{}acceleration_m_s2 = 4", circle.replace("= 2", "= 0"))).contains("more than a controller")
     );
@@ -221,7 +221,10 @@ fn references_that_no_controller_accepts_are_told() {
     assert!(moves.contains("waypoint.time_s: it asks for") && moves.contains("m/s4, more than a"), "{moves}");
     let slow = "kind = \"minimum-snap\"\nspeed_max_m_s = 0.1\nacceleration_max_m_s2 = 1";
     let lasts = refused(&format!("{slow}\n{first}{far}"));
-    assert!(lasts.contains("speed_max_m_s: it ends at") && lasts.contains("no flight lasts longer"), "{lasts}");
+    assert!(
+        lasts.contains("speed_max_m_s: the trajectory ends at") && lasts.contains("no flight lasts longer"),
+        "{lasts}"
+    );
 }
 
 /// Circle and lemniscate keep the pace in their keys: the largest acceleration and speed of their references.
