@@ -68,7 +68,7 @@ fn a_bad_file_gets_one_line() {
     for (arguments, said) in [
         (&["campaign", "robust"][..], "robust: no such campaign; "),
         (&["campaign", "small.toml", "--flight", "150"], "the campaign has flights 0 to 149"),
-        (&["campaign", "small.toml", "--flight", "1", "--contender", "me"], "it has: afbc, backstepping"),
+        (&["campaign", "small.toml", "--flight", "1", "--contender", "me"], "its contenders are afbc, backstepping"),
         (&["campaign", "small.toml", "--shard", "3/2"], "a shard must be I/N"),
         (&["campaign", "small.toml", "--shard", "1/151"], "the campaign has only 150 flights"),
         (

@@ -375,7 +375,7 @@ fn files_that_cannot_be_read_get_one_line() {
     fs::write(folder.join("latin.toml"), b"name = \"caf\xe9\"").unwrap();
     fs::write(folder.join("large.toml"), vec![b'#'; (1 << 20) + 1]).unwrap();
     fs::write(folder.join("my flight.toml"), HOVER).unwrap();
-    let lists = "`sitl scenarios` lists the built-in scenarios";
+    let lists = "`sitl scenarios` lists the built-in ones";
     for (name, message) in [
         ("none.toml", format!("none.toml: no such file; {lists}")),
         ("dir.toml", "dir.toml: this is a folder; name a scenario file in it".into()),

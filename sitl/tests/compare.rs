@@ -490,7 +490,7 @@ fn a_suite_that_cannot_be_flown_is_refused_in_one_line() {
     fs::write(folder.join("bad.toml"), SUITE.replace("like = \"racing\"", "like = \"nobody\"")).unwrap();
     for (arguments, expected) in [
         (&["--suite", "feild"][..], "feild: no such suite; did you mean field?"),
-        (&["--suite", "./nothing.toml"], "./nothing.toml: no such file; `sitl suites` lists the built-in suites"),
+        (&["--suite", "./nothing.toml"], "./nothing.toml: no such file; `sitl suites` lists the built-in ones"),
         (&["--suite", "bad.toml"], "bad.toml:19: flight.like: no flight above is called \"nobody\""),
         (&["--suite", "faults", "--controllers", "sof"], "controllers sof: no such controller; there are afbc,"),
         (&["hover", "--against", "sof"], "--against sof: does not fly; name one of afbc"),

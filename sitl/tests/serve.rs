@@ -29,7 +29,7 @@ fn a_newcomer_learns_how_to_connect_each_client() {
     for wanted in [
         "outdoor: 3 vehicles, system ids 1 to 3.",
         "System().connect(\"udpin://0.0.0.0:14540\")",
-        "QGroundControl  connects by itself",
+        "QGroundControl  connects automatically",
         "mavproxy.py --master=udpin:0.0.0.0:14550",
         "mavutil.mavlink_connection(\"udpin:0.0.0.0:14550\")",
         "udpout:127.0.0.1:",

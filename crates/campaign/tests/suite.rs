@@ -86,7 +86,7 @@ fn every_contender_flies_each_flight_with_the_gains_of_its_vehicle() {
 fn mistakes_are_refused_line_by_line() {
     let line = |text: &str| suite(text).unwrap_err().to_string();
     let cases = [
-        (String::new(), "flight: missing; add [[flight]]"),
+        (String::new(), "flight: missing; add a [[flight]]"),
         (FIRST.replace("name = \"first\"", ""), "flight.name: missing; give the flight a name"),
         (second("").replace("\"second\"", "\"first\""), "flight.name: \"first\" is the name of another flight"),
         (

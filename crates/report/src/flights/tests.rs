@@ -325,7 +325,7 @@ fn stale_files_are_removed_and_foreign_ones_kept() {
         flipped[at] ^= 1 << bit;
         fs::write(&marker, flipped).unwrap();
         let error = Folder::open(&scratch.0, "test", "it", false).unwrap_err().to_string();
-        assert!(error.contains(".sitl.json: damaged"), "{error}");
+        assert!(error.contains(".sitl.json: the file is damaged"), "{error}");
     }
 }
 

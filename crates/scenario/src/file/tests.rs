@@ -188,7 +188,7 @@ fn contenders_start_from_the_file_or_from_a_profile() {
 fn sensor_faults_and_paces_that_contradict_themselves_are_refused() {
     let refused = |text: &str| example(text).unwrap_err().to_string();
     let fault = |keys: &str| refused(&format!("[[sensor_fault]]\nstart_s = 1\n{keys}"));
-    let one = "takes one of factor, offset_m and frozen = true, and no more";
+    let one = "a sensor fault needs exactly one of factor, offset_m and frozen = true";
     for keys in [
         "axis = \"x\"",
         "axis = \"x\"\nfrozen = false",
