@@ -236,7 +236,7 @@ fn crates_to_be_published_have_complete_metadata() {
         published.push(name);
     }
     published.sort();
-    assert_eq!(published, ["afbc", "control", "estimator", "flight-core", "fpu", "link", "peers", "plant", "types"]);
+    assert_eq!(published, ["afbc", "control", "estimator", "flight-core", "fpu", "laws", "mavlink", "plant", "types"]);
     assert!(fs::read_to_string(root().join("Cargo.toml")).unwrap().contains("\npublish = false\n"));
 }
 
