@@ -35,7 +35,7 @@ pub fn markdown(flown: FlownSuite<'_>) -> String {
     }
     for (index, source) in flown.suite.sources.iter().enumerate() {
         let gap = if index == 0 { "\n" } else { "" };
-        let line = format!("* {}: {}. What differs: {}.", source.name, source.citation, source.differs);
+        let line = format!("* {}: {}. Differences: {}.", source.name, source.citation, source.differs);
         let _ = writeln!(page, "{gap}{}", wrapped(&line));
     }
     page

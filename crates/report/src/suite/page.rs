@@ -105,7 +105,7 @@ fn published(flown: FlownSuite<'_>) -> Markup {
         } }
         dl {
             @for source in &flown.suite.sources {
-                div { dt { (source.name) } dd { (source.citation) ". What differs: " (source.differs) "." } }
+                div { dt { (source.name) } dd { (source.citation) ". Differences: " (source.differs) "." } }
             }
         }
     }
