@@ -7,6 +7,7 @@
     reason = "a test that cannot go on should say why"
 )]
 
+mod again;
 mod bring_up;
 mod campaign;
 mod cli;
@@ -23,5 +24,7 @@ mod plot;
 mod replay;
 mod serve;
 mod shell;
+mod suites;
+mod tune;
 mod ulog;
 mod vehicles;

@@ -1,31 +1,29 @@
-//! Tests `sitl compare`, `sitl tune` and `sitl again`.
+//! Tests `sitl compare`.
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
 use crate::common::{command, folder, refused, succeeds};
-use afbc_files::seal;
-use afbc_scenario::contender::ControllerKind;
+use crate::suites::SUITE;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-fn sitl_on(threads: &str, folder: &Path, arguments: &[&str]) -> Output {
+pub(crate) fn sitl_on(threads: &str, folder: &Path, arguments: &[&str]) -> Output {
     command(folder, arguments).env("RAYON_NUM_THREADS", threads).output().unwrap()
 }
 
-fn sitl(folder: &Path, arguments: &[&str]) -> Output {
+pub(crate) fn sitl(folder: &Path, arguments: &[&str]) -> Output {
     sitl_on("2", folder, arguments)
 }
 
-fn json(path: &Path) -> Value {
+pub(crate) fn json(path: &Path) -> Value {
     serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
 /// Noisy circle of 8 s, and a PID with far too low gains.
-const SOFT: &str = r#"
+pub(crate) const SOFT: &str = r#"
 name = "round"
 duration_s = 8.0
 profile = "flight"
@@ -50,7 +48,7 @@ controller = "pid"
 gains = { position_p_1_s = 0.6, velocity_p_1_s = 1.5, climb_p_1_s = 1.5 }
 "#;
 
-fn soft(test: &str) -> PathBuf {
+pub(crate) fn soft(test: &str) -> PathBuf {
     let folder = folder(test);
     fs::write(folder.join("soft.toml"), SOFT).unwrap();
     folder
@@ -196,152 +194,6 @@ fn tables_narrow_to_the_terminal() {
     }
 }
 
-/// Changes the command of a manifest and seals it again, as anyone who can write the file could.
-fn forged(manifest: &Path, command: &[&str]) {
-    let mut text = fs::read_to_string(manifest).unwrap();
-    let (from, to) = (text.find("\"command\": [").unwrap(), text.find("\"fingerprint\"").unwrap());
-    text.replace_range(from..to, &format!("\"command\": {}, ", serde_json::json!(command)));
-    let digits = text.rfind("xxh64:").unwrap();
-    text.replace_range(digits..digits + seal::OPEN.len(), seal::OPEN);
-    let mut bytes = Vec::new();
-    let mut sealing = seal::SealingWriter::new(&mut bytes);
-    sealing.write_all(text.as_bytes()).unwrap();
-    sealing.finish().unwrap();
-    fs::write(manifest, bytes).unwrap();
-}
-
-/// A manifest may come from somebody else, and its seal is no signature. Its command must not write outside its
-/// results.
-#[test]
-fn a_manifest_of_others_writes_nothing_but_its_results() {
-    let folder = soft("foreign");
-    succeeds(&sitl(&folder, &["fly", "soft.toml", "--controller", "soft", "--out", "theirs"]));
-    let manifest = folder.join("theirs/manifest.json");
-    fs::write(folder.join("mine"), "mine").unwrap();
-    fs::write(folder.join("page.md"), "<!-- suite faults: begin -->\n<!-- suite faults: end -->\n").unwrap();
-    for command in [
-        &["fly", "soft.toml", "--exact-log", "mine"][..],
-        &["fly", "soft.toml", "--exact-log=new"],
-        &["fly", "--ulog", "new", "soft.toml"],
-        &["fly", "soft.toml", "--mcap", "new"],
-        &["fly", "soft.toml", "--force"],
-        &["fly", "soft.toml", "--json"],
-        &["fly", "soft.toml", "--out", "new"],
-        &["--out", "new"],
-        &["paper", "--force"],
-        &["compare", "--suite", "faults", "--seeds", "1", "--write", "page.md"],
-        &["compare", "soft.toml", "--table", "latex"],
-        &["campaign", "robustness", "--threads", "1"],
-        &["tune", "pid", "--out", "mine"],
-        &["merge", "theirs", "-o", "new"],
-        &["man", "."],
-        &["again", "theirs"],
-        &["serve", "--exact-log", "mine"],
-        &["fly", "--help"],
-        &["fly", "--no-such"],
-        &[],
-        &["--", "fly"],
-    ] {
-        forged(&manifest, command);
-        if command.is_empty() {
-            // An empty command flies the paper's experiment, which differs from these results.
-            assert_eq!(sitl(&folder, &["again", "theirs"]).status.code(), Some(1));
-            fs::remove_dir_all(folder.join("theirs-again")).unwrap();
-            continue;
-        }
-        let line = refused(&sitl(&folder, &["again", "theirs"]));
-        assert!(
-            line.starts_with("theirs: the manifest's command ") && line.lines().count() == 1,
-            "{command:?}: {line}"
-        );
-        let mut names: Vec<_> = fs::read_dir(&folder).unwrap().map(|it| it.unwrap().file_name()).collect();
-        names.sort();
-        assert_eq!(names, ["mine", "page.md", "soft.toml", "theirs"], "{command:?}");
-        assert_eq!(fs::read(folder.join("mine")).unwrap(), b"mine");
-    }
-    // A folder with other content is not written to, and a manifest cannot name a file by a path.
-    forged(&manifest, &["fly", "soft.toml", "--controller", "soft"]);
-    fs::create_dir(folder.join("other")).unwrap();
-    fs::write(folder.join("other/report.html"), "mine").unwrap();
-    refused(&sitl(&folder, &["again", "theirs", "--out", "other"]));
-    assert_eq!(fs::read(folder.join("other/report.html")).unwrap(), b"mine");
-    let path = fs::read_to_string(&manifest).unwrap().replace("\"report.html\": \"xxh64:", "\"../mine\": \"xxh64:");
-    fs::write(&manifest, path).unwrap();
-    forged(&manifest, &["fly", "soft.toml", "--controller", "soft"]);
-    let line = refused(&sitl(&folder, &["again", "theirs"]));
-    assert!(line.contains("damaged or no manifest (a path in it, ../mine)"), "{line}");
-}
-
-/// Repeats a campaign, one of its parts, and the merged whole. A folder that has results already is refused.
-#[test]
-fn campaigns_are_made_again() {
-    let folder = soft("campaigns");
-    let text = "flights = 5\nscenario = \"soft.toml\"\n[spread]\nmass_ratio = [0.9, 1.1]\n";
-    fs::write(folder.join("few.toml"), text).unwrap();
-    fs::write(folder.join("soft.toml"), SOFT.replace("duration_s = 8.0", "duration_s = 1.0")).unwrap();
-    let on = ["campaign", "few.toml", "--vehicle", "racer"];
-    succeeds(&sitl(&folder, &[&on[..], &["--threads", "1", "--json"]].concat()));
-    for part in ["1/2", "2/2"] {
-        succeeds(&sitl(&folder, &[&on[..], &["--shard", part]].concat()));
-    }
-    succeeds(&sitl(&folder, &["merge", "out/few-1-of-2", "out/few-2-of-2", "-o", "out/whole"]));
-    for name in ["few", "few-2-of-2", "whole"] {
-        let said = succeeds(&sitl(&folder, &["again", &format!("out/{name}")]));
-        assert!(said.starts_with("the same bytes: ") && said.contains(&format!("out/{name}-again")), "{said}");
-        let line = refused(&sitl(&folder, &["again", &format!("out/{name}/manifest.json")]));
-        assert!(line.starts_with(&format!("out/{name}-again: the folder exists already; ")), "{line}");
-    }
-    let commands =
-        ["few", "whole"].map(|name| json(&folder.join(format!("out/{name}/manifest.json")))["command"].clone());
-    assert_eq!(commands, [serde_json::json!(on), serde_json::json!(on)]);
-    fs::write(folder.join("few.toml"), text.replace("1.1", "1.2")).unwrap();
-    let output = sitl(&folder, &["again", "out/few", "--out", "other"]);
-    let said = String::from_utf8(output.stdout).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains("results.parquet: differs\n") && said.contains("the inputs differ"), "{said}");
-}
-
-/// Repeating a manifest gives the same bytes; differences are reported.
-#[test]
-fn a_manifest_makes_the_same_results_again() {
-    let folder = soft("again");
-    fs::write(folder.join("two.toml"), SUITE).unwrap();
-    for (name, command) in [
-        ("compare", &["compare", "soft.toml", "--controllers", "pid,soft", "--seeds", "2"][..]),
-        ("suite", &["compare", "--suite", "two.toml", "--controllers", "pid", "--seeds", "1"]),
-        ("random", &["compare", "--suite", "random", "--vehicle", "iris", "--flights", "1", "--controllers", "pid"]),
-        ("round", &["fly", "soft.toml", "--controller", "soft"]),
-    ] {
-        succeeds(&sitl(&folder, &[command, &["--out", &format!("mine/{name}"), "--force"]].concat()));
-        let manifest = format!("mine/{name}/manifest.json");
-        let written = json(&folder.join(&manifest));
-        assert_eq!(written["command"], serde_json::json!(command));
-        let flown = &written["flown"][0];
-        assert!(!flown["seeds"].as_array().unwrap().is_empty());
-        assert!(flown["scenario"]["contenders"][0]["law"].is_object(), "{flown}");
-        assert!(written["machine"]["cores"].as_u64().unwrap() > 0);
-        let said = succeeds(&sitl_on("1", &folder, &["again", &manifest]));
-        assert!(said.starts_with("the same bytes: "), "{said}");
-        assert!(folder.join(format!("mine/{name}-again/report.html")).exists());
-    }
-    // Other gains change the flight, and the reason is reported.
-    fs::write(folder.join("soft.toml"), SOFT.replace("climb_p_1_s = 1.5", "climb_p_1_s = 1.6")).unwrap();
-    let output = sitl(&folder, &["again", "mine/round", "--out", "other"]);
-    let said = String::from_utf8(output.stdout).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains("round-soft.csv: differs\n") && said.contains("the inputs differ"), "{said}");
-    // `again` refuses a modified manifest and a missing one.
-    let path = folder.join("mine/round/manifest.json");
-    fs::write(&path, fs::read_to_string(&path).unwrap().replace("\"soft.toml\"", "\"hover\"")).unwrap();
-    let line = refused(&sitl(&folder, &["again", "mine/round"]));
-    assert!(
-        line.starts_with("mine/round/manifest.json: the file is damaged or no manifest (the file's checksum is wrong)"),
-        "{line}"
-    );
-    let line = refused(&sitl(&folder, &["again", "nowhere.json"]));
-    assert!(line.starts_with("nowhere.json: cannot be read") && line.lines().count() == 1, "{line}");
-}
-
 #[test]
 fn compares_over_seeds_alike_on_any_number_of_threads() {
     let folder = soft("seeds");
@@ -402,300 +254,6 @@ fn compare_refuses_what_it_cannot_fly() {
     assert_eq!(line, "controllers pid: the controller is named twice; name it once\n");
     refused(&sitl(&folder, &["compare", "hover", "--seeds", "0"]));
     assert!(!folder.join("out").exists());
-}
-
-/// Two flights on the racer, with a published result.
-const SUITE: &str = r#"
-description = "two"
-
-[[source]]
-name = "someone"
-citation = "a paper"
-differs = "flown"
-
-[[flight]]
-name = "racing"
-duration_s = 9.0
-vehicle = { name = "racer" }
-sensors = { noise = 0.001 }
-trajectory = { kind = "circle", centre_m = [0, 0, 2], radius_m = 1.0, period_s = 4.0 }
-published = [{ law = "theirs", rms_m = 0.0123, source = "someone" }]
-
-[[flight]]
-name = "weak"
-like = "racing"
-sensors = { noise = 0.0 }
-rotor_fault = [{ rotor = 2, efficiency = 0.0, start_s = 6.0 }]
-"#;
-
-#[test]
-fn a_suite_is_one_report_alike_on_any_number_of_threads() {
-    let folder = folder("suite");
-    fs::write(folder.join("two.toml"), SUITE).unwrap();
-    let fly = |threads, out| {
-        let of =
-            ["compare", "--suite", "two.toml", "--controllers", "pid,afbc-monitored", "--seeds", "2", "--out", out];
-        succeeds(&sitl_on(threads, &folder, &of))
-    };
-    let table = fly("1", "one");
-    fly("3", "three");
-    for file in ["suite.csv", "suite.json", "report.html", "racing.svg", "weak.svg"] {
-        let [one, three] = ["one", "three"].map(|out| fs::read(folder.join(out).join(file)).unwrap());
-        assert!(one == three, "{file}");
-    }
-    assert!(table.contains("2 of 2 lost") && table.contains("PID"), "{table}");
-    assert_eq!(fs::read_to_string(folder.join("one/suite.csv")).unwrap().lines().count(), 1 + 2 * 2 * 2);
-    let flights = json(&folder.join("one/suite.json"));
-    let [racing, weak] = [0, 1].map(|flight| flights[flight]["contenders"][0].clone());
-    assert_eq!((&weak["lost"], &weak["mean"]["rms_m"], &racing["lost"]), (&2.into(), &Value::Null, &0.into()));
-    let page = fs::read_to_string(folder.join("one/report.html")).unwrap();
-    for word in ["0.0123", "someone", "a paper", "flown", "lost at t = ", "rotor fault", "<svg"] {
-        assert!(page.contains(word), "no {word}");
-    }
-    // The folder belongs to this suite: other results do not overwrite it.
-    let other = refused(&sitl(&folder, &["compare", "hover", "--out", "one"]));
-    assert_eq!(other.lines().count(), 1, "{other}");
-}
-
-#[test]
-fn a_suites_table_is_written_between_its_markers() {
-    let folder = folder("suite-page");
-    fs::write(folder.join("two.toml"), SUITE).unwrap();
-    let before = "# Page\n\n<!-- suite two: begin -->\nold\n<!-- suite two: end -->\nrest\n";
-    fs::write(folder.join("page.md"), before).unwrap();
-    let write = ["compare", "--suite", "two.toml", "--controllers", "pid", "--write", "page.md"];
-    assert_eq!(succeeds(&sitl(&folder, &write)), "");
-    let page = fs::read_to_string(folder.join("page.md")).unwrap();
-    assert!(
-        page.starts_with("# Page\n\n<!-- suite two: begin -->\n| flight | PID |\n|---|--:|\n| `racing`: "),
-        "{page}"
-    );
-    assert!(page.ends_with("<!-- suite two: end -->\nrest\n") && !page.contains("old"), "{page}");
-    assert!(page.contains("| `weak`:  | lost ") && page.contains("theirs 0.0123 (someone)"), "{page}");
-    succeeds(&sitl(&folder, &write));
-    assert_eq!(fs::read_to_string(folder.join("page.md")).unwrap(), page, "written again");
-    assert!(!folder.join("out").exists());
-
-    fs::write(folder.join("page.md"), "no markers").unwrap();
-    let line = refused(&sitl(&folder, &write));
-    assert!(
-        line.starts_with("page.md: the page has no place for the table; add the lines <!-- suite two: begin -->"),
-        "{line}"
-    );
-}
-
-#[test]
-fn a_suite_that_cannot_be_flown_is_refused_in_one_line() {
-    let folder = folder("suite-refused");
-    fs::write(folder.join("bad.toml"), SUITE.replace("like = \"racing\"", "like = \"nobody\"")).unwrap();
-    for (arguments, expected) in [
-        (&["--suite", "feild"][..], "feild: no such suite; did you mean field?"),
-        (&["--suite", "./nothing.toml"], "./nothing.toml: no such file; `sitl suites` lists the built-in ones"),
-        (&["--suite", "bad.toml"], "bad.toml:19: flight.like: no flight above is called \"nobody\""),
-        (&["--suite", "faults", "--controllers", "sof"], "controllers sof: no such controller; there are afbc,"),
-        (&["hover", "--against", "sof"], "--against sof: does not fly; name one of afbc"),
-    ] {
-        let line = refused(&sitl(&folder, &[&["compare"], arguments].concat()));
-        assert!(line.starts_with(expected) && line.lines().count() == 1, "{line}");
-    }
-    refused(&sitl(&folder, &["compare", "hover", "--suite", "field"]));
-    refused(&sitl(&folder, &["compare", "--suite", "field", "--vehicle", "racer"]));
-    refused(&sitl(&folder, &["compare", "--write", "page.md"]));
-    assert!(!folder.join("out").exists());
-    let listed = succeeds(&sitl(&folder, &["suites"]));
-    assert!(listed.contains("field ") && listed.contains("faults "), "{listed}");
-    fs::write(folder.join("copy.toml"), succeeds(&sitl(&folder, &["suites", "faults"]))).unwrap();
-}
-
-#[test]
-fn random_flights_are_alike_on_any_number_of_threads() {
-    let folder = folder("random");
-    let fly = |threads, out| {
-        let drawn = ["compare", "--suite", "random", "--seed", "2", "--flights", "2", "--controllers", "pid,indi"];
-        succeeds(&sitl_on(threads, &folder, &[&drawn[..], &["--out", out]].concat()))
-    };
-    let table = fly("1", "one");
-    fly("3", "three");
-    for file in ["flights.csv", "random.json", "report.html"] {
-        let [one, three] = ["one", "three"].map(|out| fs::read(folder.join(out).join(file)).unwrap());
-        assert!(one == three, "{file}");
-    }
-    assert!(table.starts_with("Suite random: seed 2, 2 flights of each vehicle and seed, on the truth"), "{table}");
-    assert!(table.contains("all vehicles, 12 flights") && table.contains("over PID [95 %]"), "{table}");
-    let rows = fs::read_to_string(folder.join("one/flights.csv")).unwrap();
-    assert_eq!(rows.lines().count(), 1 + 6 * 2 * 2);
-    let page = fs::read_to_string(folder.join("one/report.html")).unwrap();
-    for word in ["racer", "all vehicles", "best or level", "resamples"] {
-        assert!(page.contains(word), "no {word}");
-    }
-    // A user's vehicle file flies the same draws, also on its own estimate; the table in the page shows the same
-    // flights.
-    let mine = succeeds(&sitl(&folder, &["vehicles", "iris"]));
-    fs::write(folder.join("mine.toml"), mine).unwrap();
-    let own = ["compare", "--suite", "random", "--vehicle", "mine.toml", "--flights", "2", "--controllers", "pid"];
-    let own = [&own[..], &["--on-estimate"]].concat();
-    let table = succeeds(&sitl(&folder, &own));
-    // The text is wrapped to the terminal, so words are joined again.
-    let words = table.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(words.contains("the instruments of the scenario mocap") && words.contains("mine, 2 flights"), "{table}");
-    fs::write(folder.join("page.md"), "<!-- suite random: begin -->\n<!-- suite random: end -->\n").unwrap();
-    succeeds(&sitl(&folder, &[&own[..], &["--write", "page.md"]].concat()));
-    let page = fs::read_to_string(folder.join("page.md")).unwrap();
-    assert!(page.contains("| mine, 2 flights | best or level |") && page.contains("\n| PID | 2 (100 %) | "), "{page}");
-}
-
-#[test]
-fn random_flights_that_cannot_be_drawn_are_refused_in_one_line() {
-    let folder = folder("random-refused");
-    let own = "this suite is drawn from a seed, so it has no file; fly it with `sitl compare --suite random --seed N`";
-    for (arguments, expected) in [
-        (&["suites", "random"][..], &*format!("random: {own}")),
-        (&["compare", "--suite", "random", "--vehicle", "raser"], "vehicle: \"raser\" is no built-in vehicle"),
-        (&["compare", "--suite", "random", "--vehicle", "./no.toml"], "./no.toml: no such file"),
-        (&["compare", "--suite", "random", "--against", "sof"], "--against sof: does not fly; name one of afbc, "),
-        (&["compare", "--suite", "field", "--seed", "2"], "--seed: this option needs --suite random or rough-estimate"),
-        (
-            &["compare", "--suite", "field", "--vehicle", "racer"],
-            "--vehicle: this option needs --suite random or rough-estimate",
-        ),
-    ] {
-        let line = refused(&sitl(&folder, arguments));
-        assert!(line.starts_with(expected) && line.lines().count() == 1, "{line}");
-    }
-    refused(&sitl(&folder, &["compare", "--suite", "random", "--flights", "0"]));
-    refused(&sitl(&folder, &["compare", "--suite", "random", "--on-estimate", "nothing"]));
-    refused(&sitl(&folder, &["compare", "hover", "--seed", "2"]));
-    assert!(!folder.join("out").exists());
-    assert!(succeeds(&sitl(&folder, &["suites"])).contains("random           72 flights  drawn from --seed"));
-}
-
-/// Runs the suite with short flights: same bytes on any number of threads, a row for each class, and a one-line error
-/// for options that it does not take.
-#[test]
-fn rough_flights_are_alike_on_any_number_of_threads() {
-    let folder = folder("rough");
-    let short = ["compare", "--suite", "rough-estimate", "--vehicle", "iris", "--duration", "7", "--seed", "3"];
-    let table = succeeds(&sitl_on("1", &folder, &[&short[..], &["--out", "one"]].concat()));
-    succeeds(&sitl_on("3", &folder, &[&short[..], &["--out", "three"]].concat()));
-    for file in ["flights.csv", "rough-estimate.json", "report.html", "tables.md", "tables.tex"] {
-        let [one, three] = ["one", "three"].map(|out| fs::read(folder.join(out).join(file)).unwrap());
-        assert!(one == three, "{file}");
-    }
-    assert!(table.starts_with("Suite rough-estimate: Seed 3, flights of each vehicle, class and seed: 1"), "{table}");
-    let classes = ["nothing", "vibration", "bumps", "field", "gnss-jump", "tracker-flip", "mixture", "all"];
-    for class in classes {
-        assert!(table.lines().any(|line| line.starts_with(&format!("{class} "))), "no {class} in {table}");
-    }
-    assert_eq!(fs::read_to_string(folder.join("one/flights.csv")).unwrap().lines().count(), 1 + 25);
-    fs::write(folder.join("page.md"), "<!-- suite rough-estimate: begin -->\n<!-- suite rough-estimate: end -->\n")
-        .unwrap();
-    succeeds(&sitl(&folder, &[&short[..], &["--write", "page.md"]].concat()));
-    let page = fs::read_to_string(folder.join("page.md")).unwrap();
-    assert!(page.contains("\n| class | known | flights | NEES |") && page.contains("\n| mixture |  | 1 | "), "{page}");
-    assert!(succeeds(&sitl(&folder, &["suites"])).contains("rough-estimate  150 flights  drawn from --seed"));
-    let rough = ["compare", "--suite", "rough-estimate"];
-    for (arguments, expected) in [
-        (
-            &["suites", "rough-estimate"][..],
-            "rough-estimate: this suite is drawn from a seed, so it has no file; fly it with",
-        ),
-        (
-            &[&rough[..], &["--on-estimate"]].concat(),
-            "--on-estimate: only --suite random has this option; leave --on-estimate out",
-        ),
-        (
-            &[&rough[..], &["--against", "afbc-monitored"]].concat(),
-            "--against: --suite rough-estimate compares no contenders",
-        ),
-        (
-            &[&rough[..], &["--controllers", "afbc,pid"]].concat(),
-            "--controllers: this suite judges the estimate with one law",
-        ),
-        (
-            &["compare", "--suite", "random", "--duration", "9"],
-            "--duration: only --suite rough-estimate has this option; leave --duration out",
-        ),
-    ] {
-        let line = refused(&sitl(&folder, arguments));
-        assert!(line.starts_with(expected) && line.lines().count() == 1, "{line}");
-    }
-}
-
-/// Returns the two costs in the first line of `sitl tune`'s output.
-fn costs(fragment: &str) -> [f64; 2] {
-    let line = fragment.lines().next().unwrap();
-    let after = |word: &str| line.split(word).nth(1).unwrap().split([',', ' ']).next().unwrap().parse().unwrap();
-    [after("before "), after(": cost ")]
-}
-
-#[test]
-fn tune_improves_a_bad_start_alike_on_any_number_of_threads() {
-    let folder = soft("tune");
-    let tune = |threads, seed| {
-        let arguments = ["tune", "soft", "--scenario", "soft.toml", "--budget", "60", "--seed", seed];
-        succeeds(&sitl_on(threads, &folder, &arguments))
-    };
-    let fragment = tune("1", "1");
-    assert_eq!(fragment, tune("3", "1"));
-    assert_ne!(fragment, tune("2", "2"));
-    let [before, after] = costs(&fragment);
-    assert!(after < 0.7 * before, "{before} to {after}");
-
-    // The output is valid in a scenario file, and flies with the stated cost.
-    fs::write(folder.join("tuned.toml"), format!("{SOFT}\n{fragment}")).unwrap();
-    let again =
-        succeeds(&sitl(&folder, &["tune", "soft-tuned", "--scenario", "tuned.toml", "--budget", "1", "--seed", "3"]));
-    assert_eq!(costs(&again), [after, after]);
-}
-
-#[test]
-fn what_tune_prints_of_every_law_flies() {
-    let folder = soft("every-law");
-    let mut file = SOFT.to_owned();
-    let laws = ControllerKind::ALL.map(ControllerKind::name);
-    for law in laws {
-        let out = format!("{law}.toml");
-        let arguments =
-            ["tune", law, "--scenario", "circle", "--scenario", "soft.toml", "--budget", "20", "--out", &out];
-        let said = succeeds(&sitl(&folder, &arguments));
-        assert!(said.ends_with(&format!("gains in {out}\n")), "{said}");
-        file += &fs::read_to_string(folder.join(out)).unwrap();
-    }
-    fs::write(folder.join("all.toml"), file).unwrap();
-    let checked = succeeds(&sitl(&folder, &["check", "all.toml"]));
-    assert!(checked.contains(&laws.map(|law| format!("{law}-tuned")).join(", ")), "{checked}");
-}
-
-#[test]
-fn tune_refuses_what_it_cannot_do() {
-    let folder = soft("tune-refused");
-    let line = refused(&sitl(&folder, &["tune", "lqr"]));
-    let laws = ControllerKind::ALL.map(ControllerKind::name).join(", ");
-    assert_eq!(line, format!("lqr: no such controller; the laws are {laws}\n"));
-    let line = refused(&sitl(&folder, &["tune", "hard", "--scenario", "soft.toml"]));
-    assert!(line.ends_with("; the scenario's contenders backstepping, soft\n"), "{line}");
-    let line = refused(&sitl(&folder, &["tune", "pid", "--out", "nowhere/pid.toml"]));
-    assert!(
-        line.starts_with("nowhere/pid.toml: the file cannot be written (the folder nowhere does not exist); "),
-        "{line}"
-    );
-    refused(&sitl(&folder, &["tune", "pid", "--budget", "0"]));
-}
-
-/// Returns the number of tries in the first line of `sitl tune`'s output.
-fn tries(fragment: &str) -> &str {
-    fragment.lines().next().unwrap().split("after ").nth(1).unwrap().split(' ').next().unwrap()
-}
-
-#[test]
-fn tune_tries_as_many_gains_as_asked() {
-    let folder = soft("budget");
-    // A generation has about ten tries. The budgets are below one generation, between two, and several with a
-    // remainder.
-    for budget in ["1", "2", "9", "12", "13", "14", "40"] {
-        let fragment = succeeds(&sitl(&folder, &["tune", "soft", "--scenario", "soft.toml", "--budget", budget]));
-        assert_eq!(tries(&fragment), budget);
-    }
 }
 
 /// Repeats the example of docs/python.md on the command line: in every scenario, AFBC is the law of the profile
