@@ -208,8 +208,8 @@ pub async fn run<B: Board, const OTHERS: usize>(
 /// Passes the state of sensors outside the control tick to the ground stations, and the battery's state to the control
 /// tick.
 fn look_at_sensors<B: Board>(comms: &mut Comms, table: &ParameterTable, now_us: u64) {
-    let net = &table.configuration().guidance.failsafe;
-    let mut aux = aux_sensors::known(now_us, [net.divider, net.current_a_v]);
+    let failsafe = &table.configuration().guidance.failsafe;
+    let mut aux = aux_sensors::known(now_us, [failsafe.divider, failsafe.current_a_v]);
     if B::Sampler::IS_REDUNDANT {
         report_imus(comms, &mut aux, now_us);
     }

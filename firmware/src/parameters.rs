@@ -25,7 +25,7 @@ use heapless::Deque;
 
 /// Change that is waiting to be written.
 #[derive(Clone, Copy)]
-enum UnwrittenParameter {
+enum UnwrittenRecord {
     /// A change of the parameters.
     Parameters(RecordChange),
     /// A part of the signing key.
@@ -33,7 +33,7 @@ enum UnwrittenParameter {
 }
 
 /// Changes to write, and a signal that the queue has changes.
-static CHANGES: Mutex<CriticalSectionRawMutex, RefCell<Deque<UnwrittenParameter, 8>>> =
+static CHANGES: Mutex<CriticalSectionRawMutex, RefCell<Deque<UnwrittenRecord, 8>>> =
     Mutex::new(RefCell::new(Deque::new()));
 static CHANGED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 /// Flags for a station's warning: the parameters' flash could not be read at the start; a change could not be written.
@@ -105,7 +105,7 @@ pub struct Keeper<M>(Option<Store<Gate<M>>>);
 /// Reads the parameters and the signing key from `memory`, whose sectors begin at `start`, and makes room for changes.
 /// If the store cannot be read, the parameters are the image's.
 pub fn read<M: NorFlash>(memory: M, start: u32) -> (Keeper<M>, ParameterTable, Signing) {
-    let mut table = ParameterTable::with_rotors::<ROTORS>(CONFIGURATION);
+    let mut table = ParameterTable::for_rotors::<ROTORS>(CONFIGURATION);
     // The store is tied to the vehicle's name, so that values set for another vehicle are ignored.
     let Ok(mut store) = Store::open(Gate(memory), start, hash(NAME.as_bytes())) else {
         UNREAD.store(true, Ordering::Relaxed);
@@ -136,7 +136,7 @@ pub fn change(table: &ParameterTable, change: RecordChange, number: u16) {
     if let Ok(prepared) = Prepared::new(table.configuration()) {
         control::fly(prepared, number);
     }
-    put(UnwrittenParameter::Parameters(change));
+    put(UnwrittenRecord::Parameters(change));
 }
 
 /// Returns a problem with the parameters' flash as a text for stations. Each problem is returned once.
@@ -153,12 +153,12 @@ pub fn keep_signing(record: impl FnOnce() -> Option<SigningRecord>) {
     let has_room = CHANGES.lock(|changes| changes.try_borrow().is_ok_and(|changes| !changes.is_full()));
     // The room cannot vanish, since only this task queues. It is checked first because a record is handed out once.
     if has_room && let Some(record) = record() {
-        put(UnwrittenParameter::Signing(record));
+        put(UnwrittenRecord::Signing(record));
     }
 }
 
 /// Queues a change, or sets the flag `UNWRITTEN` if the queue is full.
-fn put(change: UnwrittenParameter) {
+fn put(change: UnwrittenRecord) {
     if CHANGES.lock(|changes| changes.try_borrow_mut().ok()?.push_back(change).ok()).is_none() {
         UNWRITTEN.store(true, Ordering::Relaxed);
     }
@@ -192,15 +192,15 @@ pub async fn run<M: NorFlash>(keeper: &mut Keeper<M>) -> ! {
 
 /// Writes a change. It is not inlined, so that it can be identified in the image.
 #[inline(never)]
-fn keep<M: NorFlash>(store: &mut Store<Gate<M>>, change: UnwrittenParameter) -> Result<(), Error<Shut>> {
+fn keep<M: NorFlash>(store: &mut Store<Gate<M>>, change: UnwrittenRecord) -> Result<(), Error<Shut>> {
     match change {
-        UnwrittenParameter::Parameters(change) => Kept::NOW.keep(store, change),
-        UnwrittenParameter::Signing(SigningRecord { name, bits }) => store.set(name, 0, bits),
+        UnwrittenRecord::Parameters(change) => Kept::NOW.keep(store, change),
+        UnwrittenRecord::Signing(SigningRecord { name, bits }) => store.set(name, 0, bits),
     }
 }
 
 /// Waits for the next change.
-fn next() -> impl Future<Output = UnwrittenParameter> {
+fn next() -> impl Future<Output = UnwrittenRecord> {
     poll_fn(|context| {
         // The waker is registered before the queue is read, so that no change is missed.
         let _ = pin!(CHANGED.wait()).poll(context);

@@ -86,13 +86,13 @@ impl<M: Machine> Driver<M> for BootObserver {
     }
 }
 
-/// Writes to the register of an erratum's workaround.
-struct Workaround {
+/// Records what an image writes to the register of an erratum's workaround.
+struct WorkaroundObserver {
     register: u64,
     written: Vec<u64>,
 }
 
-impl<M: Machine> Driver<M> for Workaround {
+impl<M: Machine> Driver<M> for WorkaroundObserver {
     fn on_settled(&mut self, _: &mut Session<M>, _: &mut dyn Host, settled: Settled) {
         if let Settled::Access { access, value } = settled
             && (access.kind, access.address) == (AccessKind::Write, self.register)
@@ -113,7 +113,7 @@ fn workaround<M: Machine>(image: &Path, revision: EarlyRevision, is_early: bool)
     if is_early {
         board.set_early_revision()?;
     }
-    let driver = Workaround { register: revision.register, written: Vec::new() };
+    let driver = WorkaroundObserver { register: revision.register, written: Vec::new() };
     let images = images::<M>(image, &[])?;
     let finished = run(Session::new(board, 0, VirtualNanos(START_UP))?, &Start::new(&images), driver)?;
     Ok(finished.driver.written)

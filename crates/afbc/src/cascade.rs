@@ -32,7 +32,7 @@ pub struct Controller<L, const N: usize = 4> {
     approach: [ApproachLimit; 3],
     desired: DesiredAttitude,
     smoother: Smoother,
-    ahead: DelayCompensation,
+    delay_compensation: DelayCompensation,
     effort: Effort,
     mixer: Mixer<N>,
     settings: Settings,
@@ -98,9 +98,9 @@ impl<E> CascadeMemory<E> {
 
     /// Returns the trace of the last step.
     pub(crate) fn trace(&self) -> Trace {
-        let LastStep { errors, inputs: PerAxis { x, y, .. }, commanded: asked, .. } = self.last;
+        let LastStep { errors, inputs: PerAxis { x, y, .. }, commanded, .. } = self.last;
         let mut trace = Trace::default();
-        trace.inputs = asked;
+        trace.inputs = commanded;
         trace.virtual_m_s2 = [x, y];
         (trace.desired_rad, trace.filtered) = self.filters.desired.trace();
         trace.errors = errors;
@@ -143,7 +143,7 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
             reference: ReferenceFilter::new(&settings.reference, limits, dt_s),
             desired: DesiredAttitude::new(&settings, vehicle.parameters.gravity_m_s2, thrust_max_n)?,
             smoother: Smoother::new(&settings.smoothing, dt_s)?,
-            ahead: DelayCompensation::new(
+            delay_compensation: DelayCompensation::new(
                 disturbance.disturbance_lag_s,
                 &settings.smoothing,
                 settings.command_filter_rad_s,
@@ -240,7 +240,8 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
         let mut tracking = self.attitude_tracking(&desired, &reference, &attitude, state);
         if self.settings.feed_forward {
             // Without the measured body rates, whose noise the lead would amplify.
-            let more = self.ahead.advance(&mut filters.delay_low_pass, &tracking.desired_accelerations.xy());
+            let more =
+                self.delay_compensation.advance(&mut filters.delay_low_pass, &tracking.desired_accelerations.xy());
             tracking.accelerations += Vector3::new(more.x, more.y, 0.0);
         }
         let [u1, u2, u3] =
@@ -251,15 +252,15 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
         let change = attitude.in_body(&reference.acceleration_m_s2) - state.rates_rad_s.cross(&velocity_body_m_s);
         let ahead_m_s = velocity_body_m_s + change * self.settings.disturbance.disturbance_lag_s;
         let compensation_n = self.moment_compensation_n(&observed_rad_s2, &ahead_m_s, share, touches_ground);
-        let ahead_n = self.mass_kg * self.ahead.thrust_s * desired.thrust_m_s3;
-        let (asked, effort) =
+        let ahead_n = self.mass_kg * self.delay_compensation.thrust_s * desired.thrust_m_s3;
+        let (commanded, effort) =
             self.commanded_inputs(filters, [u1, u2, u3, u4 + ahead_n], compensation_n, hover_n, stands);
-        let allocation = self.mixer.allocate(&asked);
+        let allocation = self.mixer.allocate(&commanded);
         let action = self.mixer.carry_out(&allocation);
 
         // The next step's observer needs the thrust.
         if let Some(forces) = &self.forces {
-            // It gets the thrust as given, not as asked. Otherwise it would observe the part beyond the rotors'
+            // It gets the thrust as given, not as commanded. Otherwise it would observe the part beyond the rotors'
             // limits as a disturbance.
             forces.record_thrust(&mut filters.forces, action.given.thrust_n);
         }
@@ -286,7 +287,7 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
         last.distances = PerAxis { roll: roll.e1, pitch: pitch.e1, yaw: yaw.e1, z, x, y };
         last.inputs = PerAxis { roll: u1, pitch: u2, yaw: u3, z: u4, x: u5, y: u6 };
         (last.eta, last.eta_dot) = (state.attitude_rad, eta_dot);
-        last.commanded = asked;
+        last.commanded = commanded;
         action
     }
 
@@ -486,8 +487,8 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
             inputs.yaw_n *= effort;
         }
         // On the ground, moments would increase the thrust and tip over the vehicle.
-        let asked = if stands { Inputs { thrust_n: inputs.thrust_n, ..Inputs::default() } } else { inputs };
-        (asked, effort)
+        let commanded = if stands { Inputs { thrust_n: inputs.thrust_n, ..Inputs::default() } } else { inputs };
+        (commanded, effort)
     }
 }
 

@@ -303,9 +303,9 @@ impl Comms {
         // COM_DL_LOSS_T. Its range is checked, so the conversion is safe.
         let silent_us = (table.configuration().guidance.failsafe.station_lost_s * 1e6) as u64;
         self.control.set_silence(silent_us);
-        let afbc_guidance::Settings { limits, failsafe: net, .. } = &table.configuration().guidance;
+        let afbc_guidance::Settings { limits, failsafe, .. } = &table.configuration().guidance;
         self.braking = limits.braking();
-        self.cylinder_m = [net.fence_radius_m, net.fence_height_m];
+        self.cylinder_m = [failsafe.fence_radius_m, failsafe.fence_height_m];
         let radio = &table.configuration().radio;
         (self.curves, self.takes_joystick) = (radio.curves, radio.receiver.takes_joystick());
         while self.left >= VALUE_BYTES as usize + SIGNATURE

@@ -20,8 +20,8 @@ const ARM_DISARM: u16 = 400;
 
 /// Returns a vehicle with a monitored three-cell battery, inside its geofence of 10 m.
 fn bench() -> Bench {
-    let net = FailsafeSettings { cells: 3, fence_radius_m: 10.0, ..FailsafeSettings::DEFAULT };
-    let guidance = Settings { failsafe: net, ..Settings::DEFAULT };
+    let failsafe = FailsafeSettings { cells: 3, fence_radius_m: 10.0, ..FailsafeSettings::DEFAULT };
+    let guidance = Settings { failsafe, ..Settings::DEFAULT };
     let mut bench = Bench::new();
     bench.flight = Flight::new(&Configuration { guidance, ..Configuration::default() }).expect("valid");
     charge(&mut bench, 12_000);
@@ -284,7 +284,7 @@ fn stands() -> impl Strategy<Value = Stands> {
 
 /// Returns a vehicle with these arming limits and a link fast enough for every text.
 fn limited(limits: &[f32; 4]) -> Bench {
-    let net = FailsafeSettings { cells: 3, fence_radius_m: 10.0, ..FailsafeSettings::DEFAULT };
+    let failsafe = FailsafeSettings { cells: 3, fence_radius_m: 10.0, ..FailsafeSettings::DEFAULT };
     let [speed_max_m_s, rate_max_rad_s, tilt_max_rad, setpoint_distance_max_m] = *limits;
     let arming = afbc_onboard::ArmingLimits {
         tilt_max_rad: tilt_max_rad.clamp(0.01, 0.8),
@@ -293,7 +293,7 @@ fn limited(limits: &[f32; 4]) -> Bench {
         rate_max_rad_s: rate_max_rad_s.max(0.01),
     };
     let configuration =
-        Configuration { guidance: Settings { failsafe: net, ..Settings::DEFAULT }, arming, ..Configuration::default() };
+        Configuration { guidance: Settings { failsafe, ..Settings::DEFAULT }, arming, ..Configuration::default() };
     let mut bench = Bench::new();
     bench.flight = Flight::new(&configuration).expect("valid");
     bench.table = afbc_onboard::parameters::ParameterTable::new(configuration);

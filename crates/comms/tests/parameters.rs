@@ -138,9 +138,9 @@ fn what_was_kept_as_a_float_counts() {
     let (table, _, notices) = restarted(store, &Kept::NOW);
     assert_eq!(notices, [""; 0]);
     let Configuration { settings, guidance, link, .. } = table.configuration();
-    let net = &guidance.failsafe;
-    assert_eq!((net.fence_action, net.sticks_action), (FenceAction::Return, SticksAction::Return));
-    assert_eq!((net.battery_action, net.cells), (BatteryAction::Warn, 4));
+    let failsafe = &guidance.failsafe;
+    assert_eq!((failsafe.fence_action, failsafe.sticks_action), (FenceAction::Return, SticksAction::Return));
+    assert_eq!((failsafe.battery_action, failsafe.cells), (BatteryAction::Warn, 4));
     assert_eq!((link.system, link.baud, settings.bumpless), (7, 57_600, false));
     // These parameters are also sent as before.
     for (text, value) in [("GF_ACTION", 3.0), ("NAV_RCL_ACT", 2.0), ("SER_TEL1_BAUD", 57_600.0)] {

@@ -156,7 +156,7 @@ impl AidRecords {
 
     /// Returns when a rejected aid is to be followed, judged by the aids that were fused within the last `time_us`.
     /// `fast` is true if a receiver's velocity was fused within that time.
-    pub(crate) fn trust(&self, aid: AidSource, fast: bool, now_us: u64, time_us: u64) -> ResetDelay {
+    pub(crate) fn reset_delay(&self, aid: AidSource, fast: bool, now_us: u64, time_us: u64) -> ResetDelay {
         let live = |other: &AidRecord| other.is_live(now_us, time_us);
         let tracker = live(&self.tracker_position);
         let never_if = |doubts: bool, else_late: bool| match (doubts, else_late) {

@@ -47,7 +47,8 @@ pub struct Resets {
     pub velocity: u32,
     /// Resets of the heading to a measurement.
     pub heading: u32,
-    /// Resets of the barometer offset to a measurement.
+    /// Resets of the barometer offset to a measurement, and corrections of a height that a GNSS receiver's creeping
+    /// error has moved.
     pub height: u32,
     /// Increases of the standard deviation of roll and pitch.
     pub tilt: u32,

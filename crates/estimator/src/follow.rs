@@ -177,6 +177,8 @@ impl Memory {
         self.history.correct(&turn, &NONE, &NONE, &NONE);
         self.covariance.turn(&matrix(&turn));
         self.yaw_bank.turn_at_once(by);
+        // Earlier innovations say nothing of the new heading.
+        (self.leaning[1].z, self.doubts_field) = (0.0, false);
     }
 
     /// Adds a variance to each coordinate of the velocity.

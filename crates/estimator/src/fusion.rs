@@ -126,7 +126,7 @@ impl Estimator {
         match (&measurement.value, &mut parts) {
             (Measurement::Gnss { .. }, [Some(level), receiver_height @ Some(_), _]) => {
                 let since_us = at_us.saturating_sub(fix_us.unwrap_or(0));
-                let trusted = self.trusts_height(memory, level, at_us, since_us);
+                let trusted = self.trusts_height(memory, level, &past, at_us, since_us);
                 self.divide(memory, level, since_us);
                 if let Some(height) = receiver_height {
                     height.variance = level.variance;
@@ -246,7 +246,7 @@ impl Estimator {
         let horizon = FusionHorizon::new(&present, &past, gravity);
         // Changes the copy only: the part's next scalar starts again from the measurement's own variances.
         part.inflate_variances(memory.roughened_since(at_us), horizon.tau_s());
-        if next == 0 && !self.check_gate(memory, at_us, &part, &horizon) {
+        if next == 0 && !self.gate_or_follow(memory, at_us, &part, &horizon) {
             return false;
         }
         let coordinate = part.axes.coordinate(next);
@@ -338,7 +338,7 @@ impl Estimator {
 
     /// Returns true if the part of a fix is to be fused. Otherwise it was rejected, or the state was reset to it.
     #[inline]
-    fn check_gate(&self, memory: &mut Memory, at_us: u64, part: &AidObservation, horizon: &FusionHorizon) -> bool {
+    fn gate_or_follow(&self, memory: &mut Memory, at_us: u64, part: &AidObservation, horizon: &FusionHorizon) -> bool {
         let variances = memory.covariance.variances();
         let past = horizon.past();
         let (innovation, variance) = match &part.target {
@@ -445,7 +445,7 @@ impl Estimator {
         let lasted_us = record.reject(at_us);
         // If the aid was never accepted, the time since its first rejection.
         let alone_us = record.accepted_us.map_or(lasted_us, |accepted_us| at_us.saturating_sub(accepted_us));
-        let wait_us = match memory.aids.trust(aid, is_carried, at_us, PRESENT_US) {
+        let wait_us = match memory.aids.reset_delay(aid, is_carried, at_us, PRESENT_US) {
             ResetDelay::Never => return,
             ResetDelay::Late => self.reacquire_us,
             ResetDelay::Soon => self.reacquire_us.min(self.coast_us / 5 * 3),

@@ -8,6 +8,8 @@
 use crate::aid::AidSource;
 use crate::estimate::count;
 use crate::estimator::Estimator;
+use crate::history::PastState;
+use crate::horizon::ObservedQuantity;
 use crate::memory::Memory;
 use crate::queue::AidObservation;
 use crate::rotation::identity;
@@ -69,12 +71,21 @@ impl HeightWatch {
 }
 
 impl Estimator {
-    /// Watches the height of a receiver's fix. Returns false if barometer and
-    /// velocity contradict it, and undoes what it has moved.
+    /// Watches the height of a receiver's fix. Returns false if barometer and vertical velocity contradict the height;
+    /// the estimate is then moved back by what the height has moved it.
     #[inline(never)]
-    pub(crate) fn trusts_height(&self, memory: &mut Memory, part: &AidObservation, at_us: u64, since_us: u64) -> bool {
-        let crate::horizon::ObservedQuantity::Position(fix) = &part.target else { return true };
-        let (height, climb) = (memory.nominal.position.z, memory.nominal.velocity.z);
+    pub(crate) fn trusts_height(
+        &self,
+        memory: &mut Memory,
+        part: &AidObservation,
+        raw: &PastState,
+        at_us: u64,
+        since_us: u64,
+    ) -> bool {
+        let ObservedQuantity::Position(fix) = &part.target else { return true };
+        // The state at the time of the fix, which is older than the present one.
+        let Some(past) = memory.history.corrected(raw, self.settings.gravity_m_s2) else { return true };
+        let (mut height, climb) = (past.position.z, past.velocity.z);
         memory.height_watch.advance((height, climb, memory.height_offset), min(since_us as f32 * 1e-6, 1e3));
         let live = |aid: AidSource| memory.aids.of(aid).is_live(at_us, PRESENT_US);
         let contradicted =
@@ -91,16 +102,18 @@ impl Estimator {
         if watch.crept() > sigmas * sigmas * usual {
             let (lifted, offset) = (watch.lifted, watch.offset);
             *watch = HeightWatch { doubts: true, ..HeightWatch::default() };
-            // A correction, not a reset: the vehicle has been taken along and has to come back.
+            // Unlike other resets, this one is not handed to the guidance: the vehicle itself was taken along, and has
+            // to come back.
             let by = Vector3::new(0.0, 0.0, -lifted);
             memory.nominal.move_by(&by);
             memory.height_offset -= offset;
             memory.history.correct(&identity(), &Vector3::zeros(), &Vector3::zeros(), &by);
+            height -= lifted;
             count(&mut memory.resets.height);
         }
         let watch = &mut memory.height_watch;
         if watch.doubts {
-            let off = fix.z - memory.nominal.position.z;
+            let off = fix.z - height;
             let variance = part.variance.z + memory.covariance.variances().position.z;
             watch.doubts = off * off > NEAR_SIGMAS * NEAR_SIGMAS * variance;
         }

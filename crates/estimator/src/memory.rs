@@ -68,7 +68,7 @@ pub struct Memory {
     pub(crate) aids: AidRecords,
     /// Mean innovations of motion and rotation along the earth's axes, in standard deviations.
     pub(crate) leaning: [Vector3<f32>; 2],
-    /// True while the magnetometer's innovations lean to one side: field or gyroscope bias drifts.
+    /// True while the innovations about the vertical lean to one side: field or gyroscope bias drifts.
     pub(crate) doubts_field: bool,
     pub(crate) height_watch: HeightWatch,
     pub(crate) repeated: FrozenPoseDetector,

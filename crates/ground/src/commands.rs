@@ -15,9 +15,9 @@ pub enum CommandState {
     Waiting,
     /// The vehicle has answered.
     Answered {
-        /// The final answer, never [`Answer::InProgress`].
+        /// The final answer, never [`CommandResult::InProgress`].
         answer: CommandResult,
-        /// Time since the last try, or since the last [`Answer::InProgress`] \[ms\].
+        /// Time since the last try, or since the last [`CommandResult::InProgress`] \[ms\].
         after_ms: u64,
     },
     /// The vehicle has not answered in time.

@@ -153,7 +153,7 @@ enum FrameScan<M> {
 /// Handler of the frames that a [`Decoder`] finds in its stream.
 pub trait FrameHandler<M> {
     /// Returns true if the frame is accepted. Called once for each valid frame that the direction carries; refused ones
-    /// count as [`Fault::Unsupported`].
+    /// count as [`FrameFault::Unsupported`].
     fn accepts(&mut self, frame: &ReceivedFrame<'_>) -> bool;
 
     /// Handles an accepted frame's message, with the address of its sender and its payload.

@@ -131,8 +131,8 @@ impl MessageSet for Uplink {
             // Requests are for everyone. Answers concern only the requester; the caller checks this.
             _ if TimeMessage::format(id).is_some() => TimeMessage::read(id, payload).map(Uplink::Time),
             _ if ServiceRequest::format(id).is_some() => {
-                let (question, to) = ServiceRequest::read(id, payload)?;
-                meant_for(receiver, to).map(|()| Uplink::ServiceRequest(question))
+                let (request, to) = ServiceRequest::read(id, payload)?;
+                meant_for(receiver, to).map(|()| Uplink::ServiceRequest(request))
             }
             _ => {
                 let (request, to) = ParameterRequest::read(id, payload)?;
@@ -168,7 +168,7 @@ impl MessageSet for Uplink {
             Uplink::Stream(stream) => stream.write(payload),
             Uplink::Control(control) => control.write(payload),
             Uplink::Signing(setup) => setup.write(payload),
-            Uplink::ServiceRequest(question) => question.write(payload),
+            Uplink::ServiceRequest(request) => request.write(payload),
         }
     }
 }

@@ -72,7 +72,7 @@ impl<P: Prepare> AnyFlight<P> {
             5 => AnyFlight::Five(Flight::of(prepare.prepare(configuration)?)),
             6 => AnyFlight::Six(Flight::of(prepare.prepare(configuration)?)),
             7 => AnyFlight::Seven(Flight::of(prepare.prepare(configuration)?)),
-            // Any other number of rotors is refused.
+            // Eight: `Rotors` has no other number.
             _ => AnyFlight::Eight(Flight::of(prepare.prepare(configuration)?)),
         })
     }

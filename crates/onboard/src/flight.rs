@@ -22,7 +22,7 @@ pub struct Flight<const N: usize = 4, C: FlightLaw<N> = Guarded<N>> {
     memory: FlightCoreMemory<C::Memory>,
     front_end: EstimatorFrontEnd,
     motor: Motor,
-    guide: GuidanceStage,
+    guidance: GuidanceStage,
     timeouts: SensorTimeouts,
     /// True if the flight core's observer provided the last tick's state.
     observes: bool,
@@ -39,7 +39,7 @@ pub struct Prepared<const N: usize = 4, C: FlightLaw<N> = Guarded<N>> {
     output_filter: OutputFilter,
     corrections: Corrections,
     motor: Motor,
-    guide: GuidanceStage,
+    guidance: GuidanceStage,
 }
 
 impl<const N: usize> Prepared<N> {
@@ -59,7 +59,7 @@ impl<const N: usize, C: FlightLaw<N>> Prepared<N, C> {
     /// Prepares a flight under `controller`, which must be built for this vehicle.
     ///
     /// # Errors
-    /// The first of the other parameters and settings that is out of range.
+    /// The first of the other parameters and settings that is out of range. Also if there are not `N` rotors.
     pub fn under(configuration: &Configuration, controller: C) -> Result<Self, OutOfRange> {
         configuration.imu.validate()?;
         configuration.calibration.validate()?;
@@ -73,13 +73,14 @@ impl<const N: usize, C: FlightLaw<N>> Prepared<N, C> {
         let Configuration { parameters, curve, response, imu, calibration, estimation, arming, radio, .. } =
             configuration;
         radio.validate()?;
+        configuration.rotors.array::<N>()?;
         Ok(Prepared {
             vehicle: FlightCore::with_rotors(*parameters, response, *arming, controller)?,
             estimator: Estimator::new(*estimation)?,
             output_filter: OutputFilter::of(parameters, N).handing_over(),
             corrections: Corrections::new(imu, calibration),
             motor: Motor::new(*curve)?,
-            guide: GuidanceStage::new(configuration)?,
+            guidance: GuidanceStage::new(configuration)?,
         })
     }
 }
@@ -99,13 +100,13 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
     // This function is always inlined, so that the vehicle is on the stack of the firmware's start-up only once.
     #[inline(always)]
     pub fn of(prepared: Prepared<N, C>) -> Self {
-        let Prepared { vehicle, estimator, output_filter, corrections, motor, guide } = prepared;
+        let Prepared { vehicle, estimator, output_filter, corrections, motor, guidance } = prepared;
         Flight {
             vehicle,
             memory: FlightCoreMemory::default(),
             front_end: EstimatorFrontEnd::corrected(estimator, output_filter, corrections),
             motor,
-            guide,
+            guidance,
             timeouts: SensorTimeouts::default(),
             observes: false,
             idle_on_ground: false,
@@ -119,11 +120,11 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
     pub fn adopt(&mut self, prepared: &Prepared<N, C>) -> bool {
         let disarmed = !self.memory.mode().armed();
         if disarmed {
-            let Prepared { vehicle, estimator, output_filter, corrections, motor, guide } = prepared;
+            let Prepared { vehicle, estimator, output_filter, corrections, motor, guidance } = prepared;
             self.vehicle.clone_from(vehicle);
             self.front_end.adopt(estimator, output_filter, corrections);
             self.motor = *motor;
-            self.guide.adopt(guide);
+            self.guidance.adopt(guidance);
         }
         disarmed
     }
@@ -210,10 +211,10 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
         let estimate = self.front_end.tick(now_us, readings, &mut inputs.inbox);
         let observed = self.memory.state().filter(|_| self.observes);
         let core = Core { mode, airborne, rested, sensors, observed };
-        let guided = self.guide.tick(now_us, inputs, &core);
+        let guided = self.guidance.tick(now_us, inputs, &core);
         self.idle_on_ground = inputs.inbox.idle_on_ground();
         let outcome = self.vehicle.tick(&mut self.memory, now_us, &inputs.inbox);
-        self.guide.gave(outcome.forces.0.iter().sum());
+        self.guidance.gave(outcome.forces.0.iter().sum());
         self.observes = outcome.health.observed;
         if outcome.health.control.saturated {
             self.saturated_ticks = self.saturated_ticks.saturating_add(1);

@@ -135,7 +135,7 @@ impl EstimatorFrontEnd {
         EstimatorFrontEnd {
             estimator,
             memory: Memory::default(),
-            lever: lever_finder(&output_filter),
+            lever: lever_arm_estimator(&output_filter),
             clearance: Clearance::default(),
             output_filter,
             corrections,
@@ -279,7 +279,7 @@ impl EstimatorFrontEnd {
         (self.estimator, self.output_filter) = (*estimator, *output_filter);
         if self.corrections != *corrections {
             (self.corrections, self.last) = (*corrections, None);
-            self.lever = lever_finder(output_filter);
+            self.lever = lever_arm_estimator(output_filter);
             self.memory.align_again();
             self.stands_m = None;
         }
@@ -384,8 +384,8 @@ impl EstimatorFrontEnd {
     }
 }
 
-/// Returns the finder for rotors at the notch's speed. Without a notch, the rotors count as fast.
-fn lever_finder(output_filter: &OutputFilter) -> LeverArmEstimator {
+/// Returns the estimator for rotors at the notch's speed. Without a notch, the rotors count as fast.
+fn lever_arm_estimator(output_filter: &OutputFilter) -> LeverArmEstimator {
     LeverArmEstimator::new(output_filter.notch().map_or(f32::MAX, VelocityNotch::centre_rad_s))
 }
 

@@ -15,7 +15,7 @@ const OWN: u8 = u8::MAX;
 #[derive(Clone, Debug)]
 pub(crate) struct GuidanceStage {
     guidance: Guidance,
-    lift: AvailableThrust,
+    available_thrust: AvailableThrust,
     mass_kg: f32,
     last_us: u64,
 }
@@ -41,7 +41,7 @@ impl GuidanceStage {
         let most_m_s2 = rotors.count() as f32 * settings.common.rotor_force_max_n / parameters.mass_kg;
         Ok(GuidanceStage {
             guidance: Guidance::new(*guidance)?,
-            lift: AvailableThrust { most_m_s2, gravity_m_s2: parameters.gravity_m_s2, given_m_s2: None },
+            available_thrust: AvailableThrust { most_m_s2, gravity_m_s2: parameters.gravity_m_s2, given_m_s2: None },
             mass_kg: parameters.mass_kg,
             last_us: 0,
         })
@@ -51,13 +51,13 @@ impl GuidanceStage {
     pub(crate) fn adopt(&mut self, prepared: &GuidanceStage) {
         // The call cannot fail, because `prepared` was made from these settings.
         let _ = self.guidance.set(*prepared.guidance.settings());
-        (self.lift, self.mass_kg) = (prepared.lift, prepared.mass_kg);
+        (self.available_thrust, self.mass_kg) = (prepared.available_thrust, prepared.mass_kg);
     }
 
     /// Stores the total thrust that the flight core has commanded.
     #[inline]
     pub(crate) fn gave(&mut self, thrust_n: f32) {
-        self.lift.given_m_s2 = (thrust_n > 0.0).then_some(thrust_n / self.mass_kg);
+        self.available_thrust.given_m_s2 = (thrust_n > 0.0).then_some(thrust_n / self.mass_kg);
     }
 
     /// Runs the guidance on the oldest order, and puts its setpoint and requests into the flight core's inbox.
@@ -70,7 +70,7 @@ impl GuidanceStage {
         let gap_us = u32::try_from(now_us.saturating_sub(self.last_us)).unwrap_or(u32::MAX);
         let dt_s = gap_us as f32 * 1e-6;
         self.last_us = now_us;
-        let sight = GuidanceInputs {
+        let guidance_inputs = GuidanceInputs {
             now_us,
             dt_s,
             state,
@@ -80,9 +80,9 @@ impl GuidanceStage {
             rested: core.rested,
             battery: *battery,
             sensors: core.sensors,
-            available_thrust: self.lift,
+            available_thrust: self.available_thrust,
         };
-        let guided = self.guidance.tick(&sight, orders);
+        let guided = self.guidance.tick(&guidance_inputs, orders);
         if let Some(value) = guided.setpoint {
             inbox.put_setpoint(Stamped { value, at_us: now_us });
         }

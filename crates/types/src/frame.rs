@@ -70,7 +70,7 @@ impl Rotors {
     #[must_use]
     #[expect(clippy::indexing_slicing, reason = "within both lengths, as the compiler checks")]
     pub const fn new<const N: usize>(rotors: &[Rotor; N]) -> Self {
-        const { assert!(N <= ROTORS_MAX, "more rotors than a vehicle may have") };
+        const { assert!(ROTORS.min as usize <= N && N <= ROTORS_MAX, "a vehicle has 4 to 8 rotors") };
         let mut all = Rotors { x: [0.0; ROTORS_MAX], y: [0.0; ROTORS_MAX], pushes_left: 0, count: N as u8 };
         let mut index = 0;
         while index < N {

@@ -31,8 +31,8 @@ use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 /// Largest number of queued replies, besides answers to commands. Further replies are dropped, since stations repeat
 /// requests.
 pub(super) const REPLIES_MAX: usize = 16;
-/// Largest number of parameter requests queued until the end of the tick. Further requests are dropped, since stations
-/// repeat them.
+/// Largest number of queued parameter requests. A tick carries out all that read, and at most one that changes a value.
+/// Further requests are dropped, since stations repeat them.
 pub(super) const PARAMETER_TASKS_MAX: usize = 24;
 /// Shortest time between two reports to the guidance that the station in control was heard \[us\].
 const HEARD_EVERY_US: u64 = 50_000;
@@ -187,13 +187,13 @@ impl Comms {
                 let stream = self.streams.set_group(request, self.now_us);
                 self.reply(Reply::Stream(stream));
             }
-            Uplink::ServiceRequest(question) => self.question(question, from),
+            Uplink::ServiceRequest(request) => self.refuse_service(request, from),
             Uplink::Time(clock) => {
                 let answer = timesync::answer(clock, from, self.me, self.now_us);
                 answer.into_iter().for_each(|answer| self.reply(Reply::Clock(answer)));
             }
-            Uplink::Control(wish) => {
-                let (answer, claim) = self.control.change(wish, from, self.now_us);
+            Uplink::Control(request) => {
+                let (answer, claim) = self.control.change(request, from, self.now_us);
                 self.reply(Reply::Control(answer));
                 self.warn_not_in_control(from, claim);
             }
@@ -357,8 +357,8 @@ impl Comms {
     }
 
     /// Refuses a request that the vehicle does not support.
-    fn question(&mut self, question: ServiceRequest, from: Address) {
-        let refusal = match question {
+    fn refuse_service(&mut self, request: ServiceRequest, from: Address) {
+        let refusal = match request {
             ServiceRequest::Log(request) => {
                 let Some(answer) = logs::answer(request) else { return };
                 ServiceRefusal::Log(answer)
@@ -369,8 +369,8 @@ impl Comms {
             ServiceRequest::Serial(asked) => ServiceRefusal::Serial(serial::answer(asked)),
             // The answer repeats the place without terrain data.
             ServiceRequest::Terrain(place) => ServiceRefusal::Terrain(place),
-            ServiceRequest::Unanswered(wish) => {
-                if let Some(text) = self.unanswered.text(wish, self.now_us) {
+            ServiceRequest::Unanswered(request) => {
+                if let Some(text) = self.unanswered.text(request, self.now_us) {
                     self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, text);
                 }
                 return;

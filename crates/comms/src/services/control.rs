@@ -3,7 +3,7 @@
 //! The first station that commands is in control, until it has been silent for a time or releases control. A station is
 //! known by its system and component number: the link has no other proof of identity (`docs/security.md`).
 
-use afbc_mavlink::{Address, ControlAnswer, ControlRequest as Wish, VehicleCommand};
+use afbc_mavlink::{Address, ControlAnswer, ControlRequest, VehicleCommand};
 
 /// Silence after which a station is no longer in control \[us\].
 pub const SILENT_US: u64 = 10_000_000;
@@ -78,17 +78,17 @@ impl OperatorControl {
     }
 
     /// Answers CHANGE_OPERATOR_CONTROL.
-    pub fn change(&mut self, wish: Wish, from: Address, now_us: u64) -> (ControlAnswer, ControlClaim) {
-        let claim = match (wish, self.holder(now_us)) {
-            (Wish::Release, None) => ControlClaim::Granted,
-            (Wish::Release, Some(holder)) if holder == from => {
+    pub fn change(&mut self, request: ControlRequest, from: Address, now_us: u64) -> (ControlAnswer, ControlClaim) {
+        let claim = match (request, self.holder(now_us)) {
+            (ControlRequest::Release, None) => ControlClaim::Granted,
+            (ControlRequest::Release, Some(holder)) if holder == from => {
                 self.holder = None;
                 ControlClaim::Granted
             }
             _ => self.claim(from, now_us),
         };
         let granted = claim == ControlClaim::Granted;
-        (ControlAnswer { station: from.system, control: wish, granted }, claim)
+        (ControlAnswer { station: from.system, control: request, granted }, claim)
     }
 
     /// Returns true if a station has not been informed yet, and notes that it is now.
@@ -105,7 +105,7 @@ impl OperatorControl {
 }
 
 /// Returns true if only the station in control may give this command. Any station may send requests and may stop the
-/// motors: [`Command::Kill`] works in flight too, [`Command::Disarm`] only on the ground.
+/// motors: [`VehicleCommand::Kill`] works in flight too, [`VehicleCommand::Disarm`] only on the ground.
 pub fn is_needed_for(command: VehicleCommand) -> bool {
     match command {
         VehicleCommand::Arm
@@ -168,14 +168,14 @@ mod tests {
     #[test]
     fn control_is_handed_over_by_its_holder_alone() {
         let mut control = OperatorControl::default();
-        let granted = |wish, from: Address| ControlAnswer { station: from.system, control: wish, granted: true };
-        assert_eq!(control.change(Wish::Take, A, 0).0, granted(Wish::Take, A));
-        assert!(!control.change(Wish::Take, B, 1).0.granted);
-        assert!(!control.change(Wish::Release, B, 2).0.granted);
+        let granted = |request, from: Address| ControlAnswer { station: from.system, control: request, granted: true };
+        assert_eq!(control.change(ControlRequest::Take, A, 0).0, granted(ControlRequest::Take, A));
+        assert!(!control.change(ControlRequest::Take, B, 1).0.granted);
+        assert!(!control.change(ControlRequest::Release, B, 2).0.granted);
         assert_eq!(control.holder(3), Some(A));
-        assert_eq!(control.change(Wish::Release, A, 4).0, granted(Wish::Release, A));
+        assert_eq!(control.change(ControlRequest::Release, A, 4).0, granted(ControlRequest::Release, A));
         assert_eq!(control.holder(5), None);
-        assert_eq!(control.change(Wish::Take, B, 6).0, granted(Wish::Take, B));
+        assert_eq!(control.change(ControlRequest::Take, B, 6).0, granted(ControlRequest::Take, B));
         assert_eq!(control.holder(7), Some(B));
     }
 
@@ -183,12 +183,12 @@ mod tests {
     #[test]
     fn a_release_takes_nothing() {
         let mut control = OperatorControl::default();
-        let (answer, claim) = control.change(Wish::Release, B, 0);
+        let (answer, claim) = control.change(ControlRequest::Release, B, 0);
         assert_eq!((answer.granted, answer.station, claim), (true, B.system, ControlClaim::Granted));
         assert_eq!(control.holder(0), None);
         assert_eq!(control.claim(A, 1), ControlClaim::Granted);
         // Releasing another station's control is refused and does not take control.
-        let (answer, claim) = control.change(Wish::Release, B, 2);
+        let (answer, claim) = control.change(ControlRequest::Release, B, 2);
         assert_eq!((answer.granted, claim), (false, ControlClaim::Refused { holder: A, first_time: true }));
         assert_eq!(control.holder(2), Some(A));
     }
@@ -216,7 +216,7 @@ mod tests {
         }
         assert_eq!([informed(&mut control, 3), informed(&mut control, 9)], [(A, false); 2]);
         assert_eq!(informed(&mut control, 2), (A, true));
-        control.change(Wish::Release, A, 2);
+        control.change(ControlRequest::Release, A, 2);
         control.claim(B, 3);
         assert_eq!(informed(&mut control, 9), (B, true));
     }

@@ -361,7 +361,7 @@ fn what_two_agree_on_is_not_overruled() {
     let trust = |aid: AidSource, live: &[AidSource], now_us| {
         let mut aids = AidRecords::default();
         live.iter().for_each(|live| aids.of_mut(*live).accept(1000));
-        aids.trust(aid, aids.gnss_velocity.is_live(now_us, 50), now_us, 50)
+        aids.reset_delay(aid, aids.gnss_velocity.is_live(now_us, 50), now_us, 50)
     };
     for (aid, live, expected) in [
         (TrackerPosition, &[GnssPosition][..], ResetDelay::Never),

@@ -112,8 +112,8 @@ impl ServiceRequest {
                 (ServiceRequest::Origin, Address { system, component: 0 })
             }
             _ if UnansweredRequest::format(id).is_some() => {
-                let (wish, to) = UnansweredRequest::read(id, payload);
-                (ServiceRequest::Unanswered(wish), to)
+                let (request, to) = UnansweredRequest::read(id, payload);
+                (ServiceRequest::Unanswered(request), to)
             }
             _ => return Err(FrameFault::Unknown),
         })
@@ -128,7 +128,7 @@ impl ServiceRequest {
             ServiceRequest::Serial(serial) => serial.write(serial::RESPOND, Address::default(), payload),
             ServiceRequest::Terrain(terrain) => terrain.write_check(payload),
             ServiceRequest::Origin => ORIGIN.write(&(Unused, 0, Unused), payload),
-            ServiceRequest::Unanswered(wish) => wish.write(payload),
+            ServiceRequest::Unanswered(request) => request.write(payload),
         }
     }
 }

@@ -58,7 +58,7 @@ impl Kept {
             notice(Reason::new("parameters", "stored for another vehicle, ignored"));
         }
         if found.damaged > 0 {
-            notice(Reason::new("parameters", "power failed in a write, one value lost"));
+            notice(Reason::new("parameters", "a write was cut off, values are lost"));
         }
         let read = store.visit(|name, edition, bits| {
             let put = self.read(name, edition, bits).and_then(|(name, value)| table.put(name, value));

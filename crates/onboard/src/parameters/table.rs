@@ -28,7 +28,7 @@ impl ParameterTable {
 
     /// Creates a table with the image's values, for a vehicle with `N` rotors. A firmware image then needs the flight
     /// for no other number.
-    pub fn with_rotors<const N: usize>(image: Configuration) -> Self {
+    pub fn for_rotors<const N: usize>(image: Configuration) -> Self {
         Self::checked_by(check_rotors::<N>, image)
     }
 

@@ -228,7 +228,7 @@ fn line(server: &mut Server, text: &str) -> PageReply {
     if let Ok(Some(line)) = parse(text)
         && matches!(line.command, ServerCommand::Quit | ServerCommand::Step(_))
     {
-        return PageReply::refused("only the terminal that started sitl serve may quit and step");
+        return PageReply::refused("quit and step cannot be used from a page");
     }
     let reply = server.line(text);
     let messages = reply.lines.iter().map(|line| json!({ "kind": "reply", "text": line }).to_string());

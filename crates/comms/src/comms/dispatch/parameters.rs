@@ -35,8 +35,8 @@ impl Comms {
     /// Handles queued parameter requests until one changes `table`. Returns that change.
     pub(crate) fn grant(&mut self, table: &mut ParameterTable) -> Option<RecordChange> {
         let disarmed = !self.status.mode.armed();
-        while let Some(wish) = self.parameter_tasks.pop_front() {
-            let (change, refused) = match wish {
+        while let Some(task) = self.parameter_tasks.pop_front() {
+            let (change, refused) = match task {
                 ParameterTask::Ask(request, from) => {
                     let heard = self.parameters.hear(request, table, disarmed);
                     if let Some(error) = heard.error {
