@@ -98,7 +98,7 @@ pub struct Parts<B: Board> {
     pub log: B::Log,
 }
 
-/// Both sides of a link.
+/// The receiving and the sending side of a link.
 pub struct BoardLink<R, T> {
     /// Receiving side.
     pub receiver: R,

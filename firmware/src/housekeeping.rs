@@ -53,6 +53,6 @@ fn deepest_stack() -> u32 {
         // SAFETY: the pointer stays within the stack's region or one past its end.
         word = unsafe { word.add(1) };
     }
-    // The difference cannot be negative, since the loop ends at `top`.
+    // The subtraction cannot underflow, since the search for the first changed word ends at `top`.
     (top as usize - word as usize) as u32
 }

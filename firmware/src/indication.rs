@@ -27,7 +27,7 @@ pub(crate) fn put(report: &Report) {
 fn indication(now_us: u64) -> Indication {
     let last = LAST.load(Ordering::Relaxed);
     let Some(at) = (last & 7).checked_sub(1) else { return Indication::Starting };
-    // Both times wrap at the same value.
+    // The stored time and the present time wrap at the same value.
     let age_ms = (milliseconds(now_us) << 3).wrapping_sub(last & !7) >> 3;
     if age_ms > SILENT_MS {
         return Indication::Fault;

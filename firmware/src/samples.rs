@@ -21,7 +21,7 @@ const WAITING: usize = 4;
 /// Time of a sample.
 #[derive(Clone, Copy, Debug)]
 pub enum SampleTime {
-    /// On the vehicle's clock ([`embassy_time::Instant`]) \[us\].
+    /// Time on the vehicle's clock ([`embassy_time::Instant`]) \[us\].
     At(u64),
     /// Age when the tick that takes the sample begins \[us\]. Used by a lockstep host, which does not know the
     /// vehicle's clock.

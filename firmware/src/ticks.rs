@@ -38,8 +38,8 @@ static TICKED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 pub(crate) type DetailsIn = Sender<'static, CriticalSectionRawMutex, TickDetails>;
 pub(crate) type DetailsOut = Receiver<'static, CriticalSectionRawMutex, TickDetails>;
 
-/// Both ends, until the tasks take them. Details are written in place, outside a lock, because they are too long to
-/// copy.
+/// Both ends of the channel of details, until the tasks take them. Details are written in place, outside a lock,
+/// because they are too long to copy.
 static ENDS: Mutex<CriticalSectionRawMutex, RefCell<Ends>> = Mutex::new(RefCell::new((None, None)));
 type Ends = (Option<DetailsIn>, Option<DetailsOut>);
 

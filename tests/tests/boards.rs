@@ -43,7 +43,8 @@ fn pins(text: &str) -> BTreeSet<String> {
     words.filter(is_pin).map(str::to_owned).collect()
 }
 
-/// A board in code calls the firmware once in its folder, a board that is a table once in its file.
+/// A board written in code calls the firmware once in its folder. A board described by a table calls the firmware once
+/// in its file.
 #[test]
 fn every_board_meets_the_firmware_once() {
     let (tables, mut codes) = kinds();
@@ -140,7 +141,8 @@ fn within(folder: &Path) -> Vec<PathBuf> {
     paths
 }
 
-/// Returns the boards that are tables, as files with their tables, and the folders of the boards in code.
+/// Returns all boards of the firmware. The first list has each board that is described by a table, as the table's file
+/// and the table. The second list has the folders of the boards written in code.
 fn kinds() -> (Vec<(PathBuf, BoardTable)>, Vec<PathBuf>) {
     let codes =
         within(&root().join("firmware/boards")).into_iter().filter(|path| path.is_dir() && !path.ends_with("emulated"));
@@ -388,7 +390,8 @@ fn no_board_has_a_bare_uart_or_i2c() {
         let calls = |call: &str| text.matches(call).count();
         assert_eq!(calls("usart::Config::default()"), 0, "{}", path.display());
         if text.contains("embassy_stm32::usart::") {
-            // The other set-ups start from this one.
+            // Only this file creates a UART's default configuration. All other UARTs' configurations start from that
+            // one.
             let begins = path.ends_with("chips/stm32/src/link.rs");
             assert_eq!(calls("= Config::default()"), usize::from(begins), "{}", path.display());
         }

@@ -207,8 +207,8 @@ fn a_bit_of_the_file_is_named_by_its_frame() {
         let found = read("bit", &damaged, &[]).unwrap();
         let Some(said) = problem(&ReplayedLog { name: "bit", replay: &found }) else { panic!("byte {at} is accepted") };
         let (count, Some(place)) = found.damaged else { panic!("{said}") };
-        // If the end mark of a frame is damaged, the frame ends with the next one, and the next one's position may be
-        // reported.
+        // If the end mark of a frame is damaged, the frame ends with the next frame, and the next frame's position may
+        // be reported.
         assert!(count <= 2 && place <= at + 1 && at < place + 400, "{at}: {place}");
         assert!(said.contains(&format!("byte {place}: ")) && said.contains("copy it again"), "{said}");
     }

@@ -328,10 +328,10 @@ fn after_pulses_of_1_s_both_recover() {
 fn as_forces_and_moments_both_lose_the_vehicle_to_the_moment_on_roll() {
     for model in [PlantModel::Simplified, PlantModel::RigidBody] {
         for run in both(Reading::Forces, model) {
-            // Both survive 1.2 N on 0.486 kg from 7.5 s on. The moment of 1.2 N m on 0.0038 kg m2 from 15 s on is 316
-            // rad/s2. Holding it takes a difference of 4.8 N between opposite rotors, more than the weight. Either roll
-            // is lost (rigid body), or the vehicle climbs away within 4 s, since roll has priority over thrust when
-            // rotors are at zero.
+            // Both laws survive a force of 1.2 N on 0.486 kg from 7.5 s on. The moment of 1.2 N m on 0.0038 kg m2 from
+            // 15 s on is 316 rad/s2. Holding it takes a difference of 4.8 N between opposite rotors, more than the
+            // weight. Either roll is lost (rigid body), or the vehicle climbs away within 4 s, since roll has priority
+            // over thrust when rotors are at zero.
             let lost = run.lost.unwrap();
             assert!((15.0..19.0).contains(&lost.time_s), "{} {}: {lost:?}", model.name(), run.contender.name);
         }

@@ -213,7 +213,7 @@ proptest! {
         prop_assert_eq!(step.at(at_s + 100.0), Reference::rest(to_m, yaw_rad + turn_rad));
     }
 
-    /// Compares with section IV as printed, with its sines and phases.
+    /// Compares the paper's trajectory with the formula printed in section IV, which has sines with phases.
     #[test]
     fn the_papers_trajectory_is_the_printed_one(t in 0.0_f64..120.0) {
         use core::f64::consts::{FRAC_PI_2, PI};

@@ -68,7 +68,8 @@ pub struct LastStep {
     unallocated: PerAxis<f32>,
     /// eta: roll, pitch and yaw \[rad\].
     pub(crate) eta: Vector3<f32>,
-    /// d eta/dt \[rad/s\]. As in (6), d eta/dt is the body rates; with feed-forward it follows from them.
+    /// d eta/dt \[rad/s\]. Without feed-forward, the body rates are taken for d eta/dt, as in (6). With feed-forward, d
+    /// eta/dt is computed from the body rates.
     pub(crate) eta_dot: Vector3<f32>,
 }
 
@@ -123,7 +124,8 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
         let model = ModelConstants::new(&vehicle.parameters);
         let known = settings.feed_forward.then_some(&model);
         let approach = |axis, speed_max_m_s| ApproachLimit::new(speed_max_m_s, law.approach(axis, known));
-        // Without feed-forward, or for a law that does not use them, the observers would have no effect.
+        // Without feed-forward the observers would have no effect. The same holds for a law that does not use
+        // feed-forward.
         let observes = settings.feed_forward && L::OBSERVES;
         Ok(Controller {
             approach: [
@@ -260,8 +262,8 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
 
         // The next step's observer needs the thrust.
         if let Some(forces) = &self.forces {
-            // It gets the thrust as given, not as commanded. Otherwise it would observe the part beyond the rotors'
-            // limits as a disturbance.
+            // The observer gets the thrust that the rotors give, not the commanded thrust. Otherwise the observer would
+            // take the part beyond the rotors' limits for a disturbance.
             forces.record_thrust(&mut filters.forces, action.given.thrust_n);
         }
         if let Some(moments) = &self.moments {
@@ -352,7 +354,7 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
         }
     }
 
-    /// Returns d eta/dt, or the body rates where the settings take these for d eta/dt.
+    /// Returns d eta/dt. Returns the body rates instead if the settings take the body rates for d eta/dt.
     #[inline(always)]
     fn eta_dot(&self, state: &State, attitude: &Attitude) -> Vector3<f32> {
         if self.settings.feed_forward && !self.settings.by_rotation {
@@ -474,7 +476,8 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
         hover_n: f32,
         stands: bool,
     ) -> (Inputs, f32) {
-        // The compensation may pass the filter of U3, which has no lead to amplify it.
+        // The compensation of yaw may pass the filter of U3, because that filter has no lead that would amplify the
+        // compensation.
         let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3 + yaw_n, thrust_n: u4 };
         let mut inputs = self.smoother.advance(&mut filters.smoothed, &inputs);
         let mut effort = 1.0;

@@ -149,7 +149,8 @@ impl<const N: usize> Guarded<N> {
             let x = match axis {
                 Axis::Roll => [eta.x, eta_dot.x],
                 Axis::Pitch => [eta.y, eta_dot.y],
-                // Only yaw uses this value: the fuzzy inputs of z, x and y are errors.
+                // Of z, x, y and yaw, only yaw uses this value, because the fuzzy systems of z, x and y take the errors
+                // as inputs.
                 _ => [eta.z, eta_dot.z],
             };
             let errors = &errors[axis];

@@ -135,7 +135,8 @@ impl Attitude {
     }
 }
 
-/// Returns d eta/dt for the body rates. (6) takes both for equal.
+/// Returns the Euler angles' derivatives d eta/dt for these body rates. The model (6) takes d eta/dt as equal to the
+/// body rates.
 ///
 /// ```text
 /// d psi/dt = (q sin phi + r cos phi) / cos theta

@@ -121,7 +121,7 @@ proptest! {
         }
     }
 
-    /// Until it trips, it equals AFBC bit for bit, and engaging has no effect.
+    /// Until the monitor trips, the guarded law equals AFBC bit for bit, and engaging has no effect.
     #[test]
     fn untripped_it_is_the_law(inputs in prop::collection::vec((state(plausible), setpoint(plausible)), 50)) {
         let settings = Profile::Flight.settings();
@@ -149,7 +149,7 @@ proptest! {
     /// of the other.
     #[test]
     fn hand_over_is_bumpless_in_both_directions(state in near(), setpoint in near(), lasting in 0_usize..300) {
-        // Otherwise there is no error of roll to trip on.
+        // Without a roll rate, there would be no roll error on which the monitor could trip.
         prop_assume!(state.rates_rad_s.x.abs() > 1e-3);
         let setpoint =
             Setpoint { position_m: setpoint.position_m, velocity_m_s: setpoint.velocity_m_s, ..Setpoint::default() };
@@ -174,7 +174,7 @@ proptest! {
         for _ in 0..lasting {
             last_of_fallback = step(&controller, &mut memory, &state, &setpoint);
         }
-        // With less thrust, the vehicle may stand on the ground by then, where nothing trips.
+        // With less thrust, the vehicle might stand on the ground by then, and the monitor does not trip on the ground.
         prop_assume!(last_of_fallback.trace.inputs.thrust_n >= LIFT_SHARE * WEIGHT_N);
         controller.engage(&mut memory.control);
         let first_of_afbc = step(&controller, &mut memory, &state, &setpoint);
@@ -182,8 +182,8 @@ proptest! {
         position_is_the_same(&last_of_fallback, &first_of_afbc)?;
     }
 
-    /// The hand-over causes no jump of the attitude commands. Their reference usually changes from step to step, so a
-    /// filter at rest holds it constant. The law has feed-forward, or also learns the weight.
+    /// The hand-over causes no jump of the attitude commands. The reference of roll and pitch usually changes from step
+    /// to step, so a filter at rest holds it constant. The law has feed-forward, or also learns the weight.
     #[test]
     fn hand_over_at_rest_is_bumpless_in_all_axes(
         height in -0.2_f32..0.2, yaw in -0.2_f32..0.2, feed_forward: bool,
@@ -247,7 +247,8 @@ fn the_fallback_takes_over_no_more_than_its_bound() {
     }
 }
 
-/// Standing on the ground with a setpoint below it never trips, whatever the saturation.
+/// A vehicle that stands on the ground with a setpoint below it never trips the monitor, however saturated its rotors
+/// are.
 #[test]
 fn the_ground_does_not_trip() {
     let controller = guarded(bounds());
@@ -258,7 +259,7 @@ fn the_ground_does_not_trip() {
         assert!(command.action.health.saturated);
     }
     assert_eq!(memory.control.trip(), None);
-    // A vehicle that sinks in the air trips.
+    // A vehicle that sinks in the air trips the monitor.
     let sinking = State { velocity_m_s: Vector3::new(0.0, 0.0, -0.5), ..State::default() };
     for _ in 0..5_000 {
         step(&controller, &mut memory, &sinking, &below);
@@ -299,7 +300,7 @@ fn bounds_and_gains_out_of_range_are_refused_by_name() {
     assert_eq!(name(settings.with_dt_s(0.0), gains, bounds()), "dt_s");
 }
 
-/// The error contains the required value.
+/// The error must contain the required value.
 #[test]
 fn a_vehicle_that_cannot_hover_is_refused_by_name() {
     let settings = Profile::Flight.settings();
@@ -322,7 +323,8 @@ fn a_vehicle_that_cannot_hover_is_refused_by_name() {
     // A light vehicle with the paper's inertia turns too slowly.
     let light = of_mass(0.05);
     assert_eq!(refusal(light, Profile::Flight.gains_for(&light, afbc::LAG_S)), Some(("hover_authority_rad_s2", 80.0)));
-    // With the gains of the paper's vehicle a heavier one would trip in an ideal hover, even with strong enough rotors.
+    // With the gains of the paper's vehicle, the monitor of a heavier vehicle would trip in an ideal hover, even with
+    // strong enough rotors.
     let strong = |mass_kg: f32| {
         let gains = Profile::Flight.gains();
         let settings = settings.with_rotor_force_max_n(100.0);
@@ -417,15 +419,16 @@ fn a_reckoned_motion_shows_no_disturbance() {
     check(&Controller::new(Parameters::PAPER.to_f32(), direct(), law).unwrap());
 }
 
-/// The fallback law's observer gets the same notice: a dead-reckoned motion is no wind to it either.
+/// The fallback law's observer is also told that the position is lost, so it does not take a dead-reckoned motion for
+/// wind.
 #[test]
 fn a_reckoned_motion_shows_the_fallback_law_no_disturbance() {
     let controller = guarded(lax());
     let asked = [false, true].map(|position_lost| {
         let ((_, mut memory), mut state) = (tripped(50, 0.0), State::default());
         let mut asked = 0.0;
-        // If the motion were measured, the vehicle would be pushed first, then not. It is on its setpoint, so nothing
-        // is learnt from errors.
+        // A measured motion like this would mean that the vehicle is first pushed, then not. The vehicle is on its
+        // setpoint, so nothing is learnt from errors.
         for accelerates_m_s2 in [1.0, 0.0] {
             for _ in 0..1000 {
                 if position_lost && accelerates_m_s2 == 0.0 {
@@ -450,12 +453,13 @@ fn a_reckoned_motion_shows_the_fallback_law_no_disturbance() {
 #[test]
 fn engaging_is_bumpless_where_no_even_estimate_fits() {
     let (bounds, (_, mut memory), mut gains) = (bounds(), tripped(0, 0.0), Profile::Flight.gains());
-    // Without adaptation of yaw, which would reach the rotors' limit first.
+    // Yaw does not adapt, because it would reach the rotors' limit first.
     gains.yaw.gamma = 0.0;
-    // Without `tilt_by_thrust`: the tilt would jump with the hover thrust, which only AFBC learns.
+    // `tilt_by_thrust` is off, because with it the tilt would jump with the hover thrust, which only AFBC learns.
     let settings = Settings { tilt_by_thrust: false, ..direct() };
     let controller = Guarded::new(Parameters::PAPER.to_f32(), settings, gains, bounds).unwrap();
-    // At rest, where the gyroscopic moment of the rotors is zero: only the fallback law compensates it.
+    // The vehicle is at rest, so the gyroscopic moment of the rotors is zero. Only the fallback law compensates this
+    // moment.
     let state = State { attitude_rad: Vector3::new(-0.16, 0.15, 0.9), ..State::default() };
     // The jerk asks for angles ahead of the held ones, so that both integrals grow.
     let (sin, cos) = 0.9_f32.sin_cos();

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// Reason why a campaign has no results.
 #[derive(Debug)]
 pub enum Error {
-    /// The draw of a flight is out of range.
+    /// A value drawn for a flight is out of range.
     Draw {
         /// Index of the flight.
         flight: u64,

@@ -20,11 +20,11 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Flights per chunk: seconds of work for one core.
+/// Number of flights per chunk, which take one core some seconds.
 pub(super) const CHUNK: u64 = 16;
 /// Number of chunks that are read at once while they are joined.
 const BATCH: u64 = 64;
-/// Name of the file of all rows.
+/// Name of the file with the results of all flights.
 const RESULTS: &str = "results.parquet";
 /// Name of the manifest's file, present from the beginning.
 const MANIFEST: &str = "campaign.json";
@@ -100,7 +100,7 @@ impl CampaignFolder {
         &self.manifest
     }
 
-    /// Writes a file with its own checksum. Such a checksum locates damage better than the folder's.
+    /// Writes a file with a checksum of its own, which locates damage better than the folder's checksum.
     fn write_sealed(
         &self,
         name: &str,

@@ -37,7 +37,7 @@ impl Comparison {
     }
 }
 
-/// Returns `own` minus `other`, or 0 if both are lost.
+/// Returns the difference `own` minus `other` of two results. Returns 0 if both vehicles are lost.
 fn difference(own: f64, other: f64) -> f64 {
     // The difference of two infinities would be NaN.
     if own == other { 0.0 } else { own - other }

@@ -69,7 +69,7 @@ fn nothing(vehicle: &str, place: Venue) -> RoughFlight {
     drawn.into_iter().find(|flight| flight.class == "nothing" && flight.place == place).unwrap()
 }
 
-/// Every class is drawn over most of its range, and never outside, by the sizes that the page states.
+/// The sizes drawn for each class cover most of the range that the page states, and never exceed that range.
 #[test]
 fn each_class_is_drawn_within_its_bounds() {
     let hummingbird = vec![afbc_vehicles::built_in("hummingbird").unwrap().read().unwrap()];
@@ -111,7 +111,7 @@ fn the_page_has_every_class() {
     }
 }
 
-/// Returns the size of the first drawn behaviour.
+/// Returns the size of the first sensor behaviour that was drawn for the flight.
 fn size(flight: &RoughFlight) -> f64 {
     let suite = &flight.scenario.instruments;
     let faults = &flight.scenario.instrument_faults;
@@ -144,7 +144,7 @@ fn size(flight: &RoughFlight) -> f64 {
     }
 }
 
-/// Returns the bounds of the size.
+/// Returns the smallest and largest size that may be drawn for a class of sensor behaviour.
 fn bounds(class: &str) -> [f64; 2] {
     match class {
         "nothing" => [0.0, 0.0],

@@ -36,7 +36,8 @@ const fn placed([a, b, c, d]: [f32; 4]) -> [f32; 7] {
 /// The accepted commands of the dialect (`MAV_CMD` in common.xml).
 const COMMANDS: &[Row] = &[
     Row(20, NONE, UNUSED),
-    // Abort altitude, precision landing, heading, place: the vehicle lands where it is.
+    // The parameters are abort altitude, precision landing, heading and place. They are unused, because the vehicle
+    // lands where it is.
     Row(21, NONE, UNUSED),
     // The parameters are pitch (-1 for none), flags, heading and place, which must be unused, and the height.
     Row(22, NONE, [But(&[-1.0]), No, No, No, No, No, Yes]),
@@ -70,7 +71,7 @@ const COMMANDS: &[Row] = &[
     Row(31_011, NONE, UNUSED),
 ];
 
-/// Values that have a meaning.
+/// Numbers that are tried for each parameter. Each has a meaning for some command.
 const ASKING: [f32; 10] = [1.0, -1.0, 2.0, -2.0, -3.0, 5.0, 7.0, 12.5, 77.0, f32::INFINITY];
 
 /// Builds a station's frame with the right checksum.
@@ -188,7 +189,7 @@ const ITEMS: &[Row] = &[
     Row(19, placed([0.0, 0.0, 0.0, NAN]), [Yes, No, No, Yes, Yes, Yes, Yes]),
     Row(20, NONE, UNUSED),
     Row(21, placed([0.0; 4]), [No, No, No, No, Yes, Yes, Yes]),
-    // Pitch of fixed-wing aircraft: QGroundControl writes 15 degrees into plans.
+    // The first parameter is the pitch of fixed-wing aircraft, for which QGroundControl writes 15 degrees into plans.
     Row(
         22,
         placed([0.0; 4]),

@@ -161,8 +161,8 @@ proptest! {
         if unlimited.rate.abs() <= limit && (unlimited.angle - state.angle).abs() <= limit * dt {
             prop_assert_eq!(next, unlimited);
         } else {
-            // It moves in the direction of the unlimited filter: along that filter's rate, or to the place where that
-            // filter stops.
+            // The limited filter moves in the direction of the unlimited filter. If the unlimited filter's rate is
+            // within the limit, the limited filter moves towards the unlimited filter's next angle.
             let onward = if unlimited.rate.abs() > limit { unlimited.rate } else { unlimited.angle - state.angle };
             prop_assert_eq!(next.rate, limit.copysign(onward));
             prop_assert!((f64::from(next.angle) - f64::from(state.angle)) * f64::from(onward) >= 0.0);

@@ -132,7 +132,7 @@ fn sine_and_cosine_are_as_exact_as_documented() {
     assert_figure("cos", worst(points(), absolute(math::cos, f64::cos)), 1.7e-4);
 }
 
-/// They return the smaller and the larger number, and the second argument if the first is NaN.
+/// `min` and `max` return the smaller and the larger number. If the first argument is NaN, they return the second.
 #[test]
 fn min_and_max_choose_one_of_both() {
     for (a, b) in [(-2.0, 3.0), (3.0, -2.0), (-1.0, -0.5), (0.25, 7.0), (5.0, 5.0), (f32::NEG_INFINITY, 1e-45)] {

@@ -135,7 +135,7 @@ const MAGNETOMETER: &[ScriptStep] = &[
     ScriptStep::Set(I2C_SLV1_ADDR, ADDRESS),
     ScriptStep::Set(I2C_SLV1_REG, CNTL1),
     ScriptStep::Set(I2C_SLV1_DO, SINGLE),
-    // Not read back: the MPU may disable a slave that does not acknowledge.
+    // The register is not read back, because the MPU may clear the bit of a slave that does not acknowledge.
     ScriptStep::Write(I2C_SLV0_CTRL, EN | 8),
     ScriptStep::Write(I2C_SLV1_CTRL, EN | 1),
 ];

@@ -108,7 +108,8 @@ proptest! {
             }
             latched = line.ask(now_us).or(latched);
             let frame_us = now_us + 700;
-            // Longer than that the question would be given up, and its answer could be taken for the next one's.
+            // After a longer time the driver would give up the question, and could take its late answer for the answer
+            // to the next question.
             if is_trouble && waits[tick as usize % 400] && waited < 5 {
                 waited += 1;
                 continue;

@@ -134,7 +134,7 @@ fn right(reading: &PressureReading) -> bool {
 #[test]
 fn it_passes_the_suite() {
     let (part, model, pace) = (&Ms5611::default, &|| Part5611::new(SETS[0]), Pace::Polled(500..=550));
-    // It has no identity.
+    // The MS5611 has no identity register, so no other part can be told from it.
     Suite { part, model, right, notice_us: 500_000, others: Vec::new(), pace }.passes();
 }
 

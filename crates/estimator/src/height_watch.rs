@@ -24,8 +24,8 @@ const APART_S: f32 = 1.0;
 const CHANGES: f32 = 0.5;
 /// Usual variance of the change of a barometer's drift within [`FORGETS_S`] \[m2\].
 const DRIFTS_M2: f32 = 1.0;
-/// Corrections beyond this many standard deviations show that the receiver's height is wrong: while it is fused, and
-/// after its rejections for [`REJECTED_US`].
+/// Beyond this many standard deviations, corrections of the height show that the receiver's height is wrong. The second
+/// number applies once the height has been rejected for [`REJECTED_US`].
 const FAR_SIGMAS: f32 = 4.0;
 const FAR_REJECTED_SIGMAS: f32 = 2.0;
 const REJECTED_US: u64 = 3_000_000;
@@ -53,7 +53,7 @@ impl HeightWatch {
         *self = HeightWatch::default();
     }
 
-    /// Takes the state at a fix, `since_s` after the last one.
+    /// Takes the state at a fix, `since_s` after the last fix.
     fn advance(&mut self, now: (f32, f32, f32), since_s: f32) {
         let last = self.last.replace(now).filter(|_| since_s < APART_S);
         let kept = max(1.0 - since_s * (1.0 / FORGETS_S), 0.0);
@@ -64,15 +64,16 @@ impl HeightWatch {
         }
     }
 
-    /// Returns the square of the error that both sums show \[m2\].
+    /// Returns the square of the error that the sums of height corrections and of barometer offsets both show \[m2\].
     fn crept(&self) -> f32 {
         if self.lifted * self.offset < 0.0 { min(self.lifted * self.lifted, self.offset * self.offset) } else { 0.0 }
     }
 }
 
 impl Estimator {
-    /// Watches the height of a receiver's fix. Returns false if barometer and vertical velocity contradict the height;
-    /// the estimate is then moved back by what the height has moved it.
+    /// Watches the height of a receiver's fix. Returns false if barometer and vertical velocity contradict the
+    /// receiver's height. The estimated height is then moved back by the distance that the receiver's height has moved
+    /// it.
     #[inline(never)]
     pub(crate) fn trusts_height(
         &self,
@@ -83,7 +84,7 @@ impl Estimator {
         since_us: u64,
     ) -> bool {
         let ObservedQuantity::Position(fix) = &part.target else { return true };
-        // The state at the time of the fix, which is older than the present one.
+        // The state at the time of the fix. A fix is older than the present state.
         let Some(past) = memory.history.corrected(raw, self.settings.gravity_m_s2) else { return true };
         let (mut height, climb) = (past.position.z, past.velocity.z);
         memory.height_watch.advance((height, climb, memory.height_offset), min(since_us as f32 * 1e-6, 1e3));
@@ -102,8 +103,8 @@ impl Estimator {
         if watch.crept() > sigmas * sigmas * usual {
             let (lifted, offset) = (watch.lifted, watch.offset);
             *watch = HeightWatch { doubts: true, ..HeightWatch::default() };
-            // Unlike other resets, this one is not handed to the guidance: the vehicle itself was taken along, and has
-            // to come back.
+            // Unlike other resets, this reset is not passed on to the guidance. The vehicle itself has followed the
+            // wrong height and has to come back.
             let by = Vector3::new(0.0, 0.0, -lifted);
             memory.nominal.move_by(&by);
             memory.height_offset -= offset;

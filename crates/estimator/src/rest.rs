@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 
 /// Length of a block \[s\].
 const BLOCK_S: f32 = 0.5;
-/// Number of quiet blocks that means rest. The next block is compared with the first one's mean.
+/// Number of quiet blocks that means rest. The second block is compared with the mean of the first block.
 const ENOUGH: u8 = 2;
 /// Number of blocks in the mean; a longer memory would miss changes of bias and temperature.
 const REMEMBERED: u8 = 8;

@@ -21,7 +21,8 @@ pub(crate) type SlowCovariance = Matrix3x5<f32>;
 /// each.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct SlowErrorCovariances {
-    /// Diagonal of D. It is zero until a sensor has a slow error; then all covariances are zero too.
+    /// Variances of the slow errors, the diagonal of D. They are zero until a sensor has a slow error. Until then all
+    /// covariances are zero too.
     pub(crate) variance: SlowErrors,
     pub(crate) theta: SlowCovariance,
     pub(crate) velocity: SlowCovariance,
@@ -68,7 +69,7 @@ impl SlowErrorCovariances {
     /// Sets the variances of a new fix; d has kept `share` of its value since the last fix. If the new variance is
     /// smaller, part of the error is treated as a different one.
     pub(crate) fn follow(&mut self, variance: &Vector3<f32>, share: f32) {
-        // Divides only by values above another variance, so never by zero.
+        // A division only happens by a value above another variance, so never by zero.
         let kept =
             variance.zip_map(&self.gnss_variance(), |new, old| if new < old { share * (new / old) } else { share });
         for m in [&mut self.theta, &mut self.velocity, &mut self.position, &mut self.gyro, &mut self.accel] {
@@ -80,12 +81,12 @@ impl SlowErrorCovariances {
         self.variance.iter_mut().zip(variance).for_each(|(old, new)| *old = *new);
     }
 
-    /// Returns the variances of d.
+    /// Returns the variances of d, the slow position error of a GNSS receiver.
     pub(crate) fn gnss_variance(&self) -> Vector3<f32> {
         self.variance.fixed_rows::<3>(0).into_owned()
     }
 
-    /// Sets the variance of each coordinate of f.
+    /// Sets the variance of the vehicle's own magnetic field f, the same for both coordinates.
     pub(crate) fn set_field_variance(&mut self, variance: f32) {
         (self.variance.w, self.variance.a) = (variance, variance);
     }

@@ -546,7 +546,7 @@ proptest! {
         prop_assert!((corrected.velocity.map(f64::from) - y.v).norm() < 4e-3);
         prop_assert!((corrected.position.map(f64::from) - y.p).norm() < 1e-3);
         prop_assert!(1.0 - past(&y, 0).attitude.dot(&corrected.attitude).abs() < 1e-6);
-        // Rewriting the entries changes nothing.
+        // Applying the correction to the stored history changes no past state.
         history.settle(g);
         let settled = history.corrected(&history.at(at_us).unwrap(), g).unwrap();
         prop_assert!((corrected.position - settled.position).norm() < 2e-4 && !history.is_unsettled());

@@ -1,4 +1,4 @@
-//! For any input and any duration: finite estimates, a positive covariance, and limited memory.
+//! Any input, for any duration, gives finite estimates and a positive covariance, and needs limited memory.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
 use crate::common::checks::{positive, sound};

@@ -3,8 +3,8 @@
 //! The zero of a sender's clock is unknown, and the clock may be slewed, stepped, wrapped or coarse. The offset of a
 //! message is its arrival minus its stamp: the difference of the two clocks plus the message's delay. The smallest
 //! offset of the last half to whole second ([`WINDOW_US`]) belongs to the fastest message. Any other message is late by
-//! the excess of its offset over that. Thus the age of a delayed message includes its delay. The delay of the fastest
-//! message itself is unknown, and a delay longer than the window becomes part of the offset.
+//! the difference between its offset and this smallest offset. Thus the age of a delayed message includes its delay.
+//! The delay of the fastest message itself is unknown, and a delay longer than the window becomes part of the offset.
 //!
 //! | stamp | interpretation |
 //! |---|---|
@@ -14,11 +14,11 @@
 //! | equal to the previous one, other content | coarse clock: counts as sent on arrival |
 //! | any, after 3 s of silence | a new clock |
 //!
-//! A clock with equal stamps counts as coarse for 1 s: a stamp that is early by up to the clock's resolution then is no
-//! delay.
+//! A clock that sends equal stamps counts as coarse for 1 s. During this time, a stamp that is early by up to the
+//! clock's resolution does not mean a delay.
 //!
-//! A step ahead takes five stamps in a row, or two among a sender's first messages. A step back takes three in a row
-//! that increase over 15 ms with offsets within 3 ms.
+//! The clock counts as stepped ahead after five stamps in a row, or after two among a sender's first messages. The
+//! clock counts as stepped back after three stamps in a row that increase over 15 ms with offsets within 3 ms.
 
 /// Half of the window in which the fastest message is found \[us\].
 pub const WINDOW_US: u64 = 500_000;
@@ -30,7 +30,7 @@ pub const AHEAD_COUNT: u8 = 5;
 pub const BACK_COUNT: u8 = 3;
 /// Smallest duration of the messages counted by [`BACK_COUNT`] \[us\].
 pub const BACK_US: u64 = 15_000;
-/// Largest spread of these messages' offsets \[us\].
+/// Largest spread of the offsets of the messages counted by [`BACK_COUNT`] \[us\].
 pub const BACK_SPREAD_US: u64 = 3_000;
 /// Like [`AHEAD_COUNT`], for the first [`NEW_COUNT`] messages of a sender, which may all have been late.
 pub const AHEAD_COUNT_NEW: u8 = 2;
@@ -158,18 +158,19 @@ impl KnownOffset {
         }
         // The delay is never negative, because this offset is in the window. Beyond u64, it is as late as can be.
         let late_us = u64::try_from(offset_us - self.fastest_us()).unwrap_or(u64::MAX);
-        // A coarse stamp may be early by up to the clock's resolution, which is no delay.
+        // A coarse stamp may be early by up to the clock's resolution, which does not mean a delay.
         let doubt_us = if arrived_us < self.coarse_until_us { self.tick_us } else { 0 };
         arrived_us.saturating_sub(late_us.saturating_sub(doubt_us))
     }
 
-    /// Counts a message that is too far ahead. The last one of a step starts a new window.
+    /// Counts a message that is too far ahead. The message that completes a step starts a new window.
     fn steps_ahead(&mut self, sent_us: u64, arrived_us: u64) {
         let offset_us = offset_us(sent_us, arrived_us);
         let goes_on = |step: &ClockStep| step.ahead && sent_us >= step.sent_us;
         let new = ClockStep { ahead: true, count: 0, since_us: arrived_us, sent_us, offset_us };
         let step = self.step.filter(goes_on).unwrap_or(new);
-        // Use the slowest: with the fastest, one outlier among them would make all later messages look late.
+        // Use the offset of the slowest message. With that of the fastest, one outlier would make all later messages
+        // look late.
         let slowest_us = step.offset_us.max(offset_us);
         // The count cannot overflow, because the step is complete at the fifth message.
         let (count, needed) = (step.count + 1, if self.heard < NEW_COUNT { AHEAD_COUNT_NEW } else { AHEAD_COUNT });
@@ -191,8 +192,8 @@ impl KnownOffset {
         })
     }
 
-    /// Counts a message that is older than the previous one, or continues such a series. Returns true if the clock was
-    /// stepped back.
+    /// Counts a message that is older than the previous message, or that follows such a message. Returns true if the
+    /// clock was stepped back.
     fn steps_back(&mut self, sent_us: u64, arrived_us: u64) -> bool {
         let offset_us = offset_us(sent_us, arrived_us);
         let new = ClockStep { ahead: false, count: 0, since_us: arrived_us, sent_us, offset_us };

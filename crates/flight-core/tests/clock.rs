@@ -396,7 +396,7 @@ fn a_step_back_takes_three_that_increase() {
     assert!(!back(&[(0, 0), (BACK_US, BACK_US)]), "two");
     assert!(!back(&[(0, 0), (16_000, 16_000), (15_500, 18_000)]), "back among them");
     assert!(!back(&[(0, 0), (8_000, 8_000), (8_000, 16_000)]), "the same again");
-    // Offsets must be within 3 ms of the first one's.
+    // All offsets must be within 3 ms of the first offset.
     assert!(back(&[(0, 0), (8_000, 8_000), (16_000, 16_000 + BACK_SPREAD_US)]));
     assert!(!back(&[(0, 0), (8_000, 8_000), (16_000, 16_001 + BACK_SPREAD_US)]));
     assert!(back(&[(0, 0), (8_000, 8_000), (16_000 + BACK_SPREAD_US, 16_000)]));

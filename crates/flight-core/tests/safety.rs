@@ -254,7 +254,7 @@ fn a_constant_pose_with_a_moving_twist_is_distrusted() {
             0..3 => frozen.velocity_m_s[axis] = -1.0,
             _ => frozen.rates_rad_s[axis - 3] = 1.0,
         }
-        // Its speed makes it count as airborne. The detection takes at most two windows.
+        // The vehicle counts as airborne because of its speed. The detection takes at most two windows.
         let stands = |bench: &mut Bench| {
             bench.travelled_m = Vector3::zeros();
             bench.tick(frozen)

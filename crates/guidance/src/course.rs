@@ -102,7 +102,7 @@ impl Land {
 pub(crate) struct Return {
     height_m: f32,
     to_m: Vector2<f32>,
-    /// Place of the climb; not set while the vehicle still stops.
+    /// Place above which the vehicle climbs. It is not set until the vehicle has stopped.
     hold: Hold,
     stage: ReturnStage,
 }
@@ -128,7 +128,7 @@ impl Return {
 
     /// Shifts the place of the climb by an estimator reset. Home does not move.
     pub(crate) fn shift(&mut self, reset: &ResetDelta, present_m: Option<Vector3<f32>>, within_m: f32) {
-        // The vehicle may still be below the place: compare horizontally only.
+        // The vehicle may still be far below this place, so only the horizontal distance is compared.
         let level_m = present_m.zip(self.hold.at_m).map(|(present, at)| Vector3::new(present.x, present.y, at.z));
         self.hold.shift(reset, level_m, within_m);
     }
@@ -144,11 +144,12 @@ impl Return {
             ReturnStage::Climbs => {
                 let mut aim = self.hold.fly(inputs);
                 let short_m = |z: f32| self.height_m - z;
-                // The vehicle must have climbed, too: one that cannot climb must not fly home too low.
+                // The vehicle itself must have climbed, not only its setpoint. A vehicle that cannot climb must not fly
+                // home too low.
                 if short_m(inputs.present.position_m.z) < CLIMBED_M && short_m(inputs.state.position_m.z) < 1.0 {
                     self.stage = ReturnStage::Flies(inputs.towards(&home_m));
                 }
-                // Climbs while still stopping.
+                // The vehicle climbs while it is still stopping.
                 aim.position_m.z = self.height_m;
                 ModeOutput::fly(aim)
             }

@@ -79,7 +79,7 @@ pub(crate) struct ModeOutput {
     pub(crate) done: bool,
 }
 
-/// How a mode's output becomes a setpoint.
+/// Way in which a mode's output becomes a setpoint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Shaping {
     /// Flown through the limiter.

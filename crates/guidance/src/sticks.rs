@@ -50,7 +50,7 @@ pub(crate) fn fly(mode: FlightMode, sticks: &Sticks, inputs: &ModeInputs<'_>, li
         }
         FlightMode::Acro => {
             let FlightModeSettings { acro_roll_deg_s, acro_pitch_deg_s, acro_yaw_deg_s, .. } = inputs.flying;
-            // Without the dead band around the centre: the pilot's transmitter may add its own.
+            // Sticks have no dead band around the centre here, because the pilot's transmitter may add its own.
             let rates_deg_s =
                 [sticks.roll * acro_roll_deg_s, sticks.pitch * acro_pitch_deg_s, -sticks.yaw * acro_yaw_deg_s];
             let thrust = thrust_m_s2() / lift.most_m_s2;

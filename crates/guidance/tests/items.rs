@@ -235,7 +235,7 @@ fn the_uploaded_fence_stops_what_would_leave_it() {
         if action.action() == FailsafeAction::Hold {
             assert_eq!((mode, bench.state.velocity_m_s.norm() < 0.05), (FlightMode::Hold, true));
             assert_eq!(bench.said, [GuidanceNotice::Found(FailsafeCause::Fence)]);
-            // It may fly back inside.
+            // A vehicle that holds outside the fence may be ordered back inside.
             bench.order(go(5.0)).unwrap();
             bench.orders.fence = Some(FenceStatus::default());
             bench.run(15.0);

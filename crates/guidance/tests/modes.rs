@@ -225,7 +225,7 @@ fn acro_commands_rates() {
     fly(&mut bench, 1);
     assert_eq!(bench.guidance.rates(), None);
     assert_eq!(bench.select(FlightMode::Acro), Ok(()));
-    // When the sticks are lost, it holds by a setpoint again.
+    // When the sticks are lost, the vehicle holds its position by a setpoint again.
     bench.run(1.0);
     assert_eq!((bench.guidance.mode(), bench.guidance.rates()), (FlightMode::Hold, None));
 }

@@ -79,7 +79,7 @@ fn described(parameter: &Parameter, declaration: &Declaration, words: &[&str]) -
     if !["", "1", "number"].contains(unit) {
         put("units", json!(unit));
     }
-    // For a default of zero, derives the decimals from the range instead.
+    // A default of zero shows no decimals, so the range gives their number instead.
     if !is_whole {
         put("decimalPlaces", json!(decimals(if default == 0.0 { range.max.min(1.0) } else { default })));
     }

@@ -7,8 +7,8 @@ use nalgebra::Vector3;
 /// Smallest vertical part of the specific force, as a share of gravity, so that the thrust always points up and defines
 /// an attitude.
 const VERTICAL_MIN: f32 = 0.1;
-/// Largest vertical part, as a share of the rotors' largest thrust. The rest remains for attitude and sideways
-/// acceleration.
+/// Largest vertical part of the specific force, as a share of the rotors' largest thrust per mass. The rest remains for
+/// attitude and sideways acceleration.
 const VERTICAL_MAX: f32 = 0.9;
 
 /// Bounds of the specific force, the thrust vector per mass in the earth frame \[m/s2\].
@@ -50,9 +50,9 @@ impl SpecificForceLimits {
         vertical_m_s2.max(self.vertical_min_m_s2).min(self.vertical_max_m_s2)
     }
 
-    /// Returns the closest allowed specific force, with height before sideways acceleration. The vertical part is
-    /// between 10 % of gravity and 90 % of the rotors' largest thrust; then tilt and length are limited. The result
-    /// always points up.
+    /// Returns the closest allowed specific force. Height has priority over sideways acceleration: first, the vertical
+    /// part is limited to between 10 % of gravity and 90 % of the rotors' largest thrust. Then tilt and length are
+    /// limited. The result always points up.
     #[inline]
     pub fn apply(&self, specific_force: &Vector3<f32>) -> Vector3<f32> {
         let vertical = self.vertical(specific_force.z);

@@ -140,7 +140,7 @@ const HELD_MAX: usize = SIGNED_FRAME_MAX + 1;
 
 /// Content at the front of the buffer.
 enum FrameScan<M> {
-    /// Undecided until this number of bytes is in the buffer.
+    /// Nothing can be decided until the buffer has this number of bytes.
     Incomplete(usize),
     /// Bytes that are no frame, or a frame to be skipped with this fault.
     Garbage(Option<FrameFault>),
@@ -187,7 +187,8 @@ impl<M: MessageSet> Decoder<M> {
         }
     }
 
-    /// Returns the decoder for a stream over a wire, from somebody who has the vehicle at hand.
+    /// Returns the decoder for a stream over a wire. Whoever sends over a wire has the vehicle at hand, and is trusted
+    /// more.
     #[must_use]
     pub fn wired(self) -> Self {
         Decoder { is_wired: true, ..self }

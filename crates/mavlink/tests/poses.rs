@@ -55,7 +55,7 @@ fn sigmas(message: Result<Uplink, Counters>) -> PoseSigmas {
     }
 }
 
-/// Returns the readings of all messages with a pose, level at the origin, with this covariance.
+/// Returns what the decoder makes of each message with a pose, level at the origin, with this covariance.
 fn with_covariance(covariance: &[f32; 21]) -> [Result<Uplink, Counters>; 3] {
     let vision = payload(&[[0.0; 6].as_slice(), covariance].concat());
     let mocap = payload(&[&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], covariance.as_slice()].concat());
@@ -74,7 +74,8 @@ fn triangle(diagonal: [f32; 6], other: f32) -> [f32; 21] {
 
 #[test]
 fn known_poses() {
-    // (roll, pitch and yaw on the wire, their meaning, directions of nose and left wing in the workspace's x, y, z)
+    // Each case has roll, pitch and yaw as sent, their meaning, and the directions of nose and left wing in the
+    // workspace's axes x, y, z.
     let quarter = core::f32::consts::FRAC_PI_2;
     let cases = [
         ([0.0; 3], "level, nose north", [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]),
@@ -130,7 +131,7 @@ fn the_largest_variance_counts() {
     for place in 0..3 {
         let mut diagonal = [0.01, 0.01, 0.01, 0.0004, 0.0004, 0.0004];
         (diagonal[place], diagonal[3 + place]) = (0.25, 0.0625);
-        // Numbers off the diagonal do not count, whatever they are.
+        // Numbers off the covariance's diagonal have no effect.
         for other in [0.0, 99.0, -99.0, f32::NAN] {
             for message in with_covariance(&triangle(diagonal, other)) {
                 let expected = PoseSigmas { position_m: Some(0.5), attitude_rad: Some(0.25) };

@@ -250,12 +250,13 @@ impl EstimatorFrontEnd {
         &self.lever
     }
 
-    /// Moves the notch filter of the output from the next tick on ([`OutputFilter::move_notch`]).
+    /// Moves the notch filter for the flight core's velocity and rates, from the next tick on
+    /// ([`OutputFilter::move_notch`]).
     pub fn move_notch(&mut self, to: &VelocityNotch) {
         self.output_filter.move_notch(to);
     }
 
-    /// Returns the notch filter of the output, if there is one.
+    /// Returns the notch filter for the flight core's velocity and rates, if there is one.
     pub fn notch(&self) -> Option<&VelocityNotch> {
         self.output_filter.notch()
     }
@@ -360,7 +361,7 @@ impl EstimatorFrontEnd {
             let off_m = *position_m - stands_m;
             self.elsewhere = if off_m.amax() > ELSEWHERE * sigmas_m.amax() { self.elsewhere + 1 } else { 0 };
             if self.elsewhere == MISLED {
-                // The origin came from a fix that was far off.
+                // The origin came from a fix that was far off, so the average starts again.
                 *origin_m += off_m;
                 (self.fixes, self.elsewhere) = (1.0, 0);
             } else {
@@ -411,7 +412,7 @@ fn leave(timed: &Stamped<Measurement>, inbox: &mut Inbox) {
 fn publish(estimate: &Estimate, state: State, now_us: u64, inbox: &mut Inbox) {
     let stamped = Stamped { value: state, at_us: now_us };
     let validity = &estimate.validity;
-    // The first missing part is the reason: without a heading, for example, no position can be held.
+    // The first missing part is reported as the reason. Without a heading, for example, no position can be held.
     let missing = match (validity.attitude, validity.heading, validity.velocity && validity.position) {
         (true, true, true) => None,
         (false, ..) => Some(Refusal::AttitudeUnknown),

@@ -22,7 +22,7 @@ const GOES: f32 = 0.5;
 /// Time after which the lanes start again \[s\].
 const OLD_S: f32 = 6.0;
 /// Stored past velocities, to which a late fix is compared: their number and spacing \[us\].
-// They cover 0.4 s, more than the largest delay of a measurement, 0.25 s.
+// The stored velocities cover 0.4 s. The largest delay of a measurement is 0.25 s.
 const PAST: usize = 16;
 const APART_US: u64 = 25_000;
 

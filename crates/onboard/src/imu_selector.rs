@@ -149,8 +149,8 @@ impl ImuSelector {
         for ((equals, new), old) in this.equals.iter_mut().zip(&sample).zip(&this.came) {
             *equals = if new == old { equals.saturating_add(1) } else { 0 };
         }
-        // Rejected samples count here: when both sensors feel a blow, the first one's rejected sample confirms the
-        // second one's.
+        // Rejected samples of the other sensor confirm a jump, too. When both sensors feel a blow, each sensor's sample
+        // jumps, and the rejected sample of one sensor confirms the sample of the other sensor.
         let confirmed = !jumps(&this.corrected(&sample), &other.corrected(&other.came));
         let is_none = jumps(&sample, &this.came) && !confirmed || this.is_stuck(other);
         this.came = sample;
@@ -255,8 +255,8 @@ impl ImuSelector {
             if self.second_flies { (&mut self.second, &mut self.first) } else { (&mut self.first, &mut self.second) };
         (wrong.wrong, right.wrong) = (true, false);
         for (offset, moved) in right.offset.iter_mut().zip(lanes.moved(now)) {
-            // The estimator's biases have adapted to the wrong sensor. Shifting the right sensor's offset likewise
-            // makes it fit at once.
+            // The estimator's biases have adapted to the wrong sensor. A shift of the right sensor's offset by the same
+            // amount makes the right sensor fit these biases at once.
             *offset -= to_imu * moved;
         }
         self.owed = lanes.hidden().map(|hidden| to_imu * (now.rotation.transpose() * hidden));

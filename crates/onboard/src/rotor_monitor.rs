@@ -77,7 +77,7 @@ impl RotorMonitor {
         let Curve { speed_max_rad_s, linearity: k, idle: u } = *curve;
         RotorMonitor {
             share: min(TICK_S / response.time_constant_s, 1.0),
-            // By the motors' curve: (omega / omega_max)^2 = k u^2 + (1 - k) u.
+            // The motors' curve is (omega / omega_max)^2 = k u^2 + (1 - k) u.
             idle_rad_s: speed_max_rad_s * sqrt(max(k * u * u + (1.0 - k) * u, 0.0)),
             fast_margin_rad_s: FAST_MARGIN * speed_max_rad_s,
             rotors: [WatchedRotor::default(); ROTORS_MAX],

@@ -12,7 +12,7 @@ use nalgebra::Vector4;
 pub struct Claim {
     /// Claim of the paper, in words.
     pub statement: String,
-    /// Whether the flights confirm it.
+    /// True if the flights confirm the claim.
     pub holds: bool,
     /// Numbers that confirm or refute the claim.
     pub evidence: String,

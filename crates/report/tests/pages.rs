@@ -128,7 +128,8 @@ fn captions_explain_exactly_what_the_figure_shows() {
         let said = format!("{:?} {}", captions(&out)[0], words_of(&out));
         assert_eq!(said.contains("over all seeds"), seeds > 1, "{said}");
         assert_eq!(said.contains("lost a vehicle"), loses, "{said}");
-        // All contenders of this test fly backstepping, so there is a ratio.
+        // The page shows the ratio of errors to backstepping's errors, because the flights of backstepping are there to
+        // compare with.
         assert_eq!(said.contains("Ratio"), !loses, "{said}");
     }
     let scenario =
@@ -198,8 +199,8 @@ impl Suited {
     }
 }
 
-/// Per vehicle, the page shows in space the flight that the contender lost alone, or else the one in which it was
-/// farthest behind.
+/// For each vehicle, the page shows one flight in space: the flight that the contender alone lost, or else the flight
+/// in which it was farthest behind.
 #[test]
 fn the_flights_that_tell_most_are_told() {
     let vehicles = BUILT_IN.iter().take(2).map(|vehicle| vehicle.read().unwrap()).collect();

@@ -92,7 +92,7 @@ fn a_reboot_restarts_the_vehicle() {
     assert!(messages.iter().any(|message| matches!(message, Downlink::CommandAck { command: 246, .. })));
     assert!(lines.iter().any(|line| line.ends_with("vehicle 1: restarted")), "{lines:?}");
     assert_eq!(get(&mut server, "MIS_TAKEOFF_ALT"), 4.0);
-    // It restarts only once.
+    // The vehicle restarts only once.
     let (_, lines) = exchange(&mut server, Uplink::Heartbeat);
     assert!(!lines.iter().any(|line| line.contains("restarted")), "{lines:?}");
 

@@ -29,7 +29,7 @@ impl FlightController for OwnLaw {
         let effectiveness = self.vehicle.effectiveness();
         let (e, e_dot) = (setpoint.position_m - state.position_m, setpoint.velocity_m_s - state.velocity_m_s);
         let acceleration = e * 2.0 + e_dot * 2.5 + setpoint.acceleration_m_s2;
-        // For small angles and a heading along x: positive pitch tilts the thrust to +x, positive roll to -y.
+        // At small angles and with the heading along x, positive pitch tilts the thrust to +x, and positive roll to -y.
         let tilt_rad = [-acceleration.y, acceleration.x].map(|a| (a / gravity_m_s2).clamp(-0.4, 0.4));
         let (eta, omega) = (state.attitude_rad, state.rates_rad_s);
         let moment = |error: f32, rate: f32| 100.0 * error - 18.0 * rate;

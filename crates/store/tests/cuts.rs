@@ -104,7 +104,7 @@ fn live(flash: Flash, acts: &[Act]) -> (Flash, [Values; 2]) {
 /// Checks that the store opens with one of `allowed`, and still works.
 fn comes_up(mut flash: Flash, allowed: &[Values; 2], context: &str) {
     flash.power_up();
-    // Before anything is erased, as a program that only reads would see it.
+    // Checks the values before anything is erased, as a program that only reads them would see them.
     let mut store = Store::open(flash, 0, OWNER).unwrap();
     let found = values(&mut store);
     assert!(allowed.contains(&found), "{context}: {found:?}, neither of {allowed:?}");
@@ -133,7 +133,7 @@ fn day() -> Vec<Act> {
     acts
 }
 
-/// Returns the number of bits and erase steps of `acts`.
+/// Returns the number of bits and erase steps that the flash has carried out after `acts`.
 fn length(seed: u64, erasing: Erasing, acts: &[Act]) -> u64 {
     live(Flash::new(seed, erasing), acts).0.done
 }

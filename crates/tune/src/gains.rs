@@ -57,7 +57,7 @@ fn each_of_axis(law: &mut Law, axis: Axis, mut show: impl FnMut(&mut f32)) {
     });
 }
 
-/// Visits every parameter that is `wanted`, tuned and not 0.
+/// Visits every parameter that is `wanted`, may be tuned, and is not 0.
 fn each_tuned(place: &str, parameters: &mut impl Declared, wanted: impl Fn(&Declaration) -> bool, visit: GainVisitor) {
     let Ok(()) = parameters.visit_mut(&mut |declaration, value| {
         if let (true, DeclaredValueMut::Single([gain])) = (declaration.tuned && wanted(declaration), value)

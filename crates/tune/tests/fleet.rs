@@ -1,4 +1,4 @@
-//! Tests of flights made from a vehicle's data, of searches on several threads, and of folders that resume.
+//! Tests the flights made from a vehicle's data, searches on several threads, and searches that resume in their folder.
 #![allow(clippy::unwrap_used, missing_docs, reason = "what cannot be flown must stop the test")]
 
 use afbc_scenario::Scenario;
@@ -103,8 +103,8 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
         .collect()
 }
 
-/// A folder whose searches were interrupted and resumed holds the same bytes as one without interruption. It refuses
-/// other searches.
+/// Searches that are interrupted and resumed leave the same bytes in their folder as searches without interruption. The
+/// folder refuses other searches.
 #[test]
 fn an_interrupted_fleet_resumes_to_the_same_bytes() {
     let base = std::env::temp_dir().join(format!("afbc-tune-fleet-{}", std::process::id()));

@@ -160,7 +160,8 @@ fn every_number_out_of_range_is_named() {
             checked += 1;
         }
     }
-    // Both ends for three numbers of the vector, four of the nested structs and a whole number; one end for six axes.
+    // Eight numbers have two limits each: three of the vector, four of the nested structs, and a whole number. Six axes
+    // have one limit each.
     assert_eq!(checked, 2 * (3 + 4 + 1) + 6);
     let nan = Outer { vector_kg_m2: Vector3::new(1.0, f64::NAN, 1.0), ..Outer::DEFAULT };
     assert_eq!(nan.validate().unwrap_err().range, Outer::VECTOR.range);

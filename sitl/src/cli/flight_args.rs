@@ -73,7 +73,7 @@ impl FlightArgs {
     }
 }
 
-/// Returns the progress on stderr, counted in flights; hidden for short flights.
+/// Returns a progress display on stderr that counts flights. The display is hidden if the flights are short.
 fn progress(scenarios: &[Scenario]) -> CommandProgress {
     let steps = |s: &Scenario| s.contenders.iter().map(|contender| s.duration_s / contender.step_s()).sum::<f64>();
     if scenarios.iter().map(steps).sum::<f64>() < QUIET_STEPS {
@@ -95,7 +95,7 @@ pub(crate) fn report(
     let written = flights::write(folder, flown, claims)?;
     let whole: Vec<manifest::FlownScenario<'_>> =
         flown.iter().map(|ScenarioFlight { scenario, .. }| (scenario, vec![scenario.seed])).collect();
-    // All flights enter the fingerprint, but a scenario is written out only once for all of its contenders.
+    // The fingerprint covers all flights, but a scenario is written only once, not once for each of its contenders.
     let mut first = whole.clone();
     first.dedup_by(|a, b| a == b);
     manifest::write(folder, &written, &whole, &first)?;

@@ -53,8 +53,8 @@ fn check_against_reference(stream: &[u8]) {
     assert_eq!(decode::<Uplink>(core::iter::once(stream)).0, expected);
 }
 
-/// Returns a stream of frames with the right checksums made of `bytes`: kind, flags, length, use, payload. A frame is
-/// sent, sent without its last byte, or becomes the beginning of the next one's payload.
+/// Returns a stream of frames with correct checksums. `bytes` gives each frame's kind, flags, length, use and payload.
+/// A frame is sent, sent without its last byte, or becomes the beginning of the next frame's payload.
 fn nested(mut bytes: &[u8]) -> Vec<u8> {
     const IDS: [u32; 12] = [0, 76, 84, 102, 138, 331, 385, 110, 120, 395, 42_000, 0xFF_FFFF];
     let (mut stream, mut carried) = (Vec::new(), Vec::new());

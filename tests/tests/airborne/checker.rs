@@ -67,7 +67,7 @@ pub struct Extremes {
     pub touch_m_s: Option<f64>,
 }
 
-/// The model of the vehicle and its complaints.
+/// Model of the vehicle that follows a flight and collects complaints.
 pub struct Checker {
     bounds: Bounds,
     /// Silence after which a station counts as lost \[ms\]. `acts_on_station` is true if the vehicle then acts.
@@ -162,12 +162,12 @@ impl Checker {
         (self.last, self.last_ms) = (Some(tick.truth), time_ms);
     }
 
-    /// Follows a message to the vehicle, and which station is then in control.
+    /// Takes a message to the vehicle into the model, and tracks which station is in control after it.
     fn hear(&mut self, time_ms: u32, from: Address, message: &Uplink) {
         if let Uplink::Target(ExternalTarget::Motion(target)) = message
             && target.position_m.iter().any(|place_m| place_m.abs() > PLACE_MAX_M)
         {
-            // The vehicle drops such a target when it reads it.
+            // The vehicle drops a target with such a coordinate when it reads the message.
             return;
         }
         if let Uplink::Command(command) = message {
@@ -184,7 +184,7 @@ impl Checker {
                 matches!(message, MissionMessage::Count(..) | MissionMessage::Clear(_) | MissionMessage::SetCurrent(_))
             }
             Uplink::Control(ControlRequest::Release) if holder == Some(from) => {
-                // The station has given up control.
+                // The station in control has given up control.
                 self.commander_ms = Some(time_ms);
                 return self.holder = None;
             }
@@ -284,7 +284,7 @@ impl Checker {
             "station lost" => silent_ms + SOON_MS > self.station_lost_ms,
             "the state estimate is back" => self.mode == FlightMode::Land && self.descends.is_some(),
             "no targets" => self.mode == FlightMode::Offboard && targetless_ms + SOON_MS > TARGETS_MS,
-            // The safety net may select these modes. The tests that provoke it check which one.
+            // The safety net may select these modes. The tests that provoke the safety net check which mode it selects.
             _ => matches!(mode, FlightMode::Hold | FlightMode::Return | FlightMode::Land),
         };
         if mode == self.mode {

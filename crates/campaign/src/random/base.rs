@@ -96,7 +96,7 @@ impl<'a> BaseVehicle<'a> {
 fn start(trajectory: &Trajectory, gravity_m_s2: f64, seen: FeedbackSource) -> Motion {
     let reference = trajectory.at(0.0);
     let force = reference.acceleration_m_s2 + Vector3::z() * gravity_m_s2;
-    // A vehicle that must find its attitude first starts with less tilt.
+    // The initial tilt is limited for a vehicle that must first find its attitude with its own sensors.
     let level_m_s2 = force.xy().norm();
     let most_m_s2 = if seen == FeedbackSource::Truth { f64::INFINITY } else { force.z * tan(LEVEL_RAD) };
     let share = if level_m_s2 > most_m_s2 { most_m_s2 / level_m_s2 } else { 1.0 };

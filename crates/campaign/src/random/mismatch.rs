@@ -75,7 +75,8 @@ impl ModelMismatch {
     /// Draws a change.
     pub(super) fn draw(noise: &mut Noise, vehicle: &Vehicle) -> Self {
         let kind = whole(noise, Self::KINDS.len());
-        // Every kind draws the same number of random values.
+        // The number of random values drawn is the same for all kinds of change, so the kind does not affect later
+        // draws.
         let [a, b, c, d] = [(); 4].map(|()| noise.uniform());
         let between = |low: f64, high: f64, at: f64| low + (high - low) * at;
         let arm_m = vehicle.parameters.arm_m;

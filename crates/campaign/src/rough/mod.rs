@@ -52,7 +52,7 @@ pub struct RoughFlights {
     pub vehicles: Vec<Vehicle>,
 }
 
-/// A vehicle at both places, with sensors that behave as stated.
+/// A vehicle equipped for flights indoors and for flights outdoors. Its sensors behave as their data sheets state.
 struct VenueVehicles<'a> {
     vehicle: &'a Vehicle,
     indoors: Scenario,

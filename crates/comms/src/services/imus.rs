@@ -11,7 +11,7 @@ const SET_UP_US: u64 = 3_000_000;
 /// Shortest time between two texts \[us\].
 const PAUSE_US: u64 = 1_000_000;
 
-/// For each IMU: its bits in SYS_STATUS and its texts.
+/// Bits of each IMU in SYS_STATUS. The constants below are the texts about each IMU.
 const BITS: [u32; 2] = [sensor::GYROSCOPE | sensor::ACCELEROMETER, sensor::GYROSCOPE_2 | sensor::ACCELEROMETER_2];
 const IN_USE: [&str; 2] = ["IMU 1 in use instead of IMU 2", "IMU 2 in use instead of IMU 1"];
 const FAILED: [&str; 2] = ["IMU 1 failed", "IMU 2 failed"];

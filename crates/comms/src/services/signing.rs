@@ -12,10 +12,10 @@ use heapless::Vec;
 
 /// Number of streams accepted between two starts. A stream is a sender on one of its links.
 pub const STREAMS_MAX: usize = 6;
-/// How far the first frame of a sender may be behind the clock \[10 us\]: one minute.
+/// Longest time by which the first frame of a sender may be behind the clock \[10 us\]: one minute.
 const BEHIND_MAX_10US: u64 = 6_000_000;
-/// How far a sender's frame may move a clock that was set together with the key \[10 us\]: one hour. Frames further
-/// ahead are accepted but do not move the clock, so they could be replayed after the next start.
+/// Largest step by which a sender's frame may move a clock that was set together with the key \[10 us\]: one hour.
+/// Frames further ahead are accepted but do not move the clock, so they could be replayed after the next start.
 const AHEAD_MAX_10US: u64 = 360_000_000;
 /// Latest time stamp that is accepted \[10 us\]: ten years before the 48 bits overflow, so that frames sent later still
 /// have time stamps.

@@ -9,9 +9,10 @@ use std::ops::RangeInclusive;
 /// Source of the time of a part's readings.
 #[derive(Debug)]
 pub enum Pace {
-    /// Its interrupts, one in so many us; at least so many readings are in the first second.
+    /// The part's interrupts. The fields are the time between two interrupts \[us\], and the smallest number of
+    /// readings in the first second.
     Interrupts(u64, usize),
-    /// Itself: so many readings are in 10 s.
+    /// The driver's own polling, with this number of readings in 10 s.
     Polled(RangeInclusive<usize>),
 }
 
@@ -21,13 +22,13 @@ pub struct Suite<'a, P: SensorPart, M> {
     pub part: &'a dyn Fn() -> P,
     /// The part.
     pub model: &'a dyn Fn() -> M,
-    /// True for what the part reads.
+    /// Returns true if a reading is what the modelled part measures.
     pub right: fn(&P::Reading) -> bool,
     /// The longest that a fault may stay unnoticed \[us\].
     pub notice_us: u64,
     /// Other parts, and by what they are named.
     pub others: Vec<(M, u8)>,
-    /// When there are readings.
+    /// Source and number of the readings.
     pub pace: Pace,
 }
 

@@ -408,7 +408,7 @@ fn what_does_not_fall_stands() {
         assert!((ticks - FALL_M_S / (9.81 * (1.0 - share)) / DT_S).abs() < 3.0, "{share}: {ticks} ticks");
     }
     assert_eq!(held(CARRY_SHARE * 1.05, 0.0, 0.0), None, "carried");
-    // It falls with slightly more or less than the deciding share of a free fall.
+    // The vehicle falls with slightly more or less than the share of a free fall that decides.
     for share in [0.0, 0.3, 0.5] {
         let falls = |of_it: f32| held(share, -of_it * 9.81 * (1.0 - share), 0.5);
         assert_eq!(falls(FALL_SHARE + 0.1), None);
@@ -485,7 +485,7 @@ fn a_vehicle_adrift_lands_by_its_thrust() {
     assert_eq!(runs(&mut land, 4000, WEIGHT_N), None, "carried");
     let mut back = Land(land.0);
     assert_eq!(runs(&mut land, 4000, 0.1 * WEIGHT_N), Some(STILL_US / GAP_US + 1));
-    // It did not hover meanwhile, so the descent counts.
+    // The vehicle has not hovered since, so its descent counts.
     assert!(back.run(1, &somewhere(), WEIGHT_N));
     assert_eq!(back.lands(&somewhere(), 0.1 * WEIGHT_N), Some(STILL_US / GAP_US + 1));
     // A vehicle on the ground stays on the ground, whatever its state drifts to.

@@ -14,8 +14,8 @@ const ASIDE_MAX_RAD: f32 = 0.52;
 /// Largest time between two samples that is integrated; a longer time counts as this one \[s\].
 const GAP_MAX_S: f64 = 0.1;
 
-/// A turn by hand from level: its name, the instruction, the direction that points up afterwards (x forward, y left, z
-/// up), and the axis and sign of the rotation that gyroscope and attitude must show.
+/// A turn of the board by hand from level. It has a name, an instruction and the body axis that points up after the
+/// turn (x forward, y left, z up). `axis` and `sign` are the rotation that gyroscope and attitude must show.
 struct TurnCheck {
     name: &'static str,
     order: &'static str,
@@ -67,7 +67,7 @@ pub(crate) fn turns(
         let is_level = talk.wait(PATIENCE_MS, |talk| level.follow(&mut talk.latest, &Vector3::z()))?;
         step.check(is_level, "the board was not held level");
         tell(turn.order);
-        // A new `TurnProgress` counts the angle from level.
+        // A new `TurnProgress` counts the angle from the level attitude.
         let mut turned = TurnProgress::default();
         let is_done = talk.wait(PATIENCE_MS, |talk| turned.follow(&mut talk.latest, &turn.up.into()))?;
         let angle_rad = turned.angle_rad.get(turn.axis).copied().unwrap_or_default() * turn.sign;

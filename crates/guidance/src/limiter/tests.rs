@@ -114,7 +114,7 @@ fn after_a_pause_a_stream_begins_anew() {
 
 /// Returns a motion one step before `target` that misses it by these amounts in position, velocity and acceleration.
 fn now(target: &CompleteTarget, off_m: f32, off_m_s: f32, off_m_s2: f32, misfit: Option<Misfit>) -> LimitedMotion {
-    // It is compared after one more step.
+    // The returned motion is compared with the target after one more step.
     let acceleration = target.acceleration_m_s2 - oblique(off_m_s2);
     let velocity = target.velocity_m_s - oblique(off_m_s) - acceleration * DT_S;
     let position = target.position_m - oblique(off_m) - (velocity + acceleration * (0.5 * DT_S)) * DT_S;

@@ -54,7 +54,8 @@ pub fn i2c_ns(bytes: u64, conditions: u64) -> u64 {
     ((bytes * 9 + conditions) * 1_000_000_000).div_ceil(I2C_HZ.into())
 }
 
-/// Adds up the longest cycle of a part that is ready, plus one read of a register.
+/// Computes the bus traffic of one reading by the longest cycle of its driver. Adds one read of a register, with which
+/// the driver asks whether the part is ready.
 pub(super) fn script<P: SensorPart>(wire: BusKind) -> BusScript {
     let format = P::SPI;
     let clock_hz = match (wire, format) {
@@ -69,7 +70,7 @@ pub(super) fn script<P: SensorPart>(wire: BusKind) -> BusScript {
                 let bytes = 1 + data + if is_read { dummies } else { 0 };
                 (bytes, spi_ns(bytes, clock_hz))
             }
-            // Address and register; a read sends the address again before the answer.
+            // Every access sends an address and a register. A read sends the address again before the answer.
             BusKind::I2c => {
                 let bytes = 2 + data + u64::from(is_read);
                 (bytes, i2c_ns(bytes, 2 + u64::from(is_read)))

@@ -41,7 +41,8 @@ fn every_mode_has_its_curves() {
         acro_yaw_super_expo: 0.9,
     };
     let sticks = Sticks { roll: 0.4, pitch: -0.6, throttle: 0.8, yaw: -0.7 };
-    // Deflections beyond the dead zone: (0.4 - 0.2) / 0.8 = 0.25; likewise 0.5, 0.75 and 0.625.
+    // Deflections beyond the dead zone, computed as (0.4 - 0.2) / 0.8 = 0.25. In the same way, the others are 0.5, 0.75
+    // and 0.625.
     let [roll, pitch] = [0.25f32, -0.5].map(|way| 0.8 * way + 0.2 * way * way * way);
     let (throttle, yaw) = (0.6 * 0.75 + 0.4 * 0.421_875, -(0.2 * 0.625 + 0.8 * 0.244_140_63));
     let position = Sticks { roll, pitch, throttle, yaw };

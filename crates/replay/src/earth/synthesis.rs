@@ -6,7 +6,7 @@
 
 /// Largest degree and order.
 const DEGREES: usize = 12;
-/// Number of pairs of a degree, from 1 on, and an order.
+/// Number of coefficient pairs (g, h): one for each degree from 1 on, and each order up to the degree.
 const PAIRS: usize = DEGREES * (DEGREES + 3) / 2;
 /// The model's reference radius \[m\].
 const RADIUS_M: f64 = 6_371_200.0;
@@ -79,7 +79,7 @@ struct Legendre {
     slope: f64,
 }
 
-/// Returns the functions of degree n, computed from those of degree n - 1 (`last`) and n - 2 (`before`).
+/// Returns the Legendre functions of degree n, computed from those of degree n - 1 (`last`) and n - 2 (`before`).
 fn next_degree(
     n: usize,
     last: &[Legendre; DEGREES + 1],

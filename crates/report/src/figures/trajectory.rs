@@ -58,7 +58,8 @@ impl BoxProjection {
         BoxProjection { px: (0.5 * width / right).min(0.5 * height / down), ..view }
     }
 
-    /// Projects a vector, given in edges of the box, to the picture: right and down.
+    /// Returns where a vector points in the picture, to the right and down. The vector is given in lengths of the box's
+    /// edges.
     fn direction(&self, v: Vector3<f64>) -> (f64, f64) {
         let v = v.component_mul(&self.edges) * self.px;
         let ((sin_a, cos_a), (sin_e, cos_e)) = (libm::sincos(AZIMUTH_RAD), libm::sincos(ELEVATION_RAD));
@@ -154,7 +155,7 @@ pub(super) fn picture(
     Picture { name: "fig4-trajectory", caption, svg, explorable }
 }
 
-/// Returns the same flights for the page's script.
+/// Returns the plotted flights as data for the page's script.
 fn scene(laws: &[PlottedFlight], longest: &ScenarioFlight, view: &BoxProjection) -> ExplorableScene {
     let scenario = &longest.scenario;
     let arm_m = scenario.vehicle.arm_m;

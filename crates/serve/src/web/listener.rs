@@ -30,7 +30,7 @@ pub(crate) fn listen(listener: &TcpListener, shared: &Arc<WebState>) {
         let shared = Arc::clone(shared);
         // If no thread can be started, the connection is closed and its place becomes free.
         let _ = thread::Builder::new().name("page".into()).spawn(move || {
-            // It does not matter how a connection ends.
+            // How a connection ends does not matter, so errors are ignored.
             let _ = serve(stream, (number, &slot), &shared);
         });
     }

@@ -20,7 +20,7 @@ fn a_hold_is_where_it_comes_to_stand() {
     assert_eq!(Stage { speed_m_s: 3.0, ..Stage::at(here()) }.see(|inputs| ordered.fly(inputs)).speed_m_s, 3.0);
 }
 
-/// A take-off is done in the air, once the setpoint stands at the end and the vehicle is nearly there.
+/// A take-off is done when the vehicle is in the air, its setpoint stands at the end, and the vehicle is nearly there.
 #[test]
 fn a_takeoff_ends_at_its_height() {
     let from = Vector3::new(3.0, 4.0, 2.0);
@@ -45,7 +45,7 @@ fn a_takeoff_ends_at_its_height() {
     }
 }
 
-/// A landing is over the place where the horizontal setpoint has stopped, at any sink rate.
+/// A landing vehicle descends over the place where its horizontal setpoint has stopped, at any sink rate.
 #[test]
 fn a_landing_is_where_it_stops() {
     let mut land = Land::default();
@@ -80,7 +80,7 @@ fn a_return_climbs_flies_and_descends() {
     assert_eq!(climbs(far(3.0), 9.0), 9.0);
     assert_eq!(climbs(near(3.0), f32::INFINITY), 3.0);
 
-    // It already climbs while it stops.
+    // The vehicle already climbs while it stops.
     let mut back = Stage::at(far(3.0)).see(|inputs| Return::new(inputs, inputs.home_m.xy()));
     let stops = Stage::at(far(3.0)).moving(Vector3::new(2.0, 0.0, 0.0)).see(|inputs| back.fly(inputs));
     assert!(same(&limited(&stops).position_m, &Vector3::new(f32::NAN, f32::NAN, safe)));
@@ -94,7 +94,7 @@ fn a_return_climbs_flies_and_descends() {
         assert_eq!(aim.position_m.xy() == home.xy(), over, "{setpoint}, {vehicle}");
         assert!(!over || (aim.yaw_rad - towards).abs() < 1e-5 && aim.position_m.z == safe, "{aim:?}");
         if over {
-            // Over home, and slow, it descends.
+            // A slow vehicle over home descends.
             for (off, speed, descends) in [(1.02, 0.0, false), (0.9, 0.31, false), (0.98, 0.29, true)] {
                 let over_home = Vector3::new(home.x, home.y, safe);
                 let stage = Stage::at(over_home + along(0, off)).moving(along(1, speed));

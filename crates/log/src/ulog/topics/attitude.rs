@@ -29,7 +29,7 @@ impl VehicleAttitude {
 }
 
 message! {
-    /// What the law wants of it.
+    /// Attitude that the law demands.
     "vehicle_attitude_setpoint" VehicleAttitudeSetpoint {
         roll_body: f32 = "rad",
         pitch_body: f32 = "rad",

@@ -52,7 +52,7 @@ impl EstimatorVector {
 }
 
 message! {
-    /// What of the estimate is valid.
+    /// Flags and accuracy of the estimate: which of its parts are valid.
     "estimator_status" EstimatorFlags {
         timestamp_sample: u64 = "us",
         pos_horiz_accuracy: f32 = "m",
@@ -97,8 +97,9 @@ impl EstimatorFlags {
 }
 
 message! {
-    /// What it makes of each kind of measurement, in the order position and attitude of a tracker, position,
-    /// height and velocity of a receiver, height, heading; whether it holds the vehicle at rest.
+    /// The estimator's judgement of each kind of measurement. The order is a tracker's position and attitude, a
+    /// receiver's position, height and velocity, the height, and the heading. Also, whether the estimator holds the
+    /// vehicle at rest.
     "afbc_estimator" EstimatorFigures {
         nis: [f32; AIDS] = "normalised innovation squared of the last measurement; a lower bound if it was rejected",
         accepted: [u32; AIDS] = "",

@@ -92,7 +92,7 @@ impl VehicleLocalPosition {
 }
 
 message! {
-    /// Where the guidance wants it.
+    /// Position that the guidance demands.
     "vehicle_local_position_setpoint" VehicleLocalPositionSetpoint {
         x: f32 = "m",
         y: f32 = "m",

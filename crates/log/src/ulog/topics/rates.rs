@@ -24,7 +24,8 @@ impl VehicleAngularVelocity {
 }
 
 message! {
-    /// What the law wants of them: the virtual control of backstepping, or the reference's rate of a law without one.
+    /// Body rates that the law demands: the virtual control of backstepping, or the reference's rates if the law has no
+    /// virtual control.
     "vehicle_rates_setpoint" VehicleRatesSetpoint {
         roll: f32 = "rad/s",
         pitch: f32 = "rad/s",

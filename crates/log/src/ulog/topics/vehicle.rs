@@ -78,7 +78,7 @@ message! {
 }
 
 message! {
-    /// Whether it is on the ground.
+    /// Whether the vehicle is on the ground.
     "vehicle_land_detected" LandDetected of moment {
         maybe_landed: bool = "" => !moment.report.guided.airborne,
         landed: bool = "" => !moment.report.guided.airborne,
