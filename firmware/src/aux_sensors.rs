@@ -99,7 +99,7 @@ pub fn put_battery(at_us: u64, pins: Option<BatteryPins>, scale: BatteryScale) {
 /// Returns the sensor state for ground stations at `now_us`. `told` has the vehicle's parameters for volts and amperes
 /// at the battery per volt at the pins.
 pub(crate) fn known(now_us: u64, told: [f32; 2]) -> AuxSensors {
-    // Saturating, since a reading may be newer than the tick being reported.
+    // The subtraction saturates, since a reading may be newer than the tick being reported.
     let works = |at_us: u64| now_us.saturating_sub(at_us) < SILENT_US;
     let aux = with(|known| {
         let mut sensors = SensorBits::default();

@@ -24,7 +24,7 @@ pub fn spawn(spawner: SendSpawner) {
 #[embassy_executor::task]
 async fn task() {
     loop {
-        // Wrapping addition, because an overflow check (after 585,000 years) would be a panic.
+        // The addition wraps, because an overflow check (after 585,000 years) would be a panic.
         Timer::at(Instant::from_micros(Instant::now().as_micros().wrapping_add(EVERY_US))).await;
         STACK_BYTES.store(deepest_stack(), Ordering::Relaxed);
         let [last, longest] = control::cycles();

@@ -19,7 +19,7 @@ static LAST: AtomicU32 = AtomicU32::new(0);
 pub(crate) fn put(report: &Report) {
     let indication = Indication::of(report);
     let number = Indication::ALL.iter().position(|one| *one == indication).map_or(0, |at| at as u32 + 1);
-    // One word, because two could be torn: the reading task has a lower priority.
+    // The indication is one word, because a reading task of lower priority could read half of two words.
     LAST.store(milliseconds(report.time_us) << 3 | number, Ordering::Relaxed);
 }
 
@@ -45,7 +45,7 @@ pub async fn run(mut show: impl FnMut(IndicatorSignals)) -> ! {
     loop {
         let now_us = Instant::now().as_micros();
         show(indicator.signals(now_us, indication(now_us)));
-        // Wrapping addition, because an overflow check (after 585,000 years) would be a panic.
+        // The addition wraps, because an overflow check (after 585,000 years) would be a panic.
         Timer::at(Instant::from_micros(now_us.wrapping_add(STEP_US / 2))).await;
     }
 }

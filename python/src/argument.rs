@@ -212,7 +212,7 @@ impl<'py> Argument<'py> for ArgumentArray {
         let py = object.py();
         let needed = "numbers are";
         let array = match object.cast::<PyArrayDyn<f64>>() {
-            // A fast path, since most arguments are such arrays and a step may run a thousand times a second.
+            // This is a fast path, since most arguments are such arrays and a step may run a thousand times a second.
             Ok(array) if array.is_c_contiguous() && array.data().is_aligned() => {
                 return Ok(ArgumentArray { numbers: array.to_vec().map_err(error)?, shape: array.shape().to_vec() });
             }

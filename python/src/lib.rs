@@ -58,7 +58,7 @@ fn _afbc(module: &Bound<'_, PyModule>) -> PyResult<()> {
     ] {
         module.add_function(function)?;
     }
-    // Functions that only `pickle` calls.
+    // Only `pickle` calls these functions.
     module.setattr("_flight", wrap_pyfunction!(flight::_flight, module)?)?;
     module.setattr("_scenario", wrap_pyfunction!(scenario::_scenario, module)?)?;
     module.setattr("_vehicle", wrap_pyfunction!(vehicle::_vehicle, module)?)

@@ -73,7 +73,7 @@ impl Socket {
             _ if bytes.is_empty() => Ok(()),
             Socket::Udp(socket) => socket.send(bytes).map(drop),
             Socket::Tcp(stream) => {
-                // Blocking, so that a full buffer does not cut a frame; the timeout bounds the wait.
+                // The write blocks, so that a full buffer does not cut a frame. The timeout bounds the wait.
                 stream.set_nonblocking(false)?;
                 stream.write_all(bytes)
             }

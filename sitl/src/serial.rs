@@ -76,7 +76,7 @@ impl Autopilot for SerialBoard {
 impl Drop for SerialBoard {
     fn drop(&mut self) {
         let mut station = Station::new();
-        // Kill, since a vehicle refuses to disarm in the air.
+        // The motors are stopped by a kill, since a vehicle refuses to disarm in the air.
         (0..KILL_REPEATS).for_each(|_| station.command(VehicleCommand::Kill));
         // A failure can no longer be reported. A vehicle without states descends by itself.
         let _ = self.port.write_all(&station.take());

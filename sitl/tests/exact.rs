@@ -48,7 +48,7 @@ fn a_change_is_shown() {
     }
     let csv = fs::read_to_string(out.join("change.csv")).unwrap();
     let columns = csv.lines().next().unwrap().split(',').count();
-    // Time, and 27 values in both versions: four speeds, four throttles and nineteen others.
+    // The columns are the time, and 27 values of both versions: four speeds, four throttles and nineteen others.
     assert!(columns == 1 + 2 * 27 && csv.lines().all(|line| line.split(',').count() == columns), "{columns}");
     for (change, wanted) in [("NO_SUCH=1", "no such parameter"), ("V_MASS=-1", "V_MASS: must be")] {
         let said = refused(&sitl(&folder, &["replay", "--exact", "flight.log", "--change", change]));

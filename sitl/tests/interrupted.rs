@@ -77,7 +77,7 @@ fn leaves_no_log_behind() {
             assert_eq!(files().collect::<Vec<_>>(), Vec::<OsString>::new(), "{options:?}");
         }
     }
-    // Interrupts while the logs are being written.
+    // The commands are interrupted while they write logs.
     fs::write(folder.join("out/far.waypoints"), FAR).unwrap();
     for flight in [&["fly", "hover", "--controller", "pid", "--duration", "300"][..], &["fly", "out/far.waypoints"]] {
         let arguments = [flight, &logs[..]].concat();

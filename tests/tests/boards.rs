@@ -321,7 +321,7 @@ fn every_interrupt_has_the_priority_of_its_purpose() {
         let handlers = handlers(&code);
         assert!(priorities.keys().eq(handlers.keys()), "{}: {priorities:?} {handlers:?}", board.display());
         let motors: Vec<_> = code.split("Motors<").skip(1).filter_map(|it| it.split(", ").nth(1)).collect();
-        // Peripherals that the card's interface takes.
+        // `card` holds the peripherals that the card's interface takes.
         let card = code.split_once("Sdmmc::new_4bit(").map_or("", |(_, call)| call.split(')').next().unwrap());
         let card: Vec<_> = names_after(card, "p.").iter().map(|name| format!("<{name}>")).collect();
         for (line, handler) in handlers {

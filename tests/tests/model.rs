@@ -120,8 +120,8 @@ proptest! {
         };
         let h = 1e-5;
         let exact = (g(h) - g(-h)) / (2.0 * h);
-        // Two products of a sine and a cosine, each factor with an error of at most 1.7e-4 (3.4e-4 of the product),
-        // times a rate.
+        // The allowed error comes from two products of a sine and a cosine, times a rate. Each factor has an error of
+        // at most 1.7e-4, so a product has 3.4e-4.
         let allowed = 2.5 * TRIGONOMETRY * (rates_rad_s.x.abs() + rates_rad_s.y.abs()) / p.mass_kg + 1e-6;
         prop_assert!((f64::from(dynamics.g_dot) - exact).abs() <= allowed, "{} for {exact}", dynamics.g_dot);
         prop_assert!((f64::from(dynamics.g) - g(0.0)).abs() <= 2.5 * TRIGONOMETRY / p.mass_kg);

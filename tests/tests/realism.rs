@@ -27,7 +27,8 @@ fn every_law_flies_the_papers_experiment_on_hardware() {
         // the other laws less.
         assert!(run.metrics.max_abs.xyz().amax() < 1.0, "{}: {}", run.contender.name, run.metrics.max_abs);
     }
-    // The paper's claim holds under these conditions too: AFBC keeps less than half of backstepping's error.
+    // The paper's claim also holds with these rotors, sensors and disturbances: AFBC keeps less than half of
+    // backstepping's error.
     let rmse = |kind| runs.iter().find(|run| run.contender.kind() == kind).unwrap().metrics.rmse;
     let (afbc, baseline) = (rmse(ControllerKind::Afbc), rmse(ControllerKind::Backstepping));
     assert!(afbc.iter().zip(&baseline).all(|(a, b)| *a < 0.5 * b), "{afbc} against {baseline}");

@@ -153,7 +153,8 @@ pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
     /// Returns the transmission errors of the first link's wire to the board.
     fn link_errors(&mut self) -> &mut Errors;
 
-    /// Attaches the models' own GNSS receiver, which `sense` requires, and passes the signals on.
+    /// Connects the GNSS receiver that comes with the models, because `sense` needs a receiver. Then passes the signals
+    /// on.
     fn sense_with_own_receiver(&mut self, signals: &Signals) {
         self.attach_receiver(Box::new(nmea::Receiver::new()));
         self.sense(signals);
@@ -325,7 +326,7 @@ impl Machine for Pixracer {
         true
     }
 
-    /// USART6, which the board reserves for a radio receiver.
+    /// Attaches the wire to USART6, which the board reserves for a radio receiver.
     fn attach_radio(&mut self, wire: UartWire) -> Option<f32> {
         self.mcu.usart[3].attach(wire);
         Some(0.0)

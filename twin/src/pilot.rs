@@ -24,11 +24,11 @@ const HEIGHT_M: f32 = 5.0;
 const HOVER_MS: u64 = 30_000;
 /// Longest hover if logs are fetched afterwards [ms].
 const SHORT_HOVER_MS: u64 = 6_000;
-/// Longest times until it is armed, for the climb, and for landing and disarming [ms].
+/// Longest times until the vehicle is armed, for the climb, and for landing and disarming [ms].
 const PATIENCE_MS: [u64; 3] = [40_000, 15_000, 40_000];
 /// Time from disarming until the log's last blocks are written [ms].
 const REST_MS: u64 = 1_500;
-/// Longest time for the mission until it is disarmed [ms].
+/// Longest time from the start of the mission until the vehicle is disarmed [ms].
 const MISSION_MS: u64 = 160_000;
 /// Largest mean position error of the hover [m], and largest tilt in gusts [rad]. A mission may tilt more, since each
 /// leg begins with an acceleration.

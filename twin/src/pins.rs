@@ -136,7 +136,7 @@ impl MotorPins {
             (access.kind, access.address, value & 1) == (AccessKind::Write, frames.timer.stream, 1)
         };
         let Some(frames) = self.frames.iter_mut().find(starts) else { return false };
-        // Transfer from the pins: the firmware samples answers.
+        // A transfer from the pins means that the firmware samples the controllers' answers.
         if value >> DIRECTION & 0b11 == 0
             && let Some(answers) = &mut frames.answers
         {

@@ -73,7 +73,8 @@ impl Gains {
             },
             gamma: gamma / square,
             eta: eta / square,
-            // Multiplied: delta_max stays, so the gain of the robust term, delta_max/epsilon, falls like alpha_2.
+            // epsilon is multiplied, not divided. delta_max stays the same, so the gain of the robust term,
+            // delta_max/epsilon, falls like alpha_2.
             epsilon: epsilon * slowness,
             safeguards: Safeguards { sigma: safeguards.sigma / slowness, ..safeguards },
             ..*self

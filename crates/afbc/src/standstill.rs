@@ -66,7 +66,7 @@ impl StandstillDetector {
         let slower = |speed_max| state.velocity_m_s.iter().all(|v| v.abs() < speed_max);
         let speed_max = if self.is_standing() { MOVING_M_S } else { STILL_M_S };
         self.still_s = if thrust_n < LIFT_SHARE * weight_n && slower(speed_max) { self.still_s + dt_s } else { 0.0 };
-        // The landing is repeated in every step, because the height at which the vehicle stood last counts.
+        // A standing vehicle is landed anew in every step, so that its height counts from where it stood last.
         if self.is_standing() {
             self.land();
         }

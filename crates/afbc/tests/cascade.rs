@@ -197,7 +197,7 @@ fn compose<L: SubsystemLaw + Copy>(
         }
         let angles = trace.desired_rad.map(f64::from);
 
-        // Angles that lead by the filter's lag, with the derivatives that follow from jerk and snap.
+        // The angles lead by the filter's lag. Their derivatives follow from jerk and snap.
         let w = f64::from(settings.command_filter_rad_s);
         // Equation (40) is differentiated along a path with this jerk and snap, and with a turning yaw.
         let along = |t: f64, [jerk, snap]: [[f64; 2]; 2]| {

@@ -258,7 +258,7 @@ fn what_was_learnt_at_a_velocity_is_remembered() {
                 let (sin, cos) = (f32::from(step) * DT_S * core::f32::consts::TAU / 6.0).sin_cos();
                 let v = Vector3::new(4.0 * sin, 3.0 * cos, 0.0);
                 let f = v * -0.5;
-                // The thrust that makes exactly this motion with f.
+                // The thrust makes exactly this motion with f.
                 let a = Vector3::new(4.0 * cos, -3.0 * sin, 0.0) * (core::f32::consts::TAU / 6.0) - f;
                 let up = Vector3::new(a.x / 9.81, a.y / 9.81, 1.0);
                 let state = State { velocity_m_s: v, ..State::default() };

@@ -93,7 +93,7 @@ proptest! {
         trips: bool,
         inputs in prop::collection::vec((state(value), setpoint(value), prop::bool::weighted(0.1)), 50),
     ) {
-        // A vehicle that can hover.
+        // The drawn vehicle must be able to hover.
         let (mut gains, mut settings) = (gains, settings);
         gains.z.safeguards.theta_max = gains.z.safeguards.theta_max.max(5.01 * WEIGHT_N);
         settings.common.rotor_force_max_n = settings.common.rotor_force_max_n.max(2.0);

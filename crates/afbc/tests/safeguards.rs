@@ -188,7 +188,7 @@ proptest! {
         let fly = |anti_windup, rotor_force_max_n| {
             let settings =
                 Settings { anti_windup, ..Profile::Flight.settings().with_rotor_force_max_n(rotor_force_max_n) };
-            // No observer, because the observer gets the thrust that the rotors gave.
+            // There is no observer, because it would get the thrust that the rotors gave.
             let disturbance = DisturbanceObserver::DEFAULT;
             let settings = Settings { tilt_by_thrust: false, disturbance, ..settings };
             let law = Adaptive::new(Profile::Flight.gains()).unwrap();

@@ -47,7 +47,7 @@ fn scenario_file(text: &str) -> Result<String, String> {
     let added = if text.contains("[trajectory]") { "" } else { hover };
     let alone = text.contains("[instruments.") && !text.contains("[instruments.imu");
     let imu = if alone { "\n[instruments.imu]\n" } else { "" };
-    // The path beside which the vehicle file that an example names lies.
+    // An example may name a vehicle file. The file lies beside this path.
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenario/tests/f");
     let scenario =
         afbc_scenario::parse(file, &format!("{text}{added}{imu}"), "f").map_err(|error| error.to_string())?;

@@ -300,7 +300,7 @@ impl Comms {
     /// ([`Kept::keep`](afbc_onboard::parameters::Kept::keep)). Nothing changes while the vehicle is armed.
     pub fn parameters(&mut self, table: &mut ParameterTable, mut send: impl FnMut(&[u8])) -> Option<RecordChange> {
         let change = self.grant(table);
-        // COM_DL_LOSS_T. Its range is checked, so the conversion is safe.
+        // The parameter is COM_DL_LOSS_T. Its range is checked, so the conversion is safe.
         let silent_us = (table.configuration().guidance.failsafe.station_lost_s * 1e6) as u64;
         self.control.set_silence(silent_us);
         let afbc_guidance::Settings { limits, failsafe, .. } = &table.configuration().guidance;

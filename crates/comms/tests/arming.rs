@@ -335,7 +335,7 @@ proptest! {
     }
 }
 
-/// Regression: the checks used the default limits instead of the parameters.
+/// The checks must use the limits of the parameters. They once used the default limits.
 #[test]
 fn the_limits_of_the_parameters_count() {
     let creeps = |speed_m_s: f32| State { velocity_m_s: Vector3::new(speed_m_s, 0.0, 0.0), ..State::default() };

@@ -89,7 +89,7 @@ fn requests() -> Vec<Sample> {
         samples.push(at(&PARAM_SET_DATA { param_value: value, param_id, ..Default::default() }, 4, &[]));
         samples.push(at(&PARAM_EXT_SET_DATA { param_id, ..Default::default() }, 0, &[]));
     }
-    // Missions, fences, rally points, all of them, and an unknown type of plan.
+    // The types of plan are missions, fences, rally points, all of them, and an unknown type.
     for plan in [0, 1, 2, 255, 99] {
         for count in [0, 1, 65] {
             samples.push(at(&MISSION_COUNT_DATA { count, ..Default::default() }, 2, &[plan]));
@@ -324,7 +324,8 @@ fn every_file_operation_is_refused() {
             assert_eq!(reported.len(), 1);
             let payload = &reported[0].payload;
             assert_eq!(u16::from_le_bytes([payload[3], payload[4]]), next);
-            // Session, NAK, one byte of data, operation; the data byte is UnknownCommand.
+            // The bytes are the session, NAK, the length of one byte, and the refused operation. The data byte means
+            // UnknownCommand.
             assert_eq!(payload[5..9], [operation, 129, 1, operation]);
             assert_eq!(payload[15], 7);
         }
@@ -345,7 +346,7 @@ fn what_there_is_not_is_named() {
         let mut payload = reported[0].payload.clone();
         payload.resize(21, 0);
         assert_eq!((reported[0].id, &payload[..2]), (345, index.to_le_bytes().as_slice()));
-        // Error 1: the parameter does not exist.
+        // Error 1 means that the parameter does not exist.
         assert_eq!((&payload[4..20], payload[20]), (name.as_slice(), 1));
     }
     let read =

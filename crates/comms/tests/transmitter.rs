@@ -53,7 +53,7 @@ fn the_transmitter_is_told_in_turn() {
     for (_, (_, numbers)) in batteries {
         assert_eq!((number(&numbers[..2]), number(&numbers[2..4]), number(&numbers[4..7])), (154, 123, 456));
     }
-    // CRSF's pitch, roll and yaw, in 1e-4 rad.
+    // CRSF sends pitch, roll and yaw in 1e-4 rad.
     for (_, (_, numbers)) in attitudes.iter().skip(1) {
         let angles = numbers.chunks_exact(2).map(|two| i16::from_be_bytes([two[0], two[1]])).collect::<Vec<_>>();
         for (angle, expected) in angles.iter().zip([2000, 1000, -3000]) {
@@ -85,7 +85,7 @@ fn the_transmitter_is_told_the_place() {
         assert_eq!(numbers.len(), 15);
         let [latitude, longitude] = [&numbers[..4], &numbers[4..8]].map(number);
         assert!((latitude - 473_977_420).abs() <= 2 && (longitude - 85_455_940).abs() <= 2, "{latitude} {longitude}");
-        // Speed in 0.1 km/h, course in 0.01 degrees, altitude in metres plus 1000.
+        // The numbers are the speed in 0.1 km/h, the course in 0.01 degrees, and the altitude in metres plus 1000.
         let [speed, course, height] = [&numbers[8..10], &numbers[10..12], &numbers[12..14]].map(number);
         assert!((speed - 180).abs() <= 1 && (course - 5_313).abs() <= 1, "{speed} {course}");
         assert_eq!((height, numbers[14]), (1_500, 17));

@@ -166,7 +166,7 @@ impl<const N: usize> Mixer<N> {
         }
         // No share is zero: THRUST_SHARE has refused shares below 0.001.
         let load = |input| inverse.column(input).component_div(&share);
-        // The largest load whose rounded force does not exceed the limit.
+        // `most` is the largest load whose rounded force does not exceed the limit.
         let most = share.map(|share| {
             let most = force_max_n / share;
             if share * most > force_max_n { most.next_down() } else { most }
@@ -289,7 +289,7 @@ impl<const N: usize> Mixer<N> {
     #[inline(always)]
     fn within_limits(&self, wanted: &Inputs, mut tilt: SVector<f32, N>) -> (Inputs, SVector<f32, N>) {
         let Inputs { mut roll_n, mut pitch_n, mut yaw_n, mut thrust_n } = *wanted;
-        // Range of thrusts at which roll and pitch fit the limits; empty if `least` exceeds `most`.
+        // Roll and pitch fit the limits at thrusts from `least` to `most`. No thrust fits if `least` exceeds `most`.
         let least = -lowest(&tilt);
         let most = match self.common_most {
             // Loads come in pairs of opposite signs, so the highest is minus the lowest.
@@ -301,7 +301,7 @@ impl<const N: usize> Mixer<N> {
         if least <= most && least <= raised {
             thrust_n = math::max(math::min(thrust_n, most), least);
         } else {
-            // Largest load, relative to its limit, at the least thrust.
+            // `excess` is the largest load at the least thrust, relative to its limit.
             let excess = match self.common_most {
                 Some(own) => (least + own - most) / own,
                 None => highest(&tilt.add_scalar(least).component_div(&self.most)),

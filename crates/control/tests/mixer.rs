@@ -145,7 +145,8 @@ fn serves_in_order<const N: usize>(
     let exact = inverse * wanted;
     prop_assume!(exact.min() < -1e-4 || exact.max() > limit_n + 1e-4);
     let tilt = inverse.column(0) * wanted.x + inverse.column(1) * wanted.y;
-    // Range of thrusts at which no force of `tilt` violates its limits; empty if the first exceeds the second.
+    // `thrusts` returns the range of thrusts at which no force of `tilt` violates its limits. The range is empty if the
+    // first thrust exceeds the second.
     let thrusts = |tilt: &SVector<f64, N>| {
         (-tilt.component_div(&share).min(), (tilt.map(|force| limit_n - force)).component_div(&share).min())
     };

@@ -73,7 +73,7 @@ impl<D: SpiDevice> Registers for SpiRegisters<D> {
         match *bytes {
             [] => self.device.write(&[head]).await,
             [byte] => self.device.write(&[head, byte]).await,
-            // Two operations, so that a block is not copied: the BMI270's has 8 KiB.
+            // Two operations avoid copying the block, since the BMI270's has 8 KiB.
             _ => self.device.transaction(&mut [Operation::Write(&[head]), Operation::Write(bytes)]).await,
         }
         .map_err(|_| BusError)

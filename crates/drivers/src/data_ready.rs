@@ -83,7 +83,8 @@ impl<E: DataReadyPin, C: PartTiming> PartTiming for DataReady<E, C> {
         if is_faster && self.is_wired {
             self.clock.ready(us).await;
         }
-        // Two periods in all: a faster part has already waited for one of them. Without edges, only the clock counts.
+        // The wait lasts two periods in all. For a faster part, one of them is over already. Without edges, the clock
+        // alone decides.
         let periods = if self.is_wired && !is_faster { 2 } else { 1 };
         let edge_us = self.edge(us, periods).await;
         let sample_us = u64::from(us / 2);

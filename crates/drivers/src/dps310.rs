@@ -83,7 +83,7 @@ const DPS310: &[ScriptStep] = &[
     ScriptStep::Await(MEAS_CFG, COEF_RDY | SENSOR_RDY, COEF_RDY | SENSOR_RDY, 100),
     ScriptStep::Read(COEF, COEF_LENGTH),
     ScriptStep::Read(COEF, COEF_LENGTH),
-    // Undocumented; without these writes, some parts read a wrong temperature.
+    // No document describes these writes. Without them, some parts read a wrong temperature.
     ScriptStep::Write(0x0E, 0xA5),
     ScriptStep::Write(0x0F, 0x96),
     ScriptStep::Write(0x62, 0x02),

@@ -91,7 +91,7 @@ impl NmeaDecoder {
         if !is_measured {
             return Some(None);
         }
-        // Sentences of two epochs: the older sentence is overwritten when its successor comes.
+        // If the two sentences are of different epochs, the older sentence is overwritten when its successor comes.
         let (fix, motion) = (self.fix?, self.motion?);
         if fix.time_ms != motion.time_ms {
             return None;

@@ -121,7 +121,7 @@ proptest! {
         survives::<Mpu9250Ak8963>(&bytes, |reading| {
             check(&reading.inertial, Mpu9250Ak8963::NAME)?;
             if let Ok(Some(magnetic)) = reading.magnetic {
-                // +-4914 uT, times the largest sensitivity factor.
+                // The range is +-4914 uT, times the largest sensitivity factor.
                 prop_assert!(magnetic.field_ut.amax() <= 4914.1 * 1.5, "{}", magnetic.field_ut);
             }
             Ok(())

@@ -165,7 +165,7 @@ impl Registers {
 impl Model for Registers {
     fn read(&mut self, now_us: u64, register: u8, into: &mut [u8]) {
         self.reads = self.reads.wrapping_add(1);
-        // No register access in the first 2.5 ms.
+        // The part does not answer within the first 2.5 ms after power-up.
         let answers = now_us - self.since_us >= 2_500;
         for (register, byte) in (usize::from(register)..).zip(into) {
             *byte = if answers { self.byte(now_us, register) } else { 0xFF };
@@ -208,7 +208,7 @@ fn right(reading: &PressureReading) -> bool {
 
 #[test]
 fn both_pass_the_suite() {
-    // The SPL07-003, whose coefficients are more.
+    // The other part is the SPL07-003, which has more coefficients.
     let others = |is_spl06| vec![(Registers { identity: 0x11, ..Registers::new(is_spl06) }, 0x11)];
     let (others, pace, notice_us) = ([false, true].map(others), || Pace::Polled(318..=322), 1_000_000);
     let [of_dps310, of_spl06] = others;

@@ -86,7 +86,7 @@ fn spi_is_framed_as_each_part_has_it() {
     // MS5611 has commands instead of registers.
     assert_eq!(on_spi::<Ms5611>(0xA2)[0], (vec![0xA2], 2));
     assert_eq!(on_spi::<Ms5611>(0x48)[2], (vec![0x48], 0));
-    // Address auto-increment, which has different bits on SPI and I2C.
+    // The bit for automatic increment of the address differs between SPI and I2C.
     assert_eq!(on_spi::<Lis3mdl>(0x28 | 0x80)[0], (vec![0xE8], 2));
     assert_eq!(on_spi::<Lis3mdl>(0x20)[1], (vec![0x60, 0x55], 0));
 }

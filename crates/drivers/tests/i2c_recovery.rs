@@ -76,7 +76,7 @@ impl Bus {
         }
     }
 
-    /// Rising clock edge: the part reads the data line.
+    /// Reads the data line, as the part does at a rising edge of the clock.
     fn rises(&mut self) {
         match &mut self.amid {
             Amid::Sends { left: 0, .. } if self.is_data_released => self.amid = Amid::Nothing,
@@ -85,11 +85,11 @@ impl Bus {
         }
     }
 
-    /// Falling clock edge: the part changes the data line.
+    /// Changes the data line, as the part does at a falling edge of the clock.
     fn falls(&mut self) {
         match &mut self.amid {
             Amid::Sends { bits, left, .. } if *left > 0 => (*bits, *left) = (*bits << 1, *left - 1),
-            // Acknowledged: sends the next byte.
+            // The last byte was acknowledged, so the part sends the next byte.
             Amid::Sends { left, .. } => *left = 8,
             Amid::Takes { taken } if *taken == 8 => {
                 self.mistaken += 1;

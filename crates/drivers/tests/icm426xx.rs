@@ -166,7 +166,7 @@ fn factory(trim: u8) -> f64 {
 
 #[test]
 fn its_self_test_passes_as_at_the_factory_and_the_part_reads_on() {
-    // Passes if a rate responds by at least half, a force by 0.5 to 1.5.
+    // The self-test passes if a rate responds by at least half, and a force by 0.5 to 1.5.
     for (axis, response, passes) in [
         (0, 1.0, true),
         (1, -0.55, true),
@@ -187,7 +187,7 @@ fn its_self_test_passes_as_at_the_factory_and_the_part_reads_on() {
         let right = |reading: &InertialReading| reads(reading, [1.0, -19.0, 0.5], [0.1, -0.2, 1.0], 31.0);
         assert!(faults.is_empty() && readings.len() > 100 && readings.iter().all(|reading| right(&reading.value)));
     }
-    // A part that is turning, and one that does not answer.
+    // The self-test fails if the part turns, or does not answer.
     let rig = Rig::new(Registers::new(0x47));
     rig.with(|part| part.rates_deg_s = [0.0, 0.0, 25.0]);
     assert_eq!(block_on(rig.driver(Icm42688p::<true> {}).self_test()), Err(PartFault::SelfTest));
@@ -216,7 +216,7 @@ fn all_pass_the_suite() {
     passes::<0x42, true>(0x47);
 }
 
-/// The part shows the current rates during any motion.
+/// The part always shows the present rates, however it moves.
 fn follows_every_turn<const IDENTITY: u8, const POLLED: bool>() {
     for (middle, swing) in [(0.0, 90.0), (0.0, 150.0), (100.0, 20.0), (-100.0, 5.0), (-300.0, 600.0), (0.0, 1900.0)] {
         let rig = Rig::new(Registers::new(IDENTITY));
@@ -224,7 +224,7 @@ fn follows_every_turn<const IDENTITY: u8, const POLLED: bool>() {
         let mut driver = rig.driver(Icm426xx::<IDENTITY, POLLED> {});
         let (mut readings, faults) = run(&mut driver, &rig, 500_000);
         assert!(faults.is_empty() && readings.len() > 400, "{middle}, {swing}: {faults:?}");
-        // A part that was reset meanwhile gets the same settings.
+        // If the part is reset in the meantime, the driver writes the same settings again.
         rig.set(Trouble::Reset);
         rig.set(Trouble::None);
         let _ = run(&mut driver, &rig, 300_000);

@@ -72,7 +72,7 @@ fn tested<P: SensorPart>(part: P, identity: u8, trims: [[u8; 4]; 2], responses: 
     result
 }
 
-/// RM-MPU-6000A: responses are powers of a factor times 25 deg/s and 0.34 g; the rate about y is negative.
+/// The responses are powers of a factor times 25 deg/s and 0.34 g, and the rate about y is negative (RM-MPU-6000A).
 #[test]
 fn the_self_test_of_the_mpu_6000_passes_within_14_percent() {
     // Codes: XG 17, YG 1, ZG 31; XA 22 = 0b10110, YA 9 = 0b01001, ZA 31.

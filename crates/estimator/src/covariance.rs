@@ -170,7 +170,8 @@ impl Covariance {
     pub(crate) fn predict(&mut self, interval: &PredictionInterval, growth: &ProcessNoise) {
         let PredictionInterval { time_s, turn, thrust } = interval;
         let (t, c, s) = (*time_s, turn, thrust);
-        // Position first, rotation last: each substitution then reads values from the beginning of the interval.
+        // Blocks are replaced in the order from position to rotation. So each block is computed from values at the
+        // beginning of the interval.
         self.slow.predict(interval);
 
         // p' = p + T v.

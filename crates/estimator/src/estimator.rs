@@ -77,7 +77,8 @@ impl Estimator {
             coast_us: microseconds(settings.coast_s),
             frozen_us: or_never(settings.frozen_s),
             stuck_us: or_never(settings.stuck_s),
-            // Negated: the earth frame's y points west, and declination is positive to the east.
+            // The declination is negated, because the earth frame's y points west and declination is positive to the
+            // east.
             magnetic_north_rad: wrap_angle(-settings.declination_rad),
             magnetic_north: (libm::cosf(settings.declination_rad), -libm::sinf(settings.declination_rad)),
             inclination_error_max: settings.inclination_error_max_rad,

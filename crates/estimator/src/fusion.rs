@@ -136,7 +136,7 @@ impl Estimator {
                     memory.aids.gnss_height.reject(at_us);
                 }
             }
-            // No heading from this field: the vehicle's own field may be as large as the earth's.
+            // This field gives no heading, because the vehicle's own field may be as large as the earth's.
             (Measurement::MagneticField { .. }, _) if self.magnetic_variance >= VAGUE => {
                 count(&mut memory.dropped.disturbed);
                 return false;

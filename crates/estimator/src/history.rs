@@ -191,7 +191,7 @@ impl StateHistory {
         if age(newest) == 0 {
             return Some(*newest);
         }
-        // Bisection for the last entry before `at_us` and the first one after.
+        // Bisection finds the last entry before `at_us` and the first entry after it.
         let (mut later, mut earlier) = (0, self.filled - 1);
         if self.entry(earlier).is_none_or(|oldest| age(oldest) > 0) {
             return None;

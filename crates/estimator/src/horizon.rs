@@ -103,7 +103,7 @@ impl FusionHorizon {
         let at = coordinate;
         let unit = at.unit();
         let none = JacobianRow { coordinate, ..NO_ROW };
-        // Row of an angle, whose innovation is the product of the rotation error with `theta`.
+        // `angle` makes the row of an angle, whose innovation is the product of the rotation error with `theta`.
         let angle = |innovation: f32, theta: Vector3<f32>| {
             (innovation, JacobianRow { theta, gyro: Some(self.turn.tr_mul(&theta)), ..none })
         };

@@ -331,7 +331,7 @@ mod tests {
             let mut last = None;
             for ms in 0..3000 {
                 let mut estimate = estimate(ms, 0.0, 0.0);
-                // A correction, then a position reset, then a heading reset across the half turn.
+                // The estimate makes a correction, then a position reset, then a heading reset across the half turn.
                 let jumps = [(1000, 0.1), (1050, -40.0)];
                 estimate.state.position_m.x += jumps.iter().filter(|(at, _)| ms >= *at).map(|(_, by)| by).sum::<f32>();
                 estimate.moved_m.x = jumps.iter().filter(|(at, _)| ms == *at).map(|(_, by)| by).sum();
@@ -482,7 +482,7 @@ mod tests {
                 let turned_m_s = turn.step(&estimate).velocity_m_s.x - (1.5 * time_s).sin();
                 if ms > 1_000 {
                     assert!(off_m_s.abs() < 1e-3, "{hover_rad_s} rad/s, {ms} ms: {off_m_s} m/s");
-                    // A fifth of the error that the uncompensated delay would make.
+                    // The bound is a fifth of the error that the delay would make without compensation.
                     let most_m_s = 0.2 * 1.5 / hover_rad_s + 2e-4;
                     assert!(turned_m_s.abs() < most_m_s, "{hover_rad_s} rad/s, {ms} ms: {turned_m_s} m/s");
                 }

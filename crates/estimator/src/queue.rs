@@ -31,8 +31,8 @@ impl MeasurementQueue {
     pub(crate) fn push(&mut self, measurement: &Stamped<Measurement>) -> bool {
         let arrived = self.arrived;
         self.arrived = arrived.wrapping_add(1);
-        // Takes a free place, or else the oldest measurement's. Arrival numbers may wrap; the differences between eight
-        // of them stay right.
+        // Takes a free place. Without one, takes the place of the oldest measurement. Arrival numbers may wrap, but the
+        // differences between eight of them stay right.
         let age = |place: &Option<(u32, Stamped<Measurement>)>| {
             place.as_ref().map_or(u32::MAX, |(number, _)| arrived.wrapping_sub(*number))
         };
@@ -109,7 +109,7 @@ pub(crate) struct AidObservation {
     pub(crate) target: ObservedQuantity,
     /// Coordinates that are fused, for a position or velocity.
     pub(crate) axes: FusedAxes,
-    /// Variances of the scalars; a single scalar uses the first one, a vertical one the third.
+    /// Variances of the scalars. A single scalar uses the first variance, a vertical scalar the third.
     pub(crate) variance: Vector3<f32>,
     /// Variance added to a field's direction after clipped or missing samples.
     pub(crate) rough: f32,
@@ -156,9 +156,9 @@ pub(crate) struct PendingFusion {
     /// State at the measurement's time, without corrections.
     pub(crate) past: PastState,
     pub(crate) parts: [Option<AidObservation>; 3],
-    /// Number of the first part's next scalar.
+    /// Number of the scalar of the first part that is fused next.
     pub(crate) next: u8,
-    /// Normalised innovation squared of the first part so far.
+    /// Sum of the normalised innovations squared of the first part's scalars that have been fused.
     pub(crate) nis: f32,
 }
 

@@ -442,7 +442,7 @@ proptest! {
         let at_us = 1_000_000 - tau_ms * 1000;
         let horizon = FusionHorizon::new(&past(&now, 1_000_000), &past(&then, at_us), GRAVITY as f32);
         let field = vector(field) + V3::new(1.0, 0.0, -1.5);
-        // The field that the body measures.
+        // `body` is the field that the body measures.
         let body = (then.r.inverse() * field).map(|x| x as f32);
         let expected = ExpectedReadings { height_offset: 0.0, field: field.map(|x| x as f32) };
         // Derivatives by fields of the vehicle, in shares of the horizontal field.

@@ -237,13 +237,13 @@ fn hours_leave_it_sound() {
             }
         }
         println!("{hours} h: beyond 2 sigma, of {checks}: {over:?}");
-        // One in twenty by chance, and more by chance if there are few checks.
+        // By chance, one error in twenty is beyond. With few checks, the share may be larger.
         let most = if settings == Settings::DEFAULT { checks / 8 } else { checks };
         assert!(over.iter().all(|over| *over <= most), "{over:?} of {checks}");
     }
 }
 
-/// RAM size of an estimator.
+/// An estimator and its memory need less than ten kibibytes of RAM.
 #[test]
 fn fits_in_ten_kibibytes() {
     let (estimator, memory) = (size_of::<Estimator>(), size_of::<Memory>());

@@ -167,7 +167,7 @@ impl DshotReply {
     #[must_use]
     pub fn bits_of_speed(speed_rev_min: u32) -> u16 {
         let period_us = US_PER_MINUTE.checked_div(speed_rev_min).unwrap_or(u32::MAX);
-        // The smallest exponent for which the mantissa fits nine bits.
+        // This is the smallest exponent for which the mantissa fits nine bits.
         let exponent = (u32::BITS - period_us.leading_zeros()).saturating_sub(9);
         let content = if exponent > 7 { STOPPED } else { (exponent << 9 | period_us >> exponent) as u16 };
         content << 4 | !(content ^ content >> 4 ^ content >> 8) & 0xF

@@ -83,7 +83,7 @@ impl Counter {
         let report = &mut self.report;
         let first = self.last_us.is_none();
         let last_us = self.last_us.replace(now_us).unwrap_or(now_us);
-        // 0 if the clock goes back; limited to 71 minutes.
+        // The gap is 0 if the clock goes back, and limited to 71 minutes.
         self.gap_us = u32::try_from(now_us.saturating_sub(last_us)).unwrap_or(u32::MAX);
         report.alive = first || self.gap_us > 0;
         self.window_us = self.window_us.saturating_add(self.gap_us);

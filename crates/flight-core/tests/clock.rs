@@ -83,7 +83,7 @@ fn stamped(clock: impl Fn(u64) -> u64) -> Vec<Sent> {
     (0..END_US).step_by(PERIOD_US as usize).map(at).collect()
 }
 
-/// A clock that steps by `by_us` at the event.
+/// Returns the messages of a sender whose clock steps by `by_us` at the event.
 fn steps(by_us: i64) -> Vec<Sent> {
     stamped(
         move |t| if t < EVENT_US { (t + HOUR_US).wrapping_add(0) } else { (t + HOUR_US).wrapping_add_signed(by_us) },
@@ -99,7 +99,7 @@ fn drifts(ppm: i64) -> Vec<Sent> {
     stamped(move |t| t.wrapping_add_signed(HOUR_US as i64 + t as i64 * ppm / 1_000_000))
 }
 
-/// A clock of this resolution.
+/// Returns messages stamped by a clock of this resolution.
 fn coarse(resolution_us: u64) -> Vec<Sent> {
     stamped(move |t| (t + 12_345) / resolution_us * resolution_us)
 }
@@ -113,7 +113,7 @@ fn jitters(by_us: u64) -> Vec<Sent> {
     sent
 }
 
-/// Two senders with separate clocks. The first one falls silent.
+/// Returns the messages of two senders with separate clocks. The first sender falls silent at `until_us`.
 fn two(until_us: u64) -> Vec<Sent> {
     let mut sent = stamped(|t| t);
     sent.retain(|sent| sent.measured_us < until_us);

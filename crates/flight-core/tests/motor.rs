@@ -81,7 +81,7 @@ fn frames_by_hand() {
     assert_eq!(DshotFrame::new(1046).asking().bits(), 0x82D7);
     assert_eq!(DshotFrame::new(1046).asking().asking().bits(), 0x82D7);
     assert_eq!(DshotFrame::new(0).asking().bits(), 0x0011);
-    // 1046 in bidirectional DSHOT: checksum 9 instead of 6.
+    // In bidirectional DSHOT, the frame of 1046 has the checksum 9 instead of 6.
     assert_eq!(DshotFrame::new(1046).bidirectional().bits(), 0x82C9);
 }
 

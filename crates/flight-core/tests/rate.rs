@@ -110,8 +110,8 @@ proptest! {
         for gap in &gaps {
             times.push(times.last().unwrap_or(&0) + gap);
         }
-        // Expected rate: windows of a second, each from the first tick at least a second after the start of the last
-        // window.
+        // The expected rate is counted in windows of at least a second. Each window ends at its first tick after a
+        // second, where the next window starts.
         let (mut start, mut rate) = (0, None);
         let mut last_off = None;
         for (index, (&now, report)) in times.iter().zip(&reports).enumerate() {

@@ -210,7 +210,7 @@ fn disarming_is_for_the_ground() {
     let mut bench = Bench::flying();
     assert_eq!(bench.answer(Request::Disarm, State::default()), Err(Refusal::InFlight));
     assert_eq!(bench.tick(State::default()).mode, Mode::Flying);
-    // Landing: it descends, stops, and its thrust is low.
+    // To land, the vehicle descends and stops, and its thrust is low.
     assert_eq!(bench.wait(1000, climbing(0.6)), None);
     assert_eq!(bench.wait(1000, climbing(-0.6)), None);
     assert_eq!(bench.answer(Request::Disarm, climbing(-0.6)), Err(Refusal::InFlight));

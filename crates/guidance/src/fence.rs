@@ -12,7 +12,7 @@ pub const MARGIN_M: f32 = 1.0;
 /// Shortest edge of an area \[m\].
 const EDGE_MIN_M: f32 = 0.1;
 /// Longest time until braking begins \[s\]: every boundary must be checked, and the guidance told.
-// 64 boundaries, two after each tick, take 32 ms.
+// Checking 64 boundaries, two after each tick, takes 32 ms.
 const REACTION_S: f32 = 0.06;
 /// Lag of the vehicle behind its setpoint, since it must tilt first \[s\].
 const LAG_S: f32 = 0.25;

@@ -268,7 +268,7 @@ impl Memory {
             home_m: self.home_m,
             battery: given.battery.as_ref(),
             sensors: given.sensors,
-            // Saturates at 71 minutes in 32 bits, longer than any COM_DL_LOSS_T.
+            // The time saturates at 71 minutes in 32 bits, longer than any COM_DL_LOSS_T.
             silent_us: orders
                 .heard_us
                 .map(|heard_us| u32::try_from(given.now_us.saturating_sub(heard_us)).unwrap_or(u32::MAX)),

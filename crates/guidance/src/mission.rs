@@ -270,7 +270,8 @@ impl MissionMemory {
         let first = self.begun.is_none_or(|begun| begun.number != leg.number);
         let present = inputs.present;
         let begun = self.begin(leg, inputs, |_| ItemCourse::Straight);
-        // Subtract the setpoint's own rotation: a difference of headings cannot show more than half a turn.
+        // The remaining turn is reduced by the setpoint's own rotation, because a difference of headings cannot show
+        // more than half a turn.
         begun.yaw_rad = if first { to_turn_rad } else { begun.yaw_rad - present.yaw_rate_rad_s * inputs.dt_s };
         let left_rad = begun.yaw_rad;
         let turned = left_rad.abs() < TURNED_RAD && present.yaw_rate_rad_s.abs() < TURNED_RAD_S;

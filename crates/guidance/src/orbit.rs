@@ -12,12 +12,13 @@ use nalgebra::Vector3;
 pub(crate) const RADIUS_M: core::ops::RangeInclusive<f32> = 1.0..=1000.0;
 /// Radius of an orbit for which none is given \[m\].
 pub const ORBIT_RADIUS_M: f32 = 10.0;
-/// Shares of the acceleration of an approach: the largest centripetal one, and the one along the circle.
+/// Shares of the acceleration of an approach. The first is for the largest centripetal acceleration, the second for the
+/// acceleration along the circle.
 const SHARE: f32 = 0.8;
 const ALONG: f32 = 0.3;
 /// Distance from the circle, horizontally and vertically, at which the orbit starts \[m\].
 const NEAR_M: f32 = 0.5;
-/// Distance between the setpoint and the orbit's moving place beyond which that place waits \[m\].
+/// Largest distance between the setpoint and the orbit's moving place \[m\]. Beyond this distance the place waits.
 const LATE_M: f32 = 2.0;
 
 /// An orbit and its progress.
@@ -75,12 +76,13 @@ impl Orbit {
         let side = if speed_m_s < 0.0 { -1.0 } else { 1.0 };
         let (speed_m_s, along_m_s2) = (side * now_m_s, side * (now_m_s - before_m_s) / inputs.dt_s);
         let rate_rad_s = speed_m_s / radius_m;
-        // Step by the mean speed: otherwise position and velocity would not fit each other.
+        // The place moves by the mean of old and new speed. With another speed, position and velocity would not fit
+        // each other.
         let step_rad = 0.5 * (before_m_s + now_m_s) * side / radius_m * inputs.dt_s;
         let at_rad = wrap_angle(before_rad + step_rad);
         self.round.at_rad = Some(at_rad);
         self.round.turned_rad += step_rad.abs();
-        // The number may wrap around: it only tells this target from the last one.
+        // The number may wrap around, because it only tells this target from the previous target.
         self.round.aims = self.round.aims.wrapping_add(1);
         let (s, c) = (sin(at_rad), cos(at_rad));
         let yaw_rad = self.yaw_rad(at_rad);
@@ -90,11 +92,12 @@ impl Orbit {
                 + Vector3::new(-s, c, 0.0) * along_m_s2,
             yaw_rad,
             yaw_rate_rad_s: if yaw_rad.is_nan() { f32::NAN } else { rate_rad_s },
-            // The target is one of a stream that fits together, so that it passes the limiter unchanged.
+            // The targets form a stream whose motion is continuous, so the limiter passes them unchanged.
             sent_us: Some(self.round.aims.into()),
             ..inputs.to(place(at_rad))
         };
-        // Leave the approach enough speed to catch up with the place on the circle.
+        // The largest speed of the approach is higher than the orbit's speed, so that the vehicle can catch up with the
+        // place on the circle.
         let aim =
             LimiterTarget { speed_m_s: max(aim.speed_m_s, min(speed_m_s.abs() + 1.0, inputs.limits.speed_m_s)), ..aim };
         ModeOutput { done: self.round.turned_rad >= self.angle_rad, ..ModeOutput::fly(aim) }

@@ -143,7 +143,7 @@ impl MotionShaper {
         let MotionShaper { acceleration, jerk, settling, d, .. } = *self;
         let missing = max(acceleration - braking, 0.0);
         let builds_up_s = missing * missing / (2.0 * acceleration * jerk);
-        // Speed at which g reaches A. Below it, the distance is the integral of x/g(x).
+        // This is the speed at which g reaches A. Below it, the distance is the integral of x/g(x).
         let gentle = min((acceleration + 2.0 * d) * acceleration / (2.0 * settling), speed);
         let root = sqrt(d * d + 2.0 * settling * gentle);
         let end = (root * root * root - d * d * d) / (6.0 * settling * settling) + d * gentle / (2.0 * settling);

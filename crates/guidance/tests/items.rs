@@ -88,7 +88,7 @@ fn a_circle_that_cannot_be_flown_is_refused() {
     };
     let around = |centre_m| Order::Orbit { centre_m, radius_m, speed_m_s, angle_deg, heading };
     assert_eq!(bench.order(around(Vector3::new(2e5, 0.0, 5.0))), Err(OrderRefusal::OutOfRange));
-    // Around the present place, at the default speed.
+    // The orbit is flown around the present place, at the default speed.
     let here = bench.state.position_m;
     assert_eq!(bench.order(around(Vector3::repeat(f32::NAN))), Ok(()));
     bench.run(20.0);

@@ -97,7 +97,7 @@ fn a_place_keeps_what_is_not_given() {
     assert_eq!(fixture.order(go(NAN, NAN, 12.0)), Ok(()));
     fixture.run(15_000);
     assert!((fixture.place() - Vector3::new(here.x, here.y, 12.0)).norm() < 1e-3, "{:?}", fixture.place());
-    // Heading and speed as ordered.
+    // The vehicle flies with the ordered heading and speed.
     let mut fixture = Fixture::flying(Settings::DEFAULT);
     let order = Order::GoTo { position_m: Vector3::new(60.0, 2.0, 8.0), yaw_rad: 0.7, speed_m_s: Some(2.0) };
     assert_eq!(fixture.order(order), Ok(()));

@@ -208,7 +208,7 @@ impl<const N: usize> FlightController<N> for Dfbc<N> {
             self.attitude.measure(&mut memory.reaction, &self.body.angular_acceleration(&now), &state.rates_rad_s);
         }
 
-        // Position. The thrust must also compensate drag, and turns as drag changes with the velocity.
+        // The position loop follows. The thrust must also compensate drag, and turns as drag changes with the velocity.
         let up = unit(&r.column(2).into());
         // Thrust for level flight at this tilt, as a share of the hover thrust.
         let share = 1.0 / up.z.max(SHARE_MIN);

@@ -102,7 +102,7 @@ mod tests {
                 assert!(late < 0.005 * h, "{late} of {h} after 30 s");
             }
         }
-        // Bandwidth 0: the nominal weight.
+        // At a bandwidth of 0, the estimate stays at the nominal weight.
         let mut estimate = HoverThrust::default();
         let none = HoverThrustEstimator::new(0.0, G, DT_S);
         (0..1000).for_each(|_| none.advance(&mut estimate, measured(1.5, 1.0), 1.0));

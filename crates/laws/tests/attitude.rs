@@ -66,7 +66,7 @@ fn the_tilt_comes_first_and_yaw_by_its_weight() {
             }
         }
     }
-    // Opposite thrusts, with different axes between them.
+    // The thrusts are opposite, with different axes between them.
     for axis in [Vector3::x_axis(), Vector3::y_axis(), Unit::new_normalize(Vector3::new(1.0, 2.0, 0.0))] {
         let upside_down = Rotation3::from_axis_angle(&axis, core::f32::consts::PI);
         let e = tilt_prioritised_error(&Matrix3::identity(), upside_down.matrix(), 0.4);
@@ -87,7 +87,8 @@ fn quaternions_match_their_matrices() {
 
 #[test]
 fn desired_rates_are_the_derivative_of_the_desired_attitude() {
-    // A changing specific force and heading: R_d by differences in f64, Omega_d = (R_d' dR_d/dt)^v.
+    // Specific force and heading change. The desired attitude R_d is differentiated in f64, and the desired rates are
+    // Omega_d = (R_d' dR_d/dt)^v.
     for [size, pace] in [[1.0, 1.0], [2.5, 1.0], [2.5, 2.5]] {
         rates_of([size, pace]);
     }

@@ -186,7 +186,7 @@ fn change_sector(change: &Change) -> usize {
     }
 }
 
-/// Returns true if a change writes a log's length, at its end.
+/// Returns true if a change writes the length of a log, which happens when the log ends.
 fn is_end(change: &Change) -> bool {
     matches!(change, Change::Program(at, _) if at % SECTOR == 24)
 }

@@ -271,8 +271,8 @@ proptest! {
     }
 }
 
-/// Found by a random test: a frame whose checksum ends in 0xFD loses its last byte, and the first byte of the next
-/// frame completes it. The next frame then lacks its first byte.
+/// A random test found this case. A frame whose checksum ends in 0xFD loses its last byte, and the first byte of the
+/// next frame completes it. The next frame then lacks its first byte.
 #[test]
 fn a_truncated_frame_may_be_completed_by_the_start_of_the_next() {
     let x = 33.915_356;
@@ -418,8 +418,8 @@ fn gaps_between_sequence_numbers_are_counted() {
     assert_eq!(decode([sent[9].as_slice(), &foreign, &sent[10]]).1.lost, 0, "two senders");
 }
 
-/// TUNNEL, FILE_TRANSFER_PROTOCOL and LOG_DATA for another system, containing a disarm command: nothing within is
-/// delivered, whatever follows. In a frame of an unknown dialect or a damaged one, nothing is delivered if a frame
+/// Nothing within a TUNNEL, FILE_TRANSFER_PROTOCOL or LOG_DATA for another system is delivered, not even a disarm
+/// command, whatever follows. From a frame that is damaged or of an unknown dialect, nothing is delivered if a frame
 /// follows.
 #[test]
 fn a_frame_that_carries_another_is_skipped_whole() {

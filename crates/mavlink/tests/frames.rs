@@ -26,7 +26,7 @@ fn with_attitude(attitude: [f32; 4]) -> Odometry {
 #[test]
 fn known_attitudes() {
     let half = core::f32::consts::FRAC_1_SQRT_2;
-    // (quaternion on the wire, its meaning, roll, pitch and yaw in the workspace's frames)
+    // Each case has the quaternion as sent, its meaning, and roll, pitch and yaw in the workspace's frames.
     let cases = [
         ([1.0, 0.0, 0.0, 0.0], "level, nose north", [0.0, 0.0, 0.0]),
         ([half, 0.0, 0.0, half], "nose east: to the right", [0.0, 0.0, -FRAC_PI_2]),
@@ -55,7 +55,8 @@ fn positive_pitch_of_ours_tilts_the_thrust_forwards() {
 
 #[test]
 fn velocity_is_in_the_child_frame() {
-    // Nose east, flying forward at 1 m/s and sinking at 2 m/s, which is along -y and -z in the workspace's frame.
+    // The vehicle's nose points east. It flies forward at 1 m/s and sinks at 2 m/s, which is along -y and -z in the
+    // workspace's frame.
     let half = core::f32::consts::FRAC_1_SQRT_2;
     let mut odometry = with_attitude([half, 0.0, 0.0, half]);
     odometry.velocity_m_s = Vector3::new(1.0, 0.0, 2.0);

@@ -206,11 +206,11 @@ impl RegisterAccess {
         let [a, b, c, d] = code;
         let (first, second) = (u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d]));
         let (is_load, register, length) = match first >> 12 {
-            // LDR and STR in the wide encoding, also of bytes and half-words.
+            // These are LDR and STR in the wide encoding, also of bytes and half-words.
             0xF if first & 0xFE00 == 0xF800 => (first >> 4 & 1 == 1, second >> 12, 4),
-            // LDR and STR whose address is a register plus a register.
+            // These are LDR and STR whose address is a register plus a register.
             0x5 => (first >> 9 & 7 >= 3, first & 7, 2),
-            // LDR and STR whose address is a register plus an offset.
+            // These are LDR and STR whose address is a register plus an offset.
             0x6..=0x8 => (first >> 11 & 1 == 1, first & 7, 2),
             _ => {
                 return Err(Error::Protocol(format!(

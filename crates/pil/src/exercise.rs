@@ -15,7 +15,7 @@ pub const TICKS: u64 = 6_000;
 pub fn bytes_of_tick(station: &mut Station, tick: u64) -> Vec<u8> {
     // The vehicle is at rest until it is armed.
     let (state, setpoint) = motion(tick.saturating_sub(ARMED) as f32 * 1e-3);
-    // Two gaps in the states: a short one that ends while coasting, and a long one that ends in a descent.
+    // The states have two gaps: a short gap that ends while coasting, and a long gap that ends in a descent.
     let tracked = !(2_500..2_600).contains(&tick) && !(4_000..5_000).contains(&tick);
     if tracked {
         station.track(tick * 1000, state);

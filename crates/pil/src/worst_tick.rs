@@ -100,7 +100,7 @@ struct EmulatedFlight {
 impl EmulatedFlight {
     /// Draws a number in -1..1.
     fn number(&mut self) -> f32 {
-        // 24 random bits, which an f32 holds exactly.
+        // An f32 holds 24 random bits exactly.
         (self.random.next_u64() >> 40) as f32 / (1 << 23) as f32 - 1.0
     }
 

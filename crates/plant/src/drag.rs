@@ -64,8 +64,8 @@ impl Drag {
         step_s: f64,
     ) -> Result<(), OutOfRange> {
         self.validate()?;
-        // Largest rate at which a force in the rotor plane changes the velocity of its hub, as the force pushes, tilts
-        // and turns the vehicle.
+        // `rate_max` bounds the rate at which a force in the rotor plane changes the velocity of its hub. The force
+        // pushes, tilts and turns the vehicle.
         let Parameters { mass_kg, arm_m, inertia_kg_m2: i, .. } = vehicle;
         let (height_m, rate_max) = (self.rotor_height_m, RATE_PER_STEP_MAX / step_s);
         let hub_per_kg = 1.0 / mass_kg + height_m * height_m / i.x.min(i.y) + arm_m * arm_m * frame.square_max() / i.z;

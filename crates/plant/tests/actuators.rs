@@ -201,7 +201,7 @@ fn more_than_a_battery_can_give_is_not_given() {
     let battery = BatteryModel { resistance_ohm: 1.0, avionics_w: 1000.0, ..BatteryModel::THREE_CELLS };
     let mut plant = plant(Rotors { battery: Some(battery), ..Rotors::default() });
     plant.step(&command(200.0), STEP_S);
-    // A matched load: half of the voltage.
+    // The load matches the battery's resistance, so the voltage falls to a half.
     let BatteryState { voltage_v, current_a, .. } = battery_of(&plant);
     assert!((voltage_v - 6.3).abs() < 1e-9 && (current_a - 6.3).abs() < 1e-9);
 }

@@ -256,7 +256,7 @@ fn pitching_through_90_degrees_is_nothing_special() {
 /// Halving the step divides the method's error by 16.
 #[test]
 fn the_integrator_is_of_fourth_order() {
-    // A linear oscillator, and a nonlinear equation: dx/dt = -x^2, x(t) = 1/(1 + t).
+    // The equations are a linear oscillator, and dx/dt = -x^2 with the solution x(t) = 1/(1 + t).
     let linear = |x: &SVector<f64, 2>| SVector::from([x[1], -x[0]]);
     let nonlinear = |x: &SVector<f64, 1>| SVector::from([-x[0] * x[0]]);
     let errors = |steps: u32| {

@@ -169,7 +169,7 @@ fn blades(drag: &Drag, motion: &Motion, wind: &Vector3<f64>, speeds: &RotorSpeed
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Galilean invariance: for an observer who drifts with the wind, the flight is one in still air.
+    /// By Galilean invariance, an observer who drifts with the wind sees a flight in still air.
     #[test]
     fn wind_is_motion_of_the_frame(
         velocity in vector(10.0),

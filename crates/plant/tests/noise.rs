@@ -34,7 +34,8 @@ fn normal_numbers_have_a_normal_distributions_moments() {
 #[test]
 fn normal_numbers_have_a_normal_distributions_tails() {
     let x = normals(2, NoiseStream::Wind);
-    // Through the layers' cores and edges, and beyond 3.654, where the tail is drawn separately.
+    // The limits pass through the cores and edges of the layers. They end beyond 3.654, where the tail is drawn
+    // separately.
     for limit in [-4.5, -4.0, -3.654_152_9, -3.0, -1.0, -0.215, 0.0, 0.1, 0.5, 2.0, 3.5, 3.654_152_9, 3.8, 4.2] {
         let below = mean(x.iter().map(|&x| if x < limit { 1.0 } else { 0.0 }));
         let p = 0.5 * libm::erfc(-limit / core::f64::consts::SQRT_2);
@@ -63,7 +64,7 @@ fn streams_and_seeds_are_independent_and_reproducible() {
 #[test]
 fn several_at_once_are_those_one_by_one() {
     let (mut at_once, mut one_by_one) = (Noise::new(7, NoiseStream::Imu), Noise::new(7, NoiseStream::Imu));
-    // Enough numbers for tails and edges of layers.
+    // So many numbers also reach the tails and the edges of the layers.
     for _ in 0..100_000 {
         let five: [f64; 5] = at_once.normals();
         assert_eq!(five, [(); 5].map(|()| one_by_one.normal()));

@@ -170,7 +170,7 @@ fn a_png_has_its_pixels_and_shows_the_line() {
     let red = share(&|pixel| pixel == RED);
     assert!((0.002..0.05).contains(&red), "{red}");
     assert!(share(&|pixel| pixel == [255; 3]) > 0.4, "paper");
-    // Colour of the band: a fifth of the line's colour on white.
+    // The band has a fifth of the line's colour on white.
     let band = RED.map(|part| (255.0 + 0.2 * (f64::from(part) - 255.0)).round());
     let near = |pixel: [u8; 3]| pixel.iter().zip(band).all(|(part, band)| (f64::from(*part) - band).abs() < 3.0);
     assert!(share(&near) > 0.02);

@@ -114,7 +114,7 @@ pub(crate) fn collect(
 pub(crate) fn sparse<T>(samples: Vec<T>, apart_us: u64, at_us: impl Fn(&T) -> u64) -> Vec<T> {
     let mut last_us: Option<u64> = None;
     let keep = |sample: &T| {
-        // Saturating, since a damaged log may contain any time.
+        // The sum saturates, since a damaged log may contain any time.
         let keep = last_us.is_none_or(|last_us| at_us(sample) >= last_us.saturating_add(apart_us));
         if keep {
             last_us = Some(at_us(sample));

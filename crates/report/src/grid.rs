@@ -125,7 +125,7 @@ impl Grid {
     }
 
     fn markdown(&self) -> String {
-        // Characters that Markdown takes for links, columns and emphasis.
+        // Markdown takes these characters for links, columns and emphasis.
         let escaped = |text: &str| {
             text.chars().fold(String::new(), |mut escaped, c| {
                 if matches!(c, '[' | ']' | '|' | '*' | '_' | '<' | '`' | '\\') {

@@ -13,7 +13,7 @@ use std::collections::BTreeSet;
 fn events_that_overlap_are_distinguished_and_each_has_its_label() {
     let out = folder("events");
     flights::write(&open(&out), &flown(&eventful(), &["afbc"]), &[]).unwrap();
-    // Label, start and end of each shaded event [s].
+    // Each shaded event has a label, a start and an end [s].
     let bands = [
         ("mass +10 %", 1.0, 8.0),
         ("inertia −10 %", 2.0, 9.0),
@@ -94,7 +94,7 @@ fn two_of_the_same_that_overlap_are_distinguished() {
     flights::write(&open(&out), &flown(&two, &["afbc"]), &[]).unwrap();
     for (name, svg) in &svgs(&out) {
         let svg = Document::parse(svg).unwrap();
-        // Bands on the time axis, and wide lines along the reference, one wider than the other.
+        // Bands lie on the time axis. Wide lines follow the reference, one wider than the other.
         let is_band = |node: &Node<'_, '_>| node.has_tag_name("polyline") && number(*node, "stroke-width") > 30.0;
         let boxes = boxes(&svg);
         let rows = boxes.iter().filter(|(_, [.., height])| *height < 80.0).filter_map(|(row, _)| row.attribute("fill"));

@@ -119,7 +119,7 @@ fn captions_explain_exactly_what_the_figure_shows() {
     let said = captions(&chatter);
     assert_eq!(said.iter().filter(|text| text.contains("chatter")).count(), 1, "{said:?}");
 
-    // Comparisons: seeds are only mentioned if there are several, and losses only if there are some.
+    // A comparison mentions seeds only if there are several, and losses only if there are some.
     for (seeds, loses) in [(1, false), (3, false), (1, true)] {
         let scenario = if loses { falling.clone() } else { hover(6.0) };
         let scenario = Scenario { contenders: vec![named("afbc")], ..scenario };

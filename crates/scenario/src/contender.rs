@@ -114,7 +114,7 @@ impl Contender {
         limits.acceleration_max_m_s2 = limits.acceleration_max_m_s2.max(G_M_S2 * libm::tanf(tilt_max_rad));
         let Ok(()) = self.law.visit_mut(&mut |declaration: &Declaration, value: DeclaredValueMut<'_>| {
             if let (TILT_MAX, DeclaredValueMut::Single([tilt])) = (declaration.range.name, value) {
-                // No further than the law's range, or its controller would be refused.
+                // The tilt stays within the law's range, or the law's controller would be refused.
                 *tilt = tilt.max(tilt_max_rad).min(declaration.range.max as f32);
             }
             Ok::<(), Infallible>(())

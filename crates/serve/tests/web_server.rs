@@ -219,7 +219,7 @@ fn hostile_clients_cost_the_flight_nothing() {
     let mut flight = Flight::new(None);
     let mut good = flight.socket("");
     let mut held = Vec::new();
-    // Request heads that never end, garbage, and half of a TLS handshake.
+    // The clients send request heads that never end, half of a TLS handshake, nothing, and garbage.
     for bytes in [&b"GET / HTTP/1.1\r\nHost:"[..], b"\x16\x03\x01\x02\x00", b"", &[b'A'; 20_000]] {
         let mut stream = flight.connect();
         let _ = stream.write_all(bytes);

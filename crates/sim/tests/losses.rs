@@ -60,9 +60,9 @@ fn never_left_the_ground() {
 fn on_the_ground_below_its_reference() {
     let flight = format!("duration_s = 12.0\n{HOVER}[[payload]]\nmass_kg = 1.0\nstart_s = 5.0\n");
     assert_lost(&flight, "on the ground below its reference", 5.0 + GROUNDED_S..7.5 + GROUNDED_S);
-    // No loss if the reference is hardly higher than the standing vehicle.
+    // The vehicle does not count as lost if the reference is hardly higher than the standing vehicle.
     assert_eq!(end(&flight.replace("[0, 0, 1]", "[0, 0, 0.3]")), None);
-    // No loss if the flight ends before the time limit.
+    // The vehicle does not count as lost if the flight ends before the time limit.
     assert_eq!(end(&flight.replace("12.0", "7.5")), None);
 }
 

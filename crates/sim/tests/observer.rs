@@ -115,8 +115,8 @@ fn velocity_and_rates_are_those_of_the_plant() {
     // Without compensation of its delay, a pose of 12 ms ago would be off by 0.011 rad at this flight's 0.9 rad/s, and
     // by 0.012 m at its 1 m/s.
     assert!(perfect.attitude_rad < 1e-3 && perfect.rates_rad_s < 0.03, "{perfect:?}");
-    // Bounds: a tenth of the flown velocities, a fifth of the rates, and the tracker's attitude noise, which is 0.006
-    // rad over three axes.
+    // The bounds are a tenth of the flown velocities, a fifth of the rates, and the tracker's attitude noise, which is
+    // 0.006 rad over three axes.
     for errors in [perfect, noisy, windy, weak] {
         assert!(errors.position_m < 0.01 && errors.velocity_m_s < 0.15, "{errors:?}");
         assert!(errors.attitude_rad < 0.007 && errors.rates_rad_s < 0.15, "{errors:?}");

@@ -55,7 +55,8 @@ impl Rotor<f64> {
 }
 
 /// Rotors of a vehicle with any accepted number of them, in the order of the motor outputs.
-// By coordinate: eight `Rotor`s with their count would take 32 bytes more in each copy of a configuration.
+// The rotors are stored by coordinate. Eight `Rotor`s with their count would take 32 bytes more in each copy of a
+// configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rotors {
     x: [f32; ROTORS_MAX],

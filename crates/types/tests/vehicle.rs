@@ -15,7 +15,7 @@ fn vector(most: f64) -> impl Strategy<Value = Vector3<f64>> {
     prop::array::uniform3(-most..most).prop_map(Vector3::from)
 }
 
-/// A vehicle of a different size than the paper's.
+/// Draws a vehicle of a different size than the paper's.
 fn parameters() -> impl Strategy<Value = Parameters<f64>> {
     let factors = (1e-6_f64..1e-2, 1e-8_f64..1e-3, 1e-7_f64..1e-2);
     (0.1_f64..50.0, 0.05_f64..2.0, prop::array::uniform3(1e-4_f64..10.0), factors, 1.0_f64..20.0).prop_map(
@@ -39,7 +39,7 @@ fn close(a: f64, b: f64) -> bool {
 }
 
 proptest! {
-    /// The inputs turn the vehicle like the forces at their places and the rotors' drag.
+    /// The moments of the inputs equal those of the rotor forces at their places and of the rotors' drag.
     #[test]
     fn inputs_are_the_moments_of_the_forces(
         vehicle in parameters(),

@@ -258,7 +258,7 @@ fn the_estimators_settings_are_the_files() {
         let there = changed("racer", "[vehicle]", &format!("[vehicle]\ngravity_m_s2 = {vehicle_m_s2}"));
         assert_eq!(parse("my.toml", &there, "my").unwrap().estimation.gravity_m_s2, estimator_m_s2);
     }
-    // The example in docs/estimation.md.
+    // The example in docs/estimation.md must be readable.
     let page = include_str!("../../../docs/estimation.md");
     let example = page.split("```toml\n").find(|block| block.starts_with("[estimator]")).unwrap();
     let example = example.split("```").next().unwrap();

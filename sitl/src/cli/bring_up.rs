@@ -137,7 +137,7 @@ fn date(time: SystemTime) -> String {
         year += 1;
     }
     let mut month = 1;
-    // Eleven months: what remains is December.
+    // The list has eleven months, and December has the rest.
     for days in [31, 28 + u64::from(is_leap(year)), 31, 30, 31, 30, 31, 31, 30, 31, 30] {
         if day < days {
             break;

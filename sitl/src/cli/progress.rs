@@ -92,7 +92,7 @@ impl CommandProgress {
     /// Adds to the number of units done.
     pub(crate) fn add(&self, more: u64) {
         let mut state = self.shared.state();
-        // 128 bits, so that the product of two counts cannot overflow.
+        // The product of two counts cannot overflow 128 bits.
         let part = |done: u64| u128::from(done) * u128::from(PARTS) / u128::from(self.shared.total.max(1));
         let old = part(state.count.done);
         state.count.done += more;

@@ -94,7 +94,7 @@ impl Document {
         text
     }
 
-    /// Returns every declared value, by table, header and key.
+    /// Returns every declared value with its table, header and key.
     pub(crate) fn declared(&self) -> BTreeMap<(usize, String), String> {
         let tables = self.tables.iter().enumerate();
         let all = tables.flat_map(|(at, (header, entries))| entries.iter().map(move |entry| (at, header, entry)));
@@ -104,7 +104,7 @@ impl Document {
             .collect()
     }
 
-    /// Returns the names and values of `other` that differ.
+    /// Returns the names and values of `other` that differ from this file's.
     pub(crate) fn differing(&self, other: &Document) -> Vec<(String, String)> {
         let (own, others) = (self.declared(), other.declared());
         assert_eq!(own.keys().collect::<Vec<_>>(), others.keys().collect::<Vec<_>>());
@@ -133,7 +133,7 @@ impl Document {
     }
 }
 
-/// Returns other values to try, coordinate by coordinate.
+/// Returns values to try in place of `value`, for each of its coordinates.
 fn cases(declaration: &Declaration, value: &DeclaredValue<'_>) -> Vec<(Option<char>, Vec<String>)> {
     let range = declaration.range;
     let near = |number: f64| {

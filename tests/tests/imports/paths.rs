@@ -69,7 +69,8 @@ pub(crate) fn in_strings(tokens: &TokenStream) -> Vec<Named> {
 
 fn walk(tokens: &TokenStream, prefix: &[String], found: &mut Vec<Named>) {
     let mut tokens = tokens.clone().into_iter().peekable();
-    // The last token, if it shows that the next word is not a path but a field, a lifetime or a variable of the macro.
+    // `before` is the last token, if it shows that the next word is not a path but a field, a lifetime or a variable of
+    // the macro.
     let mut before = ' ';
     while let Some(token) = tokens.next() {
         match token {
@@ -104,7 +105,7 @@ fn path(mut names: Path, tokens: &mut Peekable<impl Iterator<Item = TokenTree> +
         }
         match ahead.next() {
             Some(TokenTree::Ident(word)) => names.push(word.to_string()),
-            // A tree of paths, such as crate::{a, b::c}.
+            // The tokens are a tree of paths, such as crate::{a, b::c}.
             Some(TokenTree::Group(group)) if group.delimiter() == Delimiter::Brace => {
                 *tokens = ahead;
                 return walk(&group.stream(), &names, found);

@@ -353,7 +353,7 @@ impl<const ROW: usize> Machine for F405<ROW> {
         false
     }
 
-    /// The UART that the board reserves for a radio receiver.
+    /// Attaches the wire to the UART that the board reserves for a radio receiver.
     fn attach_radio(&mut self, wire: UartWire) -> Option<f32> {
         self.mcu.stm32.usart[Self::WIRING.radio?].attach(wire);
         Some(0.0)

@@ -103,7 +103,7 @@ fn ranking(results: &[Score], contender: usize, baseline: usize) -> Ranking {
 }
 
 fn difference(results: &[Score], contender: usize, baseline: usize) -> Option<RankingDifference> {
-    // Differences of each seed.
+    // The differences of the two contenders are collected for each seed.
     let mut seeds: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
     for result in results {
         if let (Some(own_m), Some(other_m)) = (result.of(contender), result.of(baseline)) {

@@ -35,7 +35,8 @@ impl Median {
 /// Returns the largest rank, from 1 on, at which the two values of that rank from both ends enclose the median with the
 /// wanted confidence; none if not even the extremes do.
 fn rank(count: usize) -> Option<usize> {
-    // Logarithm of the probability that exactly `below` values are below the median. 2^-count itself would underflow.
+    // `logarithm` is that of the probability that exactly `below` values are below the median. 2^-count itself would
+    // underflow.
     let mut logarithm = -(count as f64) * core::f64::consts::LN_2;
     let (mut outside, mut rank) = (0.0, 0);
     for below in 0..count / 2 {

@@ -316,8 +316,8 @@ mod tests {
         status.aux.powered_up_us = 0;
         assert_eq!(compose(id::SYSTEM_TIME, &status), time(0));
         let Telemetry::Version(version) = reported(id::AUTOPILOT_VERSION, &status) else { panic!("another") };
-        // MISSION_INT, COMMAND_INT, PARAM_ENCODE_BYTEWISE, SET_ATTITUDE_TARGET, both SET_POSITION_TARGET and MAVLINK2;
-        // also FTP if there is storage.
+        // The bits mean MISSION_INT, COMMAND_INT, PARAM_ENCODE_BYTEWISE, SET_ATTITUDE_TARGET, both SET_POSITION_TARGET
+        // and MAVLINK2. With storage, FTP is added.
         let bits = [2, 3, 4, 6, 7, 8, 13];
         assert_eq!(version.capabilities, bits.into_iter().map(|bit| 1 << bit).sum::<u64>());
         let stored = VehicleStatus { has_files: true, ..status };

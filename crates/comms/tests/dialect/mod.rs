@@ -16,11 +16,11 @@ pub(crate) fn expected(message: &MavMessage) -> Expected {
     use Expected::{Answer, None};
     use MavMessage as M;
     match message {
-        // Ping protocol and time synchronisation: the same message is sent back.
+        // PING and TIMESYNC are answered with the same message.
         M::PING(_) => Answer(&[4]),
         M::TIMESYNC(_) => Answer(&[111]),
-        // Commands: COMMAND_ACK. SET_MODE and SET_HOME_POSITION are older commands. SET_HOME_POSITION is answered with
-        // HOME_POSITION too: "vehicle should emit ... irrespective of whether it has changed".
+        // Commands are answered with COMMAND_ACK. SET_MODE and SET_HOME_POSITION are older commands. SET_HOME_POSITION
+        // is answered with HOME_POSITION too: "vehicle should emit ... irrespective of whether it has changed".
         M::COMMAND_LONG(_) | M::COMMAND_INT(_) | M::SET_MODE(_) => Answer(&[77]),
         M::SET_HOME_POSITION(_) => Answer(&[77, 242]),
         M::SET_GPS_GLOBAL_ORIGIN(_) => Answer(&[49]),
@@ -30,7 +30,7 @@ pub(crate) fn expected(message: &MavMessage) -> Expected {
         M::PARAM_REQUEST_READ(_) | M::PARAM_SET(_) => Answer(&[22, 345]),
         M::PARAM_EXT_REQUEST_READ(_) | M::PARAM_EXT_REQUEST_LIST(_) => Answer(&[322]),
         M::PARAM_EXT_SET(_) => Answer(&[324]),
-        // Missions: the count, the item, the next request, or MISSION_ACK.
+        // Messages about missions are answered with the count, the item, the next request, or MISSION_ACK.
         M::MISSION_REQUEST_LIST(_) => Answer(&[44, 47]),
         M::MISSION_REQUEST(_) | M::MISSION_REQUEST_INT(_) => Answer(&[39, 73, 47]),
         M::MISSION_REQUEST_PARTIAL_LIST(_) => Answer(&[44, 73, 47]),
@@ -38,7 +38,7 @@ pub(crate) fn expected(message: &MavMessage) -> Expected {
         M::MISSION_ITEM(_) | M::MISSION_ITEM_INT(_) => Answer(&[40, 51, 47]),
         M::MISSION_CLEAR_ALL(_) => Answer(&[47]),
         M::MISSION_SET_CURRENT(_) => Answer(&[42]),
-        // "Response: DATA_STREAM". The streams themselves follow.
+        // The dialect says "Response: DATA_STREAM". The streams themselves follow.
         M::REQUEST_DATA_STREAM(_) => Answer(&[67]),
         // These messages request logs, files, events, shells (with the flag "respond") and heights of the terrain.
         M::LOG_REQUEST_LIST(_) => Answer(&[118]),
@@ -86,7 +86,7 @@ pub(crate) fn expected(message: &MavMessage) -> Expected {
         | M::TERRAIN_REQUEST(_)
         | M::WIFI_CONFIG_AP(_) => None,
 
-        // Orders without an answer: telemetry shows their effect.
+        // These orders have no answer. Telemetry shows their effect.
         M::ACTUATOR_CONTROL_TARGET(_)
         | M::AUTH_KEY(_)
         | M::CAN_FILTER_MODIFY(_)

@@ -93,9 +93,9 @@ fn hexadecimal(digit: u8) -> Option<u8> {
 /// A sentence used for an epoch.
 #[derive(Debug, PartialEq)]
 pub(super) enum Sentence {
-    /// GGA; none without a measured fix.
+    /// A sentence GGA. The fields are none without a measured fix.
     Fix(Option<GgaFields>),
-    /// RMC; none if not valid or not measured.
+    /// A sentence RMC. The fields are none if the sentence is not valid or was not measured.
     Motion(Option<RmcFields>),
 }
 

@@ -76,7 +76,7 @@ pub(super) fn step(interface: Interface, number: u8, baud: u32) -> Option<(UbxCo
             (UbxCommand::new(CFG_MSG, &[class, number, 1]), Importance::Needed)
         }
         (Interface::Messages, 1) => {
-            // Mask that applies only the dynamic model.
+            // The mask of the first byte applies only the dynamic model.
             let payload = core::array::from_fn::<u8, 36, _>(|at| match at {
                 0 => 1,
                 2 => AIRBORNE,
@@ -86,7 +86,7 @@ pub(super) fn step(interface: Interface, number: u8, baud: u32) -> Option<(UbxCo
         }
         (Interface::Messages, 2) => {
             let [a, b, c, d] = baud.to_le_bytes();
-            // UART 1; 8N1; input UBX and NMEA, output only UBX.
+            // The payload sets UART 1 to 8N1, with UBX and NMEA as input, and only UBX as output.
             let payload = [1, 0, 0, 0, 0xC0, 0x08, 0, 0, a, b, c, d, 3, 0, 1, 0, 0, 0, 0, 0];
             (UbxCommand::new(CFG_PRT, &payload), Importance::Line(baud))
         }

@@ -232,9 +232,9 @@ pub fn run<P: SensorPart, M: Model>(
     (readings, faults)
 }
 
-/// The table of faults: each is noticed within `notice_us`, no reading of a part that answers nothing passes for one,
-/// and within a second after its end the part reads right again. `interrupts` is true if the part's interrupt is used,
-/// `right` tells a right reading.
+/// Tries the faults of a table. The driver notices each fault within `notice_us`, and takes no answer of a part that
+/// answers nothing for a reading. Within a second after the fault's end, the readings are right again. `interrupts` is
+/// true if the part's interrupt is used. `right` tells a right reading.
 fn survives_all_troubles<P: SensorPart, M: Model>(
     part: impl Fn() -> P,
     model: impl Fn() -> M,

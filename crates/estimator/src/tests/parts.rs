@@ -531,7 +531,7 @@ fn the_door_has_bounds() {
     assert!(!Measurement::MagneticField { field: Vector3::z(), sigma: 1.1e7 }.is_plausible());
     let faint = |x: f32| Measurement::MagneticField { field: Vector3::repeat(-x), sigma: 1.0 }.is_plausible();
     assert!(faint(1.1e-7) && !faint(0.9e-7));
-    // Limits of the origin.
+    // An origin is accepted within limits of latitude, longitude and altitude.
     let is = |latitude, longitude, altitude| GeodeticOrigin::new(latitude, longitude, altitude).is_some();
     assert!(is(88.9, 179.9, 1.9e4) && is(-88.9, -179.9, -1.9e4));
     assert!(!is(89.1, 0.0, 0.0) && !is(-89.1, 0.0, 0.0) && !is(0.0, 180.1, 0.0) && !is(0.0, -180.1, 0.0));

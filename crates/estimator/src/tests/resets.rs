@@ -255,7 +255,7 @@ proptest! {
         if teller > 0 {
             prop_assert!(c.ta.row(2).norm() < 1e-9, "nobody turns by the tilt: {}", c.ta);
         }
-        // Variances: tilt by bias and noise, heading by the sensor that gave it.
+        // The tilt has the variance of bias and noise. The heading has the variance of the sensor that gave it.
         let g2 = 9.81_f64 * 9.81;
         let level = f64::from(c.tt.m11.max(c.tt.m22));
         prop_assert!((level - bias * bias / g2).abs() < 0.1 * bias * bias / g2 + 2e-7, "{level}");

@@ -51,7 +51,7 @@ fn place(position_m: Vector3<f32>) -> Measurement {
 }
 
 proptest! {
-    /// `motion_variance` is the sum of both variances with their squared factors.
+    /// `motion_variance` is the sum of the variances of position and velocity, each with its squared factor.
     #[test]
     fn a_motions_variance_is_that_of_place_and_speed(p in covariance(), row in row()) {
         let (at, h) = (VectorComponent::ALL.iter().position(|c| *c == row.coordinate).unwrap(), dense_row(&row));
@@ -330,7 +330,7 @@ fn rest_is_a_measurement() {
         memory.still_us = NOW_US - since_us;
         run(&mut memory);
         assert_eq!(memory.held_us, due.then_some(NOW_US));
-        // The variance ratio is 1e-4 of 26e-4.
+        // The velocity's variance of 1e-4 is a 26th of the innovation's variance of 26e-4.
         let kept = if due { 25.0 / 26.0 } else { 1.0 };
         assert!((memory.nominal.velocity - slow * kept).norm() < 1e-4, "{}", memory.nominal.velocity);
     }
@@ -463,7 +463,7 @@ fn rough_samples_leave_it_less_sure() {
     assert_eq!((run(249_000, 0.0, 0.0).2, run(250_000, 0.0, 0.0).2), (0, 1));
 }
 
-/// The variance of each scalar: at least the minimum, plus the part for rough samples.
+/// The variance of each scalar is at least the minimum. Rough samples add their part.
 #[test]
 fn each_part_has_its_variance() {
     let zero = Vector3::zeros();

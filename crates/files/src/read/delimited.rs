@@ -15,7 +15,7 @@ impl DelimitedFormat {
     pub fn of(text: &[u8]) -> Self {
         let head = text.split(|byte| *byte == b'\n').next().unwrap_or_default();
         let count = |separator: &char| head.iter().filter(|byte| char::from(**byte) == *separator).count();
-        // On a tie, the last one wins: the comma, since the order is reversed.
+        // The order is reversed, so that on a tie the last separator wins: the comma.
         let most = SEPARATORS.iter().rev().max_by_key(|separator| count(separator)).copied().unwrap_or(',');
         DelimitedFormat { separator: most as u8 }
     }

@@ -79,7 +79,7 @@ fn it_is_recovered_once_it_has_been_upright_long_enough() {
 #[test]
 fn coming_up_gives_another_second() {
     let spinning = State { rates_rad_s: Vector3::new(0.0, SPIN_RAD_S + 1.0, 0.0), ..cosine(-0.5) };
-    // Lowest cosine, state that it comes up to, and whether this counts.
+    // Each case has the lowest cosine, the state that the vehicle comes up to, and whether this counts.
     for (lowest, state, counts) in [
         (-1.0, cosine(-0.79), true),
         (-1.0, cosine(-0.81), false),
@@ -128,7 +128,7 @@ fn a_blind_tumble_goes_on() {
 
 // --- Frozen trackers. ---
 
-/// A state whose pose is not zero.
+/// Returns a state whose pose is not zero.
 fn somewhere() -> State {
     State {
         position_m: Vector3::new(3.0, -2.0, 1.0),

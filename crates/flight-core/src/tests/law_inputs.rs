@@ -242,8 +242,8 @@ fn between_states_roll_and_pitch_are_reckoned() {
         let dead_reckoning = DeadReckoning::new(&Parameters::PAPER.to_f32(), &Response::DEFAULT, 1e-3);
         let given = asks(1.0);
         let last = at(bench.now_us);
-        // Inputs constant for long: the rotors have reached them, and the trim has learnt most of what explains the
-        // constant rates.
+        // The inputs are constant for long. The rotors have reached these inputs, and the trim has learnt most of what
+        // explains the constant rates.
         let mut reckoning = dead_reckoning.start(&last);
         reckoning.acting_n = nalgebra::Vector2::new(given.roll_n, given.pitch_n);
         let steps = bench.steps();
@@ -419,7 +419,8 @@ fn a_vehicle_adrift_lands_by_its_thrust_or_gives_up() {
     );
     ms += bench.now_us / 1000 - 3000;
     assert_eq!(ended, EndReason::Landed);
-    // A second without thrust, at the latest from the start of the descent. The usual thrust is the weight.
+    // The descent lands after a second without thrust, counted at the latest from its start. The usual thrust is the
+    // weight.
     assert!(ms <= u64::from(DESCEND_US + STILL_US) / 1000 + 30 && USUAL_S > 1.0, "{ms} ms");
     // A vehicle on its side is lost.
     let mut bench = Bench::flying(asks(1.0), true);

@@ -16,7 +16,7 @@ use proptest::prelude::*;
 
 const DT_S: f32 = 1e-3;
 
-/// A vehicle that responds differently about each axis.
+/// Returns a vehicle that responds differently about each axis.
 fn parameters() -> Parameters<f32> {
     Parameters { inertia_kg_m2: Vector3::new(0.004, 0.007, 0.012), arm_m: 0.2, ..Parameters::PAPER.to_f32() }
 }

@@ -29,7 +29,7 @@ fn limits() -> impl Strategy<Value = MotionLimits> {
     })
 }
 
-/// A star-shaped polygon around the origin, which does not cross itself.
+/// Draws a star-shaped polygon around the origin, which does not cross itself.
 fn star() -> impl Strategy<Value = Vec<Vector2<f32>>> {
     prop::collection::vec(2.0_f32..20.0, 3..12).prop_map(|radii| {
         let turn = core::f32::consts::TAU / radii.len() as f32;
@@ -149,7 +149,7 @@ proptest! {
             (one + 2..count).any(|other| {
                 let (a, b) = (changed[one], changed[(one + 1) % count]);
                 let (c, d) = (changed[other], changed[(other + 1) % count]);
-                // Solve for the intersection.
+                // Two sides intersect if the solution for both parameters lies between 0 and 1.
                 let (r, s) = (b - a, d - c);
                 let whole = r.perp(&s);
                 let (t, u) = ((c - a).perp(&s) / whole, (c - a).perp(&r) / whole);

@@ -241,7 +241,8 @@ impl Memory {
                 match &mut self.mode_memory {
                     ModeMemory::Hold(hold) => ModeOutput::fly(hold.fly(inputs)),
                     ModeMemory::Orbit(orbit) => orbit.fly(inputs),
-                    // Unreachable: `plan` was just set for this mode. The same in the other modes.
+                    // This arm is unreachable, because `plan` has just set the memory for this mode. The same holds for
+                    // the other modes.
                     _ => ModeOutput::fly(inputs.stop()),
                 }
             }

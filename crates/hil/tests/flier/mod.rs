@@ -110,7 +110,7 @@ impl Flier {
             self.host.hear_radio(&bytes);
         }
         let mut buffer = [0; FRAME_MAX];
-        // A heartbeat every second, as the vehicle would miss a station that falls silent.
+        // A heartbeat is sent every second, since the vehicle would miss a station that falls silent.
         let message = message.or((self.ms % 1_000 == 500).then_some(&Uplink::Heartbeat));
         let bytes = message.map_or(Vec::new(), |message| self.sender.send(message, &mut buffer).to_vec());
         let tick = self.host.next_tick(&bytes);

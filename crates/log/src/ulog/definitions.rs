@@ -107,7 +107,7 @@ impl Definitions {
         let index = usize::from(self.next);
         Some(match self.part {
             Part::Header => match index {
-                // Header and flags in one piece: readers take a log without flags for an old one.
+                // Header and flags are written in one piece, because readers take a log without flags for an old log.
                 0 => ring.bytes(&mut |content| {
                     content.put(&MAGIC);
                     content.put(&now_us.to_le_bytes());

@@ -343,7 +343,7 @@ impl<S: Storage> Room<S> {
     /// Runs the log's task for this millisecond, unless it still waits for the storage.
     fn task(&mut self) {
         while self.busy_us <= self.now_us {
-            // The state that the task found before it waited.
+            // The task acts on the state that it found before it waited.
             self.state = self.keeper.state();
             let began_us = self.busy_us.max(self.now_us - TICK_US);
             self.card.begin(began_us);

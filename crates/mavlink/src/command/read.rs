@@ -158,8 +158,8 @@ fn known(id: u16, parameters: [f32; 7], place: Option<GlobalPosition>) -> Option
             VehicleCommand::Reposition { place: plausible?, yaw_rad, speed_m_s, changes_mode }
         }
         ORBIT => orbit([p1, p2, p3, p4], plausible?)?,
-        // p1: only 0 (airspeed) and 1 (ground speed), since climb and descent have their own limits. p3: -1 and -2
-        // leave the throttle unchanged. p2: -2 returns to the default speed.
+        // Parameter 1 may only be 0 (airspeed) or 1 (ground speed), since climb and descent have their own limits.
+        // Parameter 2 of -2 returns to the default speed. Parameter 3 of -1 or -2 leaves the throttle unchanged.
         SPEED if (p1 == 0.0 || p1 == 1.0) && (is_neutral_or_minus(p3) || p3 == DEFAULT) => {
             VehicleCommand::Speed(if p2 == DEFAULT { SPEED_MAX_M_S } else { speed(p2)? })
         }

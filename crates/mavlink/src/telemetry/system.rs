@@ -203,6 +203,6 @@ pub(super) fn write_landed(state: u8, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, 
 }
 
 pub(super) fn write_protocol(payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
-    // In hundredths: version, minimum and maximum are 2.0.
+    // The present, oldest and newest version are 2.0, given in hundredths.
     PROTOCOL.write(&([200, 200, 200], [0; 16]), payload)
 }

@@ -64,7 +64,8 @@ pub fn any_by_chance(stream: &[u8], joints: &[usize], seed: impl Fn(u32) -> Opti
 /// Returns all frames of `stream` with a correct checksum that are not within another frame. `seed` returns a message's
 /// `CRC_EXTRA`, if known.
 pub fn frames(stream: &[u8], seed: impl Fn(u32) -> Option<u8>) -> Vec<Frame> {
-    // Position; end of the last frame that could not be verified; number of bytes needed for the decisions so far.
+    // `at` is the position, `sealed` the end of the last frame that could not be verified, and `known` the number of
+    // bytes needed for the decisions so far.
     let (mut at, mut sealed, mut known) = (0, 0, 0);
     let mut frames = Vec::new();
     while at < stream.len() {

@@ -310,7 +310,7 @@ impl SimulatedFailures {
     pub(super) fn tracker(&mut self, now_s: f64, mut seen: TrackerFix) -> Option<TrackerFix> {
         let before = *self.last.tracker.get_or_insert(seen);
         let mut alive = true;
-        // By the true time: an error of the stamp must not shift the failure.
+        // Failures start and end by the true time, since an error of the stamp must not shift them.
         for (failure, held) in Self::active(&mut self.faults, now_s) {
             match failure {
                 FailureKind::TrackerLost => alive = false,

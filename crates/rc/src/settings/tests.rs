@@ -61,7 +61,8 @@ proptest! {
             return Ok(());
         }
         let us = if number == 5 { us } else { 1_500 };
-        // Position with the default calibration: one half at 1500 us, with a dead band of 10 us on either side.
+        // With the default calibration, the switch's position is one half at 1500 us, with a dead band of 10 us on
+        // either side.
         let way = 0.5 + 0.5 * described(&ChannelCalibration::DEFAULT, us, 1_500.0);
         let beyond = if share < 0.0 { f64::from(-share) - way } else { way - f64::from(share) };
         prop_assume!(beyond == 0.0 || beyond.abs() > 1e-6);

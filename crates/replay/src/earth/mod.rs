@@ -79,7 +79,7 @@ mod tests {
             level.is_some_and(|(level, down)| (level - 0.21).abs() < 0.01 && (down - 0.43).abs() < 0.01),
             "{level:?}"
         );
-        // Times before and after the models' years, and no time.
+        // The times are before and after the models' years, or unknown.
         for utc_us in [Some(0.0), Some(1e18), Some(f64::NAN), None] {
             assert!(at(47.0, 8.0, 0.0, utc_us).is_some_and(|field| field.declination_rad > 0.03));
         }

@@ -92,7 +92,7 @@ fn placed(
     width_px: f64,
     onset: &'static str,
 ) -> TimeMarks {
-    // Occupied intervals of each row.
+    // `lanes` holds the occupied intervals of each row.
     let mut lanes = Vec::new();
     for mark in gusts.iter_mut().chain(&mut changes) {
         place(mark, width_px / end_s, width_px, &mut lanes);

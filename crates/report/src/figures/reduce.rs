@@ -4,7 +4,8 @@
 /// last point, in order of time. Chatter within a column keeps its height. Values that are not finite are left out.
 pub(super) fn envelope(values: impl Iterator<Item = (f64, f64)>, end_s: f64, columns: f64) -> Vec<(f64, f64)> {
     let mut points = Vec::new();
-    // Index, lowest and highest point of the current column; and the last point of the line.
+    // `column` is the index, and the lowest and highest point of the current column. `last` is the last point of the
+    // line.
     let mut column: Option<(f64, [(f64, f64); 2])> = None;
     let mut last = None;
     for point in values.filter(|(t, v)| t.is_finite() && v.is_finite()) {

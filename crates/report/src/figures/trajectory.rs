@@ -52,7 +52,7 @@ impl BoxProjection {
             px: 1.0,
             middle_px: (left + 0.5 * width, top + below_px + 0.5 * height),
         };
-        // Outermost corners of the outline, relative to the centre.
+        // The outermost corners of the outline decide the scale. They are relative to the centre.
         let (right, _) = view.direction(Vector3::new(0.5, 0.5, 0.0));
         let (_, down) = view.direction(Vector3::new(0.5, -0.5, -0.5));
         BoxProjection { px: (0.5 * width / right).min(0.5 * height / down), ..view }

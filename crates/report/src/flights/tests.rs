@@ -187,7 +187,7 @@ fn unusual_flights_have_figures() {
     };
     let mut flown = vec![fly(&calm, ControllerKind::Afbc), fly(&stormy, ControllerKind::Backstepping)];
     flown.extend(both(&paper(Reading::Forces, 20.0)));
-    // A vehicle whose log contains NaN and infinity.
+    // This vehicle's log contains NaN and infinity.
     let mut broken = fly(&Scenario { name: "broken".into(), ..calm.clone() }, ControllerKind::Afbc);
     for sample in broken.run.log.iter_mut().skip(2) {
         sample.motion.position_m = Vector3::repeat(f64::NAN);

@@ -14,7 +14,7 @@ use afbc_vehicles::{Vehicle, parts};
 pub(super) fn read(table: Option<Table<'_>>) -> Result<InstrumentSuite, FileError> {
     let Some(mut table) = table else { return Ok(InstrumentSuite::default()) };
     let suite = suite(&mut table, &InstrumentSuite::default())?;
-    // First, since an unknown key may be a misspelt `imu`.
+    // Unknown keys are reported first, since an unknown key may be a misspelt `imu`.
     table.finish()?;
     if suite.imu.is_none() {
         table.clash("imu", &[], "missing; add an imu, since the other instruments have no effect without one")?;

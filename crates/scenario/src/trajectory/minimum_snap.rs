@@ -71,7 +71,7 @@ pub fn minimum_snap(places: &[FlatOutput], start_s: f64, limits: PaceLimits) -> 
     if let Some(leg) = lengths_m.iter().position(|length_m| *length_m < LEG_MIN_M) {
         return Err(NoPath::ShortLeg(leg));
     }
-    // A first guess of the times' proportions: the square root of the length, as at constant acceleration.
+    // The first guess of each leg's share of the time is the square root of its length, as at constant acceleration.
     let per_metre = limits.acceleration_m_s2.sqrt() / limits.speed_m_s;
     let durations_s: Vec<f64> = lengths_m.iter().map(|length_m| libm::sqrt(*length_m) + length_m * per_metre).collect();
     let first = timed(places, &durations_s, start_s).ok_or(NoPath::Unsolvable)?;

@@ -92,7 +92,7 @@ pub fn written(pieces: &[PolynomialPiece]) -> String {
     let mut text = format!("duration{}\n", ["x", "y", "z", "yaw"].map(powers).concat());
     for piece in pieces {
         text += &piece.duration_s.to_string();
-        // Debug format: it reads back to the last bit, and writes an exponent where Display would write many zeros.
+        // The Debug format reads back to the last bit. Unlike Display, it writes an exponent instead of many zeros.
         text.extend(piece.coefficients.iter().flatten().map(|coefficient| format!(",{coefficient:?}")));
         text.push('\n');
     }

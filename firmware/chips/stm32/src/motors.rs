@@ -175,7 +175,7 @@ where
         let dma = self.dma.reborrow();
         self.timer.enable_update_dma(true);
         let transfer = self.timer.setup_update_dma_burst(dma, self.irqs, Channel::Ch1, Channel::Ch4, rows);
-        // Wrapping, since an overflow check, although it would need 585,000 years, would add a panic.
+        // The addition wraps, because an overflow check (after 585,000 years) would be a panic.
         let deadline = Instant::from_micros(Instant::now().as_micros().wrapping_add(TRANSFER_MAX_US));
         if with_deadline(deadline, transfer).await.is_err() {
             // The next frame sets up the DMA again.
@@ -268,7 +268,7 @@ where
     /// Sets the time between two updates, effective at once.
     fn set_period(&mut self, counts: u16) {
         self.timer.regs_core().arr().write(|reload| reload.set_arr(counts.saturating_sub(1)));
-        // Loads the register from its preload register.
+        // An update event loads the register from its preload register.
         self.timer.generate_update_event();
     }
 

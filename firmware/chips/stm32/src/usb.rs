@@ -101,7 +101,7 @@ async fn port(driver: Driver<'static, USB_OTG_FS>) {
     config.manufacturer = Some("AFBC");
     config.product = Some("AFBC flight controller");
     config.serial_number = Some(uid::uid_hex());
-    // Largest current of USB 2.0 \[mA\]: the port powers the board.
+    // The port powers the board. This is the largest current of USB 2.0 \[mA\].
     config.max_power = 500;
     let (mut configuration, mut capabilities, mut control) = ([0; 80], [0; 16], [0; PACKET_MAX]);
     let mut state = cdc_acm::State::new();

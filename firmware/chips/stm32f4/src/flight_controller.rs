@@ -162,8 +162,8 @@ macro_rules! flight_controller {
 
                 // Ring buffers of the link's UART.
                 static RINGS: [StaticCell<[u8; 1024]>; 2] = [const { StaticCell::new() }; 2];
-                // Room for 15 ms at the fastest baud rate: with more, less than a quarter of a SpeedyBee F405 V4's RAM
-                // would be free.
+                // The buffer has room for 15 ms at the fastest baud rate. With a larger buffer, less than a quarter of
+                // a SpeedyBee F405 V4's RAM would be free.
                 static GNSS_RX: StaticCell<[u8; 352]> = StaticCell::new();
                 static GNSS_TX: StaticCell<[u8; TX_RING]> = StaticCell::new();
 
@@ -203,7 +203,7 @@ macro_rules! flight_controller {
                 )?
 
                 let kernel_hz = embassy_stm32::rcc::frequency::<peripherals::$spi>().0;
-                // The slowest clock at first; each candidate sets its own.
+                // The bus starts with its slowest clock. Each candidate sets its own clock.
                 let config = chip_stm32::sensors::spi(kernel_hz / 256);
                 let spi = embassy_stm32::spi::Spi::new(
                     p.$spi, p.$sck, p.$mosi, p.$miso, p.$spi_tx, p.$spi_rx, Irqs, config,

@@ -54,7 +54,7 @@ fn limit_ram_reads() {
     const TARGET_7: *mut u32 = 0x5100_8108 as *mut u32;
     const ONE_READ: u32 = 1;
     if DBGMCU.idc().read().rev_id() < REVISION_X {
-        // SAFETY: a register of the bus matrix that nothing else uses, as documented in the errata sheet.
+        // SAFETY: nothing else uses this register of the bus matrix, which the errata sheet documents.
         unsafe { TARGET_7.write_volatile(ONE_READ) };
     }
 }

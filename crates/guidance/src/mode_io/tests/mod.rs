@@ -49,7 +49,7 @@ struct Stage {
 }
 
 impl Stage {
-    /// Vehicle and setpoint at the same place, with different headings.
+    /// Returns a stage with vehicle and setpoint at the same place, and with different headings.
     fn at(position_m: Vector3<f32>) -> Self {
         let mut state = State { position_m, ..State::default() };
         state.attitude_rad = Vector3::new(0.1, -0.2, 0.8);

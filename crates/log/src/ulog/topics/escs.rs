@@ -52,7 +52,7 @@ impl Wire for EscReport {
         rpm.put(to);
         [voltage_v, current_a, temperature_c].put(to);
         failures.put(to);
-        // Address, count of commands, state, function, power, padding.
+        // The bytes are address, count of commands, state, function, power and padding.
         [0, 0, 0, function, 0, 0, 0, 0, 0, 0_u8].put(to);
     }
 }
