@@ -64,7 +64,8 @@ pub(crate) fn details_out() -> Option<DetailsOut> {
     ENDS.lock(|ends| ends.try_borrow_mut().ok()?.1.take())
 }
 
-/// Waits for the oldest queued result. The control tick never waits: if 20 results are queued, it drops the next one.
+/// Waits for the oldest queued result. The control tick never waits. If 20 results are queued, the tick drops its
+/// result.
 pub fn next() -> impl Future<Output = Tick> {
     poll_fn(|context| {
         // The waker is registered before the queue is read, so that no tick is missed.

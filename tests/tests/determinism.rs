@@ -72,7 +72,7 @@ fn two_flights_are_the_same_to_the_bit() {
             let first = digest(&scenario, contender);
             assert_eq!(first.1, 25_001);
             assert_eq!(digest(&scenario, contender), first, "{} {}", model.name(), kind.name());
-            // Another thread flies while this one waits.
+            // Another thread flies while this thread waits.
             let elsewhere = std::thread::scope(|scope| scope.spawn(|| digest(&scenario, contender)).join().unwrap());
             assert_eq!(elsewhere, first);
             // The digest detects a difference in the last bit of a number.

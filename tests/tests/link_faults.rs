@@ -210,7 +210,7 @@ const CASES: &[Case] = &[
 
     // Delayed frames.
     case("states 10 ms late, the paper's flight", Paper, &[(States, 5_000..FOREVER, Delay(10))], 42_000, Flies(0.8)),
-    // Each later state is as late as the first one. A delay looks like a difference between the clocks.
+    // Each later state is as late as the first state. Such a delay looks like a difference between the clocks.
     case("states 30 ms late", Hover(1.5), &[(States, 3000..FOREVER, Delay(30))], 10_000, Resumes(0.9, 0.1)),
     case("states held back for 100 ms, then all at once", Hover(2.0),
         &[(States, 3000..3100, HoldBack)], 13_000, Recovers(0.1, 0.02)),

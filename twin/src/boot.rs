@@ -49,9 +49,9 @@ struct BootObserver {
     /// Number of samples, and pulses that differ from the pulse of a stopped motor.
     looks: u64,
     wrong: Vec<String>,
-    /// First word of the parameters' flash at the end.
+    /// First word of the parameters' flash, read at the end of the run.
     store: u64,
-    /// Pins that float at the end.
+    /// Pins that float at the end of the run.
     floating: Vec<SteadyPin>,
 }
 
@@ -167,7 +167,7 @@ pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
     check(feeds.len() as u64 + first >= END / TICK - 1, "no tick is missing")?;
     check(least.abs_diff(TICK) <= M::JITTER && most.abs_diff(TICK) <= M::JITTER, "1 kHz")?;
 
-    // DSHOT sends one frame per tick; PWM repeats its pulses all the time.
+    // DSHOT sends one frame per tick. PWM repeats its pulses all the time.
     let carried = match M::SIGNAL {
         Signal::Dshot600(_) => looks * LOOK_EVERY / TICK * BITS * BIT_NS / LOOK_EVERY,
         Signal::Pwm400 => *looks,

@@ -53,7 +53,7 @@ impl SimulatedGnss {
         SimulatedGnss { receiver, decoder, frame: FixFrame::NEW, began_ms: 0, last_ms: 0 }
     }
 
-    /// Replaces the instruments' fix by the one that the receiver completes in this millisecond, if any.
+    /// Replaces the instruments' fix by the fix that the receiver completes in this millisecond, if any.
     fn replace(&mut self, readings: &mut Readings, signals: &Signals, now_ms: u64) {
         self.receiver.set_position(signals.position);
         self.receiver.set_velocity(signals.velocity);
@@ -62,7 +62,7 @@ impl SimulatedGnss {
         // 38,400 baud are four bytes per millisecond. Nothing is sent before the first position.
         for _ in 0..if signals.position == at_the_place().position { 0 } else { 4 } {
             let Some(byte) = self.receiver.transmit(VirtualNanos(now_ms * 1_000_000)) else { break };
-            // The bytes of an epoch follow each other without a pause, so a pause marks the start of the next one.
+            // The bytes of an epoch follow each other without a pause, so a pause marks the start of the next epoch.
             if now_ms - self.last_ms > 20 {
                 self.began_ms = now_ms;
             }

@@ -102,7 +102,7 @@ impl GroundPilot {
             throttles: vec![0; scenario.rotors.len()],
             rotor_speeds_rad_s: vec![0.0; scenario.rotors.len()],
             stopped_rotor: None,
-            // The speed is the one in `vehicles/paper.toml`, for which the images are built.
+            // The speed is that of `vehicles/paper.toml`, for which the images are built.
             speed_max_rad_s: 1000.0,
             wire,
             client: client(),

@@ -20,7 +20,7 @@ use nalgebra::Vector2;
 pub struct DelayCompensation {
     /// d of roll and pitch, divided by the delay of the low-pass.
     lead: f32,
-    /// Share of the low-pass that is replaced per step.
+    /// Share of the distance to its input that the low-pass covers per step.
     share: f32,
     /// d of the thrust \[s\].
     pub thrust_s: f32,
@@ -46,7 +46,7 @@ impl DelayCompensation {
     /// and advances the low-pass by one step.
     #[inline(always)]
     pub fn advance(&self, late: &mut Option<Vector2<f32>>, accelerations_rad_s2: &Vector2<f32>) -> Vector2<f32> {
-        // The first value counts as constant before, so that a law that takes over does not jump.
+        // The low-pass starts at its first input, so that a law that takes over does not jump.
         let before = late.unwrap_or(*accelerations_rad_s2);
         *late = Some((before + (accelerations_rad_s2 - before) * self.share).map(math::settled));
         (accelerations_rad_s2 - before) * self.lead

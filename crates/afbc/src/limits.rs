@@ -33,7 +33,7 @@ impl PositionControlLimits {
     pub const NONE: Self = Self::DEFAULT;
 }
 
-/// Speed limit of x, y or z: cuts the position error to the one that demands the largest speed.
+/// Speed limit of x, y or z: cuts the position error to the error that demands the largest speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ApproachLimit {
     /// Largest e_1 \[m\].

@@ -197,7 +197,7 @@ fn a_distant_setpoint_is_approached_at_the_speed_limit() {
     check(&Controller::new(vehicle, settings, IntegralBackstepping::new(&vehicle, integral).unwrap()).unwrap());
 }
 
-/// Attitudes at all angles, including upside down: no division by the cosine of the tilt fails.
+/// At all angles of the attitude, including upside down, no division by the cosine of the tilt fails.
 #[test]
 fn no_attitude_is_singular() {
     let controller = flight(Profile::Flight.settings().limits);

@@ -81,7 +81,7 @@ fn estimates_freeze_on_the_ground_and_thaw_on_lift() {
     };
     let [stood, still_standing, asked, lifted, left] = fly(true);
     assert_eq!(stood, still_standing);
-    // The step that first demands lift still counts as standing; the next one does not.
+    // The step that first demands lift still counts as standing, and the next step does not.
     assert_eq!(asked, stood);
     assert!(lifted.z != stood.z && lifted.x == stood.x, "its feet still touch the ground");
     assert_ne!(left.x, stood.x);

@@ -188,7 +188,7 @@ fn what_is_left_out_is_told() {
     let (found, told) = turned(&mut hands(Part::QMC5883L, 3), &[Side::Down, Side::Down], 0.0, |_, _| ());
     assert_eq!(found, Some(Err(CalibrationFailure::NotRotated)));
     assert_eq!(told.get(1..3), Some([CalibrationEvent::Detected(Side::Down), CalibrationEvent::Rotate].as_slice()));
-    // To and fro by a quarter turn: this never adds up to a whole turn.
+    // Turning to and fro by a quarter turn never adds up to a whole turn.
     let mut quarters = hands(Part::QMC5883L, 3);
     let mut magnetometer = MagnetometerCalibration::new(&Mounting::PLAIN, &calibrated(&quarters));
     let found = (0..3000).find_map(|number| {
@@ -196,10 +196,10 @@ fn what_is_left_out_is_told() {
         magnetometer.step(&quarters.sample(), |_| ())
     });
     assert_eq!(found, Some(Err(CalibrationFailure::NotRotated)));
-    // No magnetometer.
+    // The vehicle has no magnetometer.
     let (found, _) = turned(&mut hands(Part::QMC5883L, 3), &[Side::Down], 1.0, |_, sample| sample.field_ut = None);
     assert_eq!(found, Some(Err(CalibrationFailure::NoField)));
-    // A side is repeated, and no further side follows.
+    // A side that is shown again is reported as repeated, and no further side follows.
     let (found, told) = turned(&mut hands(Part::QMC5883L, 3), &[Side::Up, Side::Down, Side::Up], 1.0, |_, _| ());
     assert_eq!((found, told.last()), (None, Some(&CalibrationEvent::Repeated(Side::Up))));
     let mut askew = hands(Part::QMC5883L, 3);

@@ -18,7 +18,7 @@ pub struct Quantity {
     pub meaning: &'static str,
     /// True if only whole numbers are drawn.
     pub whole: bool,
-    /// Name of another quantity without which this one has no effect.
+    /// Name of another quantity that must be present, or else this quantity has no effect.
     pub needs: Option<&'static str>,
     /// Applies the value to a flight.
     apply: fn(&mut FlightAssembly, f64),

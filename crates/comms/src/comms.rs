@@ -90,7 +90,8 @@ pub struct Comms {
     /// Channels of RC_CHANNELS_OVERRIDE, until radio control takes them.
     pub(crate) overrides: Option<ChannelsOverride>,
     fence_given: FenceStatus,
-    /// Nearest safe place for a return \[m\], the one that the guidance knows, and the time of the last search \[us\].
+    /// Nearest safe place for a return \[m\], the safe place that the guidance knows, and the time of the last search
+    /// \[us\].
     safe_m: Option<Vector2<f32>>,
     safe_given_m: Option<Vector2<f32>>,
     safe_us: u64,

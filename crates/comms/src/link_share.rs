@@ -3,10 +3,10 @@
 /// Transfers get at least 1 / `SHARE` of the link's bytes, even if telemetry needs all of it. They also get all bytes
 /// that telemetry leaves.
 const SHARE: i64 = 5;
-/// Largest part of the share that can be saved up, less than a frame \[1e-3 bytes\].
+/// Largest number of bytes that transfers can save up for later, less than a frame \[1e-3 bytes\].
 const SAVED: i64 = 250_000;
 
-/// Budget of the transfers' share.
+/// Number of bytes that transfers may send.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LinkShare {
     /// Bytes that may be sent now \[1e-3 bytes\].

@@ -148,7 +148,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     /// For any sequence of modes, each failsafe is reported once each time it begins. A heartbeat is critical if there
-    /// was a failsafe since the previous one, and not critical if there was none for a second.
+    /// was a failsafe since the previous heartbeat. A heartbeat is not critical if there was no failsafe for a second.
     #[test]
     fn each_failsafe_is_reported_once_each_time(modes in prop::collection::vec(modes(), 1..12), tumbles: bool) {
         let mut bench = Bench::new();

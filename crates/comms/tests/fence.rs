@@ -138,7 +138,7 @@ impl Vehicle {
         self.inputs.orders.safe_m.map(|place| [place.x, place.y].map(|x| (x * 20.0).round() / 20.0))
     }
 
-    /// Returns the mission item that the guidance gets when it asks for this one.
+    /// Returns the mission item that the guidance gets when it asks for this number.
     pub(crate) fn leg(&mut self, wanted: u16) -> RequestedItem {
         self.inputs = ControlInputs::EMPTY;
         self.report.guided.wanted = wanted;
@@ -294,7 +294,7 @@ fn a_return_lands_at_the_nearest_place() {
         vehicle.put(here_m);
         assert_eq!(vehicle.safe(510), Some(nearest));
     }
-    // The search runs half a second after the previous one, not earlier.
+    // A search runs half a second after the previous search, not earlier.
     vehicle.put(points[0]);
     assert!((0..510).any(|_| vehicle.safe(1) == Some(points[0])));
     vehicle.put(points[2]);

@@ -216,7 +216,7 @@ fn commands_that_do_not_need_control() {
     }
 }
 
-/// Control passes to a second station when the first one releases it. Until then the second is informed once.
+/// Control passes to a second station when the first station releases it. Until then the second is informed once.
 #[test]
 fn a_second_station_is_informed_once_and_follows() {
     let mut bench = Bench::new();

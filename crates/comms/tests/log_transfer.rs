@@ -111,7 +111,7 @@ fn several_gaps_are_filled_in_turn() {
     for (gap, parts) in (0..20).zip(messages.chunks(3)) {
         assert_eq!(read(parts, 0, 400 * gap), one.logs[0][400 * gap as usize..][..270]);
     }
-    // A request for the rest of the log replaces all gaps, and a new such request replaces the old one.
+    // A request for the rest of the log replaces all gaps, and a new request for the rest replaces the old request.
     logs.hear(LogRequest::Data { log: 0, offset: 0, bytes: 90 });
     for offset in [0, 9_000] {
         logs.hear(LogRequest::Data { log: 0, offset, bytes: u32::MAX });

@@ -103,7 +103,7 @@ fn frames(bench: &mut Bench) -> (Vec<Vec<u8>>, Vec<Downlink>) {
     (frames, messages)
 }
 
-/// Returns a command that is answered at once in any state.
+/// Returns a command that the vehicle answers at once in any state.
 fn command() -> Uplink {
     Uplink::Command(VehicleCommand::Other(31_999))
 }
@@ -235,7 +235,7 @@ fn a_start_forgets_neither_key_nor_clock() {
     locked.restart();
     assert!(!locked.hears(&before), "two hours old");
     assert!(!locked.hears(&at_last), "replayed before anything else is heard");
-    // Real time goes on.
+    // Some time passes, so the station's next frame is newer than all earlier frames.
     locked.time_10us += 100_000;
     let genuine = locked.signed(&command(), &KEY);
     assert!(locked.hears(&genuine));
@@ -323,7 +323,7 @@ fn the_end_of_time_is_not_heard() {
     assert!(locked.hears(&last));
 }
 
-/// Power fails between any two records. Then the key is the old one, the new one, or an incomplete one that nobody has.
+/// Power fails between any two records. Then the key is the old key, the new key, or an incomplete key that nobody has.
 /// The vehicle is never left without signing.
 #[test]
 fn half_a_key_opens_nothing() {

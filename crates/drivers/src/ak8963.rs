@@ -174,7 +174,7 @@ impl Mpu9250Ak8963 {
     fn magnetic(&mut self, answer: [u8; MAGNETIC_LENGTH]) -> Result<Option<MagneticReading>, PartFault> {
         let adjustment = self.adjustment?;
         let [st1, field @ .., st2] = answer;
-        // The MPU keeps the last answer until the next one; noise makes two measurements differ.
+        // The MPU keeps the last measurement until the next, and noise makes two measurements differ.
         let is_new = st1 & DRDY != 0 && answer != self.last;
         (self.last, self.age) = (answer, if is_new { 0 } else { self.age.saturating_add(1) });
         if !is_new {

@@ -72,7 +72,8 @@ impl SensorPart for Ms5611 {
 
 impl Ms5611 {
     fn take_prom(&mut self, command: u8, value: u16) -> Result<(), PartFault> {
-        // Each cycle begins with the PROM. The temperature of an incomplete cycle must not be used for this one.
+        // Each cycle begins with the PROM. The temperature of an earlier, incomplete cycle must not be used for this
+        // cycle.
         self.d2 = None;
         let at = usize::from(command.wrapping_sub(PROM_READ) / 2);
         let word = self.prom.get_mut(at).ok_or(PartFault::Bus)?;

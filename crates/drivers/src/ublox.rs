@@ -337,7 +337,7 @@ impl UbxReceiver {
         if self.step(interface, number).is_none_or(|(command, _)| command.id() != to) {
             return;
         }
-        // All keys use the same command. Answers to earlier steps, or to the one that set the baud rate, come first.
+        // All keys use the same command. Answers to earlier steps, or to the step that set the baud rate, come first.
         if self.owed > 0 {
             self.owed -= 1;
         } else if self.asked == 0 || matches!(self.phase, UbxPhase::Confirms(..)) {
@@ -351,7 +351,7 @@ impl UbxReceiver {
         }
     }
 
-    /// Begins the next step; `owed` answers to this one may still arrive.
+    /// Begins the next step. `owed` answers to the present step may still arrive.
     fn enter_next(&mut self, interface: Interface, number: u8, owed: u8, now_us: u64) {
         self.enter(UbxPhase::Configures(interface, number.saturating_add(1)), now_us);
         // Each message type is acknowledged separately, so no answers are owed.

@@ -14,7 +14,7 @@ pub(crate) struct Registers {
     /// Status bits DOR, OVL and DRDY.
     status: u8,
     control: [u8; 3],
-    /// True while the data are locked: after the first byte is read, until the last one is.
+    /// True while the data are locked: from the reading of the first byte to the reading of the last.
     is_locked: bool,
     since_us: u64,
     /// Number of measurements since `since_us`.

@@ -234,7 +234,7 @@ fn refusals_are_survived() {
 }
 
 /// The receiver answers so late that each command is sent twice, and the line loses one command. No answer to an
-/// earlier command counts for the next one.
+/// earlier command counts for the next command.
 #[test]
 fn late_answers_are_not_taken_for_later_ones() {
     for generation in [Generation::Eight, Generation::Ten] {

@@ -67,7 +67,7 @@ pub struct DroppedMeasurements {
     pub late: u32,
     /// Measurements more than 20 ms in the future.
     pub early: u32,
-    /// Measurements that were not newer than the last one of the same kind.
+    /// Measurements that were not newer than the last measurement of the same kind.
     pub overtaken: u32,
     /// Measurements that were pushed out of the full queue.
     pub crowded: u32,

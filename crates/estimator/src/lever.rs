@@ -99,7 +99,7 @@ struct LeverArmFilters {
     sums: [Vector3<f32>; 2],
     /// Memories of the low-pass filter's sections.
     memories: [[[Vector3<f32>; 2]; 2]; 2],
-    /// Low-pass outputs of this cycle and of the previous one.
+    /// Low-pass outputs of this cycle and of the previous cycle.
     smooth: [Vector3<f32>; 2],
     before: [Vector3<f32>; 2],
     /// Number of cycles in the air so far, up to [`SETTLES`].

@@ -44,7 +44,7 @@ pub struct Memory {
     pub(crate) turned: Quaternion<f32>,
     /// Variances that the next prediction adds for clipped or missing samples: attitude and velocity.
     pub(crate) rough: (f32, f32),
-    /// Sum of the variances for recent clipped or missing samples, and the time of the last one \[us\].
+    /// Sum of the variances for recent clipped or missing samples, and the time of the last such sample \[us\].
     pub(crate) lately: ((f32, f32), u64),
     pub(crate) history: StateHistory,
     /// Sum of the horizontal velocity changes by specific force, never corrected \[m/s\].

@@ -83,8 +83,8 @@ impl NominalState {
         self.carry = Vector3::zeros();
     }
 
-    /// Integrates up to `sample`, `dt_s` after the last one. Returns the velocity change by specific force in the earth
-    /// frame \[m/s\].
+    /// Integrates up to `sample`, which is `dt_s` after the last sample. Returns the velocity change by specific force
+    /// in the earth frame \[m/s\].
     #[inline]
     pub(crate) fn advance(&mut self, sample: &ImuSample, dt_s: f32, gravity: f32) -> Vector3<f32> {
         let rates = sample.rates_rad_s - self.gyro_bias;

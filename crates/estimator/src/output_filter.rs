@@ -79,7 +79,7 @@ pub struct OutputFilter {
     forced: FastForceVelocity,
 }
 
-/// Reset counts and yaw of an estimate, to detect a reset in the next one.
+/// Reset counts and yaw of an estimate, to detect a reset in the next estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct LastResets {
     positions: u32,

@@ -82,7 +82,7 @@ impl RestDetector {
         self.blocks >= ENOUGH
     }
 
-    /// Takes a sample, `dt_s` after the last one.
+    /// Takes a sample, `dt_s` after the last sample.
     #[inline]
     pub(crate) fn advance(&mut self, sample: &ImuSample, dt_s: f32, settings: &Settings) {
         let ImuSample { rates_rad_s, specific_force_m_s2, .. } = sample;

@@ -26,7 +26,7 @@ const UNTOLD_M: f32 = 0.01;
 const LEVEL: f32 = 1e-8;
 /// Standard deviation added to roll and pitch when the tilt is doubted \[rad\].
 const DOUBT_RAD: f32 = 0.2;
-/// Standard deviations added to the biases with it: gyroscope \[rad/s\], accelerometer \[m/s2\].
+/// Standard deviations added to the biases when the tilt is doubted: gyroscope \[rad/s\], accelerometer \[m/s2\].
 const DOUBT_RAD_S: f32 = 0.02;
 const DOUBT_M_S2: f32 = 0.2;
 /// Standard deviations added to the biases for each scalar while the mean innovation is too large.
@@ -72,7 +72,8 @@ impl Memory {
         let (x, y) = (-r.row(1) * (1.0 / gravity), r.row(0) * (1.0 / gravity));
         let (dip_x, dip_y) = aligned.dip;
         let by_bias = Matrix3::from_rows(&[x, y, -(x * dip_x + y * dip_y)]);
-        // Second-order effects: the bias along z changes the divisor, and the heading error changes the direction.
+        // Two effects are of second order. The bias along z changes gravity's measured size, and the heading error
+        // changes the direction.
         let share = bias * bias / (gravity * gravity);
         let own = if aligned.by_field { estimator.magnetic_variance } else { 0.0 };
         let turned = aligned.heading_variance.unwrap_or(0.0) + own;

@@ -73,7 +73,7 @@ impl Folder {
         }
         // Checks again: another program may have written into the folder before it was locked.
         let folder = Folder { _lock: Some(lock), ..Folder::find(path, command, name, force)? };
-        // Only under the lock: no running program owns any of the temporary files.
+        // This is only done under the lock, when no running program owns any of the temporary files.
         remove_temporary_files(path);
         folder.add::<&str>(&[])?;
         Ok(folder)

@@ -50,8 +50,8 @@ pub(crate) struct Guide {
 }
 
 impl<M: Default> Armed<M> {
-    /// Starts a flight in the memory of the last one. It is not inlined, so that the tick's stack holds no copy of the
-    /// new memory.
+    /// Starts a flight in the memory of the last flight. It is not inlined, so that the tick's stack holds no copy of
+    /// the new memory.
     #[cold]
     #[inline(never)]
     pub(crate) fn begin(

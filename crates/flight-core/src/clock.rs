@@ -144,7 +144,7 @@ impl KnownOffset {
         self.fastest_us() - offset_us(sent_us, arrived_us) > AHEAD_US.into()
     }
 
-    /// Returns the time of a message that is newer than the previous one, and not far ahead.
+    /// Returns the time of a message that is newer than the previous message, and not far ahead.
     fn stamp(&mut self, sent_us: u64, arrived_us: u64) -> u64 {
         let offset_us = offset_us(sent_us, arrived_us);
         (self.sent_us, self.arrived_us) = (sent_us, arrived_us);

@@ -101,8 +101,9 @@ pub(crate) fn extrapolated(state: &State, age_us: u32) -> State {
 }
 
 impl<M> FlightCoreMemory<M> {
-    /// Stores the inbox's state. Ignores it if it is not newer than the present one, already stale (states that are
-    /// always late do not count), or from a frozen tracker. Returns true if it was stored.
+    /// Stores the inbox's state. Ignores the state if it is not newer than the present state, or from a frozen tracker.
+    /// Also ignores a stale state, where a delay that all states have does not count as age. Returns true if it was
+    /// stored.
     pub(crate) fn take_state(&mut self, inbox: &Inbox, now_us: u64) -> bool {
         // An observed state is stamped now, so let states from the link, which are always a little older, replace it.
         let gives_way = self.is_observing() && !inbox.is_own();

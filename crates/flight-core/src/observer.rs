@@ -100,7 +100,7 @@ impl PoseObserver {
         }
     }
 
-    /// True if `pose` is newer than the last one and differs from it. A tracker that repeats its pose has frozen.
+    /// True if `pose` is newer than the last pose and differs from it. A tracker that repeats its pose has frozen.
     #[must_use]
     pub fn is_news(&self, pose: &Stamped<Pose>) -> bool {
         pose.at_us > self.pose.at_us && pose.value != self.pose.value

@@ -109,7 +109,7 @@ impl Counter {
         &self.report
     }
 
-    /// Returns the time between the last two ticks \[us\]; 0 before the second one.
+    /// Returns the time between the last two ticks \[us\]. Returns 0 before the second tick.
     pub fn gap_us(&self) -> u32 {
         self.gap_us
     }

@@ -39,7 +39,7 @@ struct Over {
 }
 
 impl Tumble {
-    /// Processes a fresh state, `gap_us` after the last one.
+    /// Processes a fresh state, `gap_us` after the last state.
     #[inline]
     pub fn advance(&mut self, state: &State, gap_us: u32) {
         let (attitude, rates) = (&state.attitude_rad, &state.rates_rad_s);

@@ -342,7 +342,7 @@ fn a_step_ahead_takes_five_stamps_in_a_row() {
             let arrived_us = now_us + index as u64 * 10_000;
             assert_eq!(clock.stamp(HOUR_US + off_us, arrived_us, true), Some(arrived_us), "taken as sent on arrival");
         }
-        // Once stepped, the old clock's stamps are out of order.
+        // Once the clock counts as stepped, the old clock's stamps are out of order.
         let next_us = now_us + offs_us.len() as u64 * 10_000;
         let mut old = clock;
         let stepped = old.stamp(next_us, next_us, true).is_none();
@@ -409,7 +409,7 @@ fn the_sender_that_is_silent_longest_is_forgotten() {
     for silent in 1..=4_u16 {
         let mut tracker = Tracker::default();
         let says = |tracker: &mut Tracker, sender: u16, sent_us: u64, arrived_us: u64| {
-            // The count of late states tells whether this one was late, since another sender is in use.
+            // The count of late states tells whether this state was late, since another sender is in use.
             let late = tracker.refused().late;
             let _ = tracker.stamp(sender, sent_us, arrived_us, hovering(sent_us));
             tracker.refused().late > late

@@ -18,7 +18,7 @@ const STOPPED_M_S: f32 = 0.3;
 /// Remaining angle \[rad\] and rate \[rad/s\] below which a turn is complete.
 const TURNED_RAD: f32 = 0.03;
 const TURNED_RAD_S: f32 = 0.05;
-/// Largest angle by which the commanded heading leads the present one \[rad\]. Below half a turn, since the limiter
+/// Largest angle by which the commanded heading leads the present heading \[rad\]. Below half a turn, since the limiter
 /// takes the shorter way.
 const LED_RAD: f32 = 2.0;
 
@@ -309,7 +309,7 @@ impl MissionMemory {
         })
     }
 
-    /// Requests the next item if this one is done. The mission is done with its last item.
+    /// Requests the next item if the present item is done. The mission is done with its last item.
     fn go_on(
         &mut self,
         leg: &RequestedItem,

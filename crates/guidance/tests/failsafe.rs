@@ -369,7 +369,7 @@ fn the_guidance_bars_arming_for_its_own_reasons_only() {
     ] {
         assert_eq!(against(&bench, &sight), expected, "{sight:?}");
     }
-    // Once armed, the reasons stay as they were.
+    // Once the vehicle is armed, the reasons against arming stay as they were.
     let armed = GuidanceInputs { core: Mode::Flying, sensors: gnss, ..well };
     assert_eq!(against(&bench, &armed), []);
 }

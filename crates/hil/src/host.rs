@@ -404,7 +404,7 @@ impl Host {
         HostTick { report, bytes, change, signing: self.comms.signing_record(), asks_esc: action.ask }
     }
 
-    /// Runs the tick one millisecond after the previous one, with a reported duration of zero.
+    /// Runs the tick one millisecond after the previous tick, with a reported duration of zero.
     pub fn next_tick(&mut self, uplink: &[u8]) -> HostTick {
         self.tick(uplink, self.took.time_us + PERIOD_US, 0.0)
     }

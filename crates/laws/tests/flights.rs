@@ -249,7 +249,7 @@ fn jerk_and_snap_keep_indi_on_its_path() {
     }
 }
 
-/// DFBC without jerk and snap is far off, too.
+/// Without jerk and snap, DFBC is far off the trajectory, too.
 #[test]
 fn jerk_and_snap_keep_dfbc_on_its_path() {
     let gains = dfbc::Gains { rotor_time_constant_s: 0.0, ..dfbc::Gains::PAPER_VEHICLE };
@@ -273,7 +273,7 @@ fn indi_flies_rotors_of_half_to_twice_the_lag_it_knows() {
     }
 }
 
-/// A vehicle with random factors on mass, inertia and thrust factor, pushed by a constant force and moment.
+/// Draws a vehicle with random factors on mass, inertia and thrust factor, pushed by a constant force and moment.
 struct Stranger {
     factors: [(PlantParameter, f64); 3],
     /// Push along each axis: linear \[m/s2\], then angular \[rad/s2\].
@@ -325,13 +325,14 @@ fn strangers_come_to_rest_where_they_should() {
         let estimate = lands("l1", &l1(), &stranger);
         let [(_, mass), (_, inertia), (_, thrust)] = stranger.factors;
         let pushed = -Vector3::new(stranger.push[0], stranger.push[1], stranger.push[2]);
-        // The true thrust over mass balances gravity and push; the model believes in mass / thrust times as much.
+        // The true thrust over mass balances gravity and push. The law's model expects this thrust to accelerate the
+        // vehicle by mass / thrust times as much, where both are factors on the nominal values.
         let gravity = Vector3::new(0.0, 0.0, 9.81);
         let lacking = gravity - (gravity - pushed) * (mass / thrust);
         let error = (estimate.force_m_s2.cast::<f64>() - lacking).norm();
         assert!(error < 0.01 * 9.81, "{:?} for {lacking:?}", estimate.force_m_s2);
-        // The moments that the rotors give balance the push; the model believes in inertia / thrust times as much, but
-        // for yaw, which the drag of the rotors gives, in inertia times as much.
+        // The moments that the rotors give balance the push. The law's model expects inertia / thrust times as much of
+        // them. For yaw, whose moment comes from the rotors' drag, the model expects inertia times as much.
         let pushed = -Vector3::new(stranger.push[3], stranger.push[4], stranger.push[5]);
         let lacking = pushed.component_mul(&Vector3::new(1.0 / thrust, 1.0 / thrust, 1.0)) * inertia;
         let error = (estimate.moment_rad_s2.cast::<f64>() - lacking).norm();
@@ -339,7 +340,8 @@ fn strangers_come_to_rest_where_they_should() {
     }
 }
 
-/// L1 as in its source has no integral: it cancels what the rotors can cancel, and the rest stays.
+/// L1 as in its source has no integral. It cancels the push that the rotors can cancel, and the rest of the push
+/// remains.
 #[test]
 fn l1_rejects_what_is_matched() {
     let left = |push: [f64; 6], adapting: bool| {

@@ -42,9 +42,9 @@ pub struct StatesRefused {
     pub overtaken: u32,
     /// States that were too old on arrival.
     pub late: u32,
-    /// States from a sender other than the one in use.
+    /// States from a sender other than the sender in use.
     pub elsewhere: u32,
-    /// States that repeat the last one in flight, or come from a tracker that is no longer trusted.
+    /// States that repeat the last state in flight, or come from a tracker that is no longer trusted.
     pub frozen: u32,
 }
 

@@ -257,7 +257,7 @@ proptest! {
         prop_assert_eq!(decode([stream.as_slice()]).0, sent);
     }
 
-    /// A frame that cannot be verified does not delay the next one, whatever its content.
+    /// A frame that cannot be verified does not delay the next frame, whatever the frame contains.
     #[test]
     fn a_foreign_frame_does_not_delay_the_next((stranger, _) in top_level(), message in messages()) {
         let frame = frames(&[message]).concat();

@@ -96,7 +96,7 @@ fn rotated_twice(state: &State) -> f32 {
     16.0 * f32::EPSILON * state.velocity_m_s.norm()
 }
 
-/// Found by `states_survive_the_link` when its bound was an absolute number.
+/// `states_survive_the_link` found this state when its bound was an absolute number.
 #[test]
 fn a_fast_state_survives_the_link() {
     let state = State {

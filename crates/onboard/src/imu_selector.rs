@@ -220,7 +220,7 @@ impl ImuSelector {
     }
 
     /// Checks the two sensors against each other, by the estimate and other measurements. Switches to the other sensor
-    /// if that one is right. Call it in every tick with an estimate.
+    /// if the other sensor is right. Call it in every tick with an estimate.
     pub fn cross_check(&mut self, now: &InertialState, others: &OtherSensors) {
         let works = !self.first.is_silent(now.at_us) && !self.second.is_silent(now.at_us);
         if !works {

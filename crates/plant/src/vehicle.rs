@@ -114,7 +114,7 @@ pub struct Plant {
     body: ModelVector,
     environment: Environment,
     segment: Segment,
-    /// Boxed, so that the ideal plant stays small.
+    /// Simulated effects that the ideal plant does not have. They are boxed, so that the ideal plant stays small.
     effects: Option<Box<SimulatedEffects>>,
     /// Load of the last step; before the first step, that of the initial rotor speeds.
     load: Load,

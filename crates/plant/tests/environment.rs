@@ -44,7 +44,7 @@ fn a_gust_acts_from_its_onset_to_its_end_and_not_a_step_more() {
     assert_eq!(pushed_steps(0.010, 0.015, 0.001, 30), [10, 11, 12, 13, 14]);
     assert_eq!(pushed_steps(0.0, 0.002, 0.001, 10), [0, 1]);
     assert_eq!(pushed_steps(0.007, f64::INFINITY, 0.001, 10), [7, 8, 9]);
-    // An onset between two steps acts from the next one on.
+    // An onset between two steps acts from the next step on.
     assert_eq!(pushed_steps(0.0095, 0.0105, 0.001, 30), [10]);
     assert_eq!(pushed_steps(0.0101, 0.0109, 0.001, 30), Vec::<usize>::new());
     assert_eq!(pushed_steps(0.010, 0.010, 0.001, 30), Vec::<usize>::new());

@@ -80,7 +80,7 @@ fn measurements_arrive_exactly_as_many_steps_later() {
         let mut sensors = sensors(Sensing { delay_s, ..Sensing::default() }, 1);
         for k in 0..300_u16 {
             let measurement = sensors.measure(&motion(k));
-            // Until the first delayed state arrives, the first one is returned.
+            // Until the first delayed state arrives, the first state is returned.
             assert_eq!(measurement.state, motion(k.saturating_sub(steps)).measure());
             assert!(measurement.fresh && (measurement.age_s - delay_s).abs() < 1e-12);
         }

@@ -13,7 +13,7 @@ const GRID_PT: f64 = 0.3;
 const TICK_PT: f64 = 2.0;
 /// Opacity of a band's area.
 const BAND: f64 = 0.2;
-/// A point closer than this to the last one drawn cannot be seen and is left out \[pt\].
+/// A point closer than this to the last drawn point cannot be seen and is left out \[pt\].
 const UNSEEN_PT: f64 = 0.12;
 /// Margin around the values of an axis, as a share of their range.
 const ROOM: f64 = 0.05;
@@ -178,7 +178,7 @@ fn lines(figure: &PaperFigure, panel: &FigurePanel, [x, y]: [&PlotAxis; 2], shap
     }
 }
 
-/// Leaves out points that are too close to the last one kept; the very last point stays.
+/// Leaves out points that are too close to the last point kept. The very last point stays.
 fn thinned(places: impl Iterator<Item = Point>) -> Vec<Point> {
     let mut kept: Vec<Point> = Vec::new();
     let mut last = None;

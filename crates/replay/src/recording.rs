@@ -43,7 +43,7 @@ impl Sensor {
 pub struct SampleSource {
     /// Sensor of the samples.
     pub sensor: Sensor,
-    /// Topic or kind of line; without any samples, the one that is missing.
+    /// Topic, or kind of line, that has the samples. If the log has none, the topic or line that is missing.
     pub topic: String,
     /// Number of samples used.
     pub used: usize,

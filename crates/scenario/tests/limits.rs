@@ -135,7 +135,7 @@ proptest! {
             for (at, (position_m, _)) in [start, end].iter().zip(pair) {
                 prop_assert!((at.position_m - position_m).norm() < 1e-6 * longest_m, "{at:?}, not {position_m}");
             }
-            // The heading turns the short way round from the previous one.
+            // The heading turns the short way round from the previous heading.
             heading_rad += short_turn(heading_rad, pair[1].1);
             prop_assert!((end.yaw_rad - heading_rad).abs() < 1e-6, "{} not {heading_rad}", end.yaw_rad);
             for k in 0..100 {

@@ -24,7 +24,7 @@ pub struct Server {
 /// Answer to a line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LineReply {
-    /// Lines of the answer; the last one begins with `ok` or `error`. Empty for an empty line.
+    /// Lines of the answer. The last line begins with `ok` or `error`. An empty line has an empty answer.
     pub lines: Vec<String>,
     /// Action that the server's caller must carry out.
     pub action: ServerAction,

@@ -91,7 +91,7 @@ impl UdpPort {
     }
 
     /// Handles a datagram. An unknown sender becomes a peer when it sends a valid frame. If there are too many peers,
-    /// it replaces the one that has been silent for longest.
+    /// the new peer replaces the peer that has been silent for longest.
     fn take(
         &mut self,
         (from, bytes): (SocketAddr, &[u8]),

@@ -218,7 +218,7 @@ fn only_a_frame_makes_a_peer() {
     assert!(messages(&datagrams(&station))[0] > 10 && served.reported("connected") == 1, "{:?}", served.lines);
 }
 
-/// If there are too many peers, the one that has been silent for longest goes; bytes that are no valid frame do not
+/// If there are too many peers, the peer that has been silent for longest goes. Bytes that are no valid frame do not
 /// count.
 #[test]
 fn the_longest_silent_peer_goes_first() {

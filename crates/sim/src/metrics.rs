@@ -92,7 +92,7 @@ pub fn inputs(sample: &Sample) -> Vector4<f64> {
 /// Returns true if errors are evaluated at this time.
 #[inline]
 pub fn is_settled(time_s: f64) -> bool {
-    // A tolerance of half a microsecond, since times are decimal and steps binary.
+    // The tolerance is half a microsecond, since times are decimal and steps binary.
     time_s >= SETTLED_S - 5e-7
 }
 
@@ -105,7 +105,7 @@ impl Metrics {
 
 impl Accumulator {
     /// Adds one step.
-    // Inlined, so that only the used parts of a sample are ever built.
+    // This function is inlined, so that only the used parts of a sample are ever built.
     #[inline(always)]
     pub fn add(&mut self, sample: &Sample) {
         self.last_error = tracking_error(sample);

@@ -63,7 +63,7 @@ pub struct StoreCondition {
 struct ActiveSector {
     sector: u32,
     sequence: u32,
-    /// First place after the last one that is not blank.
+    /// First place after the last place that is not blank.
     next: u32,
     /// First place whose values count: after the last [`RecordContent::Begin`].
     first: u32,
@@ -88,7 +88,7 @@ pub struct Store<F> {
 struct FillingSector {
     sector: u32,
     owner: u32,
-    /// Places `next` and `first` as in [`ActiveSector`].
+    /// `next` and `first` are places, as in [`ActiveSector`].
     next: u32,
     first: u32,
 }
@@ -270,7 +270,7 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// Appends a record, in the other sector if this one is full.
+    /// Appends a record. If the active sector is full, the record goes to the other sector.
     fn add(&mut self, record: RecordContent) -> Result<(), Error<F::Error>> {
         let mut active = self.active.ok_or(Error::NeedsErase)?;
         while active.next < Self::PLACES {
@@ -337,7 +337,7 @@ impl<F: NorFlash> Store<F> {
     /// Writes the header, which makes the sector active.
     fn finish(&mut self, filling: FillingSector, sequence: u32) -> Result<(), Error<F::Error>> {
         let FillingSector { sector, owner, next, first } = filling;
-        // If the header cannot be written, the other sector stays active and this one must be erased.
+        // If the header cannot be written, the other sector stays active and this sector must be erased.
         if !self.write(sector, 0, RecordContent::Header { sequence })? {
             return Err(Error::NeedsErase);
         }

@@ -77,7 +77,7 @@ impl Story {
         if self == Story::Sensors { "outdoor" } else { "mocap" }
     }
 
-    /// Returns the events, by the time since the first one \[ms\], and the duration of the story.
+    /// Returns the events with their times since the first event \[ms\], and the duration of the story.
     fn acts(self) -> (Vec<(u32, Act)>, u32) {
         let (offboard, hold) = (|| select(FlightMode::Offboard), 5_000);
         let mut acts = vec![(0, select(FlightMode::Takeoff))];
@@ -151,7 +151,7 @@ impl Story {
         trace
     }
 
-    /// True if a flight differs from the one with this trace.
+    /// True if a flight differs from the flight with this trace.
     pub(crate) fn differs(self, scenario: &Scenario, trace: &[u64]) -> bool {
         let mut trace = trace.iter();
         let mut differs = false;

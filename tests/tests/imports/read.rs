@@ -81,7 +81,7 @@ impl Reader<'_> {
         module
     }
 
-    /// Reads a module that the present one declares.
+    /// Reads a module that the present module declares.
     fn declared(&mut self, item: &syn::ItemMod, file: &FilePath, folder: &FilePath) {
         let (name, parent) = (item.ident.to_string(), self.module);
         let child = match &item.content {

@@ -18,7 +18,7 @@ const WIND_M_S: f64 = 4.0;
 /// Largest additional delay of the state \[s\].
 const AGE_S: f64 = 0.012;
 
-/// A difference between the simulated vehicle and the one that the controllers know.
+/// A difference between the simulated vehicle and the vehicle that the controllers know.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ModelMismatch {
     /// No difference.

@@ -210,7 +210,7 @@ mod tests {
         for system in 1..=INFORMED_MAX as u8 {
             assert_eq!(informed(&mut control, system), (A, false));
         }
-        // A further station overwrites the first one, which then overwrites the second one.
+        // A further station overwrites the first station. When the first station returns, it overwrites the second.
         for system in [9, 1] {
             assert_eq!(informed(&mut control, system), (A, true));
         }

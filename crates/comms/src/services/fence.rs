@@ -44,7 +44,7 @@ pub fn check_item(item: &MissionItem) -> Result<(), Invalid> {
     if ![0, 3, 5, 6].contains(&item.frame) {
         return refuse(MissionResult::UNSUPPORTED_FRAME, "frame is not supported");
     }
-    // Unsigned, because `i32::MIN` has no absolute value in `i32`.
+    // The absolute value is unsigned, because `i32::MIN` has no absolute value in `i32`.
     if item.x.unsigned_abs() > 900_000_000 {
         return refuse(MissionResult::INVALID_X, "latitude is out of range");
     }

@@ -106,7 +106,7 @@ mod tests {
         assert_eq!(told(&mut news, 1_000_000, 9, &one), [(3_000_000, "IMU 2 failed")]);
     }
 
-    /// Frequent changes cause at most one text per second. Each fits into STATUSTEXT, and the last one is right.
+    /// Frequent changes cause at most one text per second. Each text fits into STATUSTEXT, and the last text is right.
     #[test]
     fn a_flood_of_changes_is_none_of_texts() {
         let mut news = ImuNews::NEW;

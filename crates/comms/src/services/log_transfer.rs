@@ -95,7 +95,8 @@ impl LogTransfer {
         let count = count.min(wanted);
         // No underflow: `count` is at most `wanted`, which is at most `left`.
         let (offset_then, left) = (offset.saturating_add(count as u32), left - count as u32);
-        // LOG_DATA that is not full marks the end of the log. If the last one is full, an empty one follows.
+        // LOG_DATA that is not full marks the end of the log. If the log's last LOG_DATA is full, an empty LOG_DATA
+        // follows.
         if count == LOG_DATA_MAX && left > 0 {
             self.parts.push_front(LogPart { log, offset: offset_then, left }).ok();
         }

@@ -37,7 +37,7 @@ fn last(tumble: &mut Tumble, state: &State, ticks: u32) -> bool {
     tumble.is_lost()
 }
 
-/// Ticks until a tumbling vehicle is lost: the first one starts the time.
+/// Number of ticks until a tumbling vehicle is lost. The first tick starts the time.
 const LOST: u32 = LOST_US / GAP_US + 2;
 
 proptest! {

@@ -28,7 +28,7 @@ struct Notes {
 struct Noted {
     received: Option<(State, Setpoint)>,
     steps: u32,
-    /// Number of steps announced as without a position, and whether the next one is announced.
+    /// Number of steps announced as without a position, and whether the next step is announced so.
     position_lost: u32,
     announced: bool,
     /// Number of times it was told to be on the ground, before its first step and later.
@@ -218,7 +218,7 @@ fn late_states_are_carried_on_to_the_present() {
         let mut bench = Bench::flying(asks(1.0), false);
         for tick in 0..50 {
             let outcome = bench.linked(late_us);
-            // Skip states that are older than the last one before this loop: they are ignored.
+            // States that are older than the last state before this loop are ignored, so skip them.
             if tick > late_us / 1000 {
                 assert_eq!(u64::from(outcome.health.state_age_us), late_us);
                 let (state, setpoint) = bench.received();

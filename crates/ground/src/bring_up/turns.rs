@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 const PATIENCE_MS: u64 = 60_000;
 /// Largest angle between gravity and the axis that should be vertical \[rad\]: 30 degrees.
 const ASIDE_MAX_RAD: f32 = 0.52;
-/// Largest time between two samples that is integrated; a longer time counts as this one \[s\].
+/// Largest time between two samples that is integrated \[s\]. A longer time counts as this time.
 const GAP_MAX_S: f64 = 0.1;
 
 /// A turn of the board by hand from level. It has a name, an instruction and the body axis that points up after the

@@ -39,7 +39,8 @@ pub fn decode(frame: &mut [u8]) -> Result<Record, FrameError> {
     let foreign = || FrameError::Foreign(version(body).filter(|version| *version != VERSION));
     match postcard::take_from_bytes(body) {
         Ok((Record::Start(start), _)) if start.version != VERSION => Err(foreign()),
-        // Leftover bytes mean another version, whose first bytes happen to read as a record of this one.
+        // Leftover bytes mean that another version wrote them. Its first bytes happen to read as a record of this
+        // version.
         Ok((record, [])) => Ok(record),
         _ => Err(foreign()),
     }

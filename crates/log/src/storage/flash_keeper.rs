@@ -255,8 +255,8 @@ impl<'a> FlashKeeper<'a> {
         Ok((parts - 1) * ROOM + in_last)
     }
 
-    /// Returns the length of the written pages in a sector, without the last one: its bits may have been changing when
-    /// the power was cut.
+    /// Returns the length of the written pages in a sector, without the last page. The last page's bits may have been
+    /// changing when the power was cut.
     fn unfinished(&mut self, sector: u32) -> Result<u32, FlashFailed> {
         let mut length = ROOM;
         while length > 0 && self.is_blank(sector * SECTOR_BYTES + START + length - PROGRAM_BYTES)? {

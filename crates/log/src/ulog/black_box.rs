@@ -251,7 +251,7 @@ impl Topics<'_, '_> {
             })
     }
 
-    /// Writes a message at its topic's rate, or at once if `like` finds it different from the last one.
+    /// Writes a message at its topic's rate, or at once if `like` finds it different from the last message.
     fn on_change<T: Listed + Copy>(&mut self, last: &mut Option<T>, message: T, like: impl FnOnce(&T, &T) -> bool) {
         if !last.as_ref().is_some_and(|last| like(last, &message)) {
             self.due_us.get_mut(usize::from(T::ID)).into_iter().for_each(|due_us| *due_us = 0);
@@ -303,7 +303,7 @@ impl Last {
         }
     }
 
-    /// Returns true if this kind of measurement is due in a small log, and schedules the next one.
+    /// Returns true if this kind of measurement is due in a small log, and schedules the next measurement.
     fn is_due(&mut self, value: &Measurement, now_us: u64) -> bool {
         let (kind, _) = value.numbers();
         let period_us = TOPICS.get(usize::from(AidOffered::ID)).map_or(0, |topic| topic.small_us);

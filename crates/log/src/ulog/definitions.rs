@@ -154,7 +154,7 @@ impl Definitions {
         })
     }
 
-    /// Writes an information message. Returns none after the last one.
+    /// Writes an information message. Returns none after the last message.
     fn information(&self, index: usize, ring: &mut RingView<'_>) -> Option<bool> {
         let text = |ring: &mut RingView<'_>, name: &str, text: &str| match text {
             "" => true,

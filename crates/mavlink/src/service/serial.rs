@@ -36,7 +36,7 @@ impl SerialControl {
     /// Number of the shell in `SERIAL_CONTROL_DEV`.
     pub const SHELL: u8 = 10;
 
-    /// Reads a message that has this one of the two flags, and not the other.
+    /// Reads a message that has `flag`, which is `REPLY` or `RESPOND`, but not both.
     pub(super) fn read(payload: &[u8], flag: u8) -> Result<(Self, Address), FrameFault> {
         let (_, _, device, flags, bytes, _, _, to) = SERIAL.read(payload);
         if flags & (REPLY | RESPOND) != flag {

@@ -83,7 +83,7 @@ pub fn frames(stream: &[u8], seed: impl Fn(u32) -> Option<u8>) -> Vec<Frame> {
             at += 1;
             continue;
         }
-        // Two frames are possible, here and after the skipped bytes: the one that is complete first counts.
+        // A frame may begin here and another after the skipped bytes. The frame that is complete first counts.
         if at < sealed
             && let Some(other) = Frame::end(stream, sealed)
             && (known..end).contains(&other)

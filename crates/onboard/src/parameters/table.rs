@@ -91,7 +91,7 @@ impl ParameterTable {
     }
 
     /// Changes one of several parameters, without regard to the others. Call [`ParameterTable::check`] after the last
-    /// one.
+    /// change.
     ///
     /// # Errors
     /// The reason, with nothing changed: the parameter is unknown, or the value is out of range.

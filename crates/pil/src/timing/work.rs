@@ -136,11 +136,11 @@ impl InstructionCounts {
                 looped: 515,
             },
             CriticalSection { what: "timer of a task", priority: priority::HOUSEKEEPING, straight: 216, looped: 0 },
-            // Copies 64 bytes to an odd address.
+            // The section copies 64 bytes to an odd address.
             CriticalSection { what: "messages, to USB's ring", priority: priority::COMMS, straight: 200, looped: 233 },
         ];
         if board.senses {
-            // Copies the message of a fix, 48 bytes, and the origin.
+            // The section copies the message of a fix, 48 bytes, and the origin.
             sections.push(CriticalSection {
                 what: "a fix, to stations",
                 priority: priority::AIDING,
@@ -195,7 +195,7 @@ impl InstructionCounts {
             instructions: self.systick,
             interrupts: 1,
             bus_ns: 0,
-            // If SysTick is later, the next one is lost.
+            // If SysTick's response is longer than a tick, the next tick is lost.
             deadline_ns: Some(TICK_NS),
         }];
         let byte = |name, rate: RateOfUart, is_heard: bool| RowInput {
@@ -205,8 +205,8 @@ impl InstructionCounts {
             instructions: self.byte,
             interrupts: 1,
             bus_ns: 0,
-            // If a received byte's interrupt is later, the arriving byte has no room. A byte to send has no deadline,
-            // since the line just waits.
+            // If the interrupt of a received byte comes later, the next byte has no room. A byte to send has no
+            // deadline, since the line just waits.
             deadline_ns: is_heard.then(|| board.uart_keeps * rate.byte_ns(link_baud)),
         };
         let links = [
@@ -288,7 +288,7 @@ impl InstructionCounts {
             instructions: self.wake,
             interrupts: 1,
             bus_ns: 0,
-            // If the links' task is later, tick results are dropped.
+            // If the links' task comes later, tick results are dropped.
             deadline_ns: Some(QUEUE * TICK_NS),
         }]);
         entries.sort_by_key(|entry| entry.priority);

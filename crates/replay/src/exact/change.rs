@@ -8,7 +8,7 @@ use std::str::FromStr;
 /// Key that selects the law in `KEY=VALUE`.
 const LAW: &str = "law";
 
-/// A setting that replaces the one that was flown.
+/// A setting that replaces the flown setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SettingChange {
     /// A parameter by its MAVLink name, and its value from the first start on.

@@ -91,7 +91,7 @@ pub(super) fn run(
 
 impl ExactRun {
     fn take(&mut self, byte: usize, record: &Record) -> Result<(), String> {
-        // Ticks are missing after the last one.
+        // Ticks are missing after the last recorded tick.
         let before_us = matches!(record, Record::Tick(tick, _) if tick.number != self.next).then_some(self.last_us);
         self.count(record);
         if self.out.first_difference.is_some() || self.out.starts == 0 {

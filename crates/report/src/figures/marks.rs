@@ -16,7 +16,7 @@ pub(super) struct TimeMark {
     pub(super) is_band: bool,
     /// Tint of the band; overlapping bands have different tints.
     pub(super) tint: Rgb,
-    /// Number of bands below this one, which determines its width along the trajectory.
+    /// Number of bands below this band, which determines the band's width along the trajectory.
     pub(super) depth: usize,
     /// Row of the label and band, 0 at the bottom. Marks in one row do not overlap in time.
     pub(super) lane: usize,

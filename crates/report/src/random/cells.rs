@@ -4,7 +4,7 @@ use super::results::{RandomResults, VehicleGroup};
 use afbc_campaign::random::{RESAMPLES, Ranking, RankingDifference};
 use afbc_sim::metrics::SETTLED_S;
 
-/// Column heads without the contender's; the reference contender's name is appended to the last one.
+/// Column heads without the contender's. The reference contender's name is appended to the last head.
 pub(super) const HEADS: [&str; 6] = ["best or level", "lost", "alone", "median [m]", "geometric [m]", "over"];
 
 /// Returns the column heads.

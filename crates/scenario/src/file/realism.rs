@@ -49,7 +49,7 @@ pub(super) fn read(
         }
         None => (default.contact, default.ground_effect),
     };
-    // The scenario's seed is used instead of this one.
+    // The scenario's seed is used instead of this seed.
     Ok(Realism { rotors, drag, wind, contact, ground_effect, seed: 0 })
 }
 

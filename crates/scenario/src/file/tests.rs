@@ -75,8 +75,8 @@ fn documented_examples_are_valid_and_complete() {
         example(&text).unwrap_or_else(|error| panic!("{error} in\n{text}"));
         for line in text.lines().filter(|line| line.contains(" = ")) {
             let documented = rows.iter().any(|[key, ..]| line.starts_with(&format!("{} = ", key.trim_matches('`'))));
-            // Not in the table: the kind of a trajectory, the profile, and the head of a contender whose gains are the
-            // subject.
+            // The table does not list the kind of a trajectory, the profile, and the head of a contender whose gains
+            // are the subject.
             let head =
                 ["kind", "name", "controller", "profile"].iter().any(|key| line.starts_with(&format!("{key} = ")));
             assert!(documented || head, "{line}");

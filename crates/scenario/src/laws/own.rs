@@ -24,7 +24,7 @@ const TAKEN: [&str; 3] = ["afbc-as-printed", "backstepping-as-printed", "afbc-mo
 /// A new instance is made for each flight, so it may keep its own memory.
 pub trait OwnController: Send {
     /// Computes the demanded U1..U4 \[N\] of one step from a plausible state and setpoint. A state that is not `fresh`
-    /// repeats the last one. An input that is not finite counts as zero.
+    /// repeats the last state. An input that is not finite counts as zero.
     fn step(&mut self, state: &State, setpoint: &Setpoint, fresh: bool) -> Inputs;
 }
 

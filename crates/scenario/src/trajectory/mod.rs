@@ -98,7 +98,8 @@ pub enum Trajectory {
     /// after the last. Position, velocity and acceleration are continuous; the jerk jumps at each waypoint. The heading
     /// turns by the difference of the waypoints' yaw: [`nearest_heading`] makes that the short way round.
     Waypoints(Vec<Waypoint>),
-    /// Polynomial pieces, each beginning where the previous one ends; at rest before the first and after the last.
+    /// Polynomial pieces. Each piece begins where the previous piece ends. The reference rests before the first and
+    /// after the last piece.
     Polynomials(Vec<PolynomialPiece>),
 }
 

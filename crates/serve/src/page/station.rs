@@ -79,7 +79,7 @@ impl PageStation {
 
     /// Sends a command.
     pub(crate) fn command(&mut self, server: &mut Server, command: VehicleCommand) {
-        // A new command cancels what was to follow the last one.
+        // A new command cancels whatever was to follow the last command.
         (self.once_armed, self.target_m) = (None, None);
         self.client.command(command, RetryPolicy::ONCE);
         self.send(server);

@@ -65,7 +65,7 @@ impl ConnectionSlots {
 
 impl ConnectionSlot {
     /// Turns the connection into a page; returns false if its place has been taken. If there are too many pages, the
-    /// one that has been silent for longest stops being a page, so that eight open pages lock nobody out.
+    /// page that has been silent for longest loses its place, so that eight open pages lock nobody out.
     pub(crate) fn keep(&self) -> bool {
         let mut open = self.slots.lock();
         let Some(own) = open.iter().position(|it| it.number == self.number) else { return false };

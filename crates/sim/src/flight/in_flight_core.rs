@@ -44,7 +44,8 @@ impl<C: FlightController<N>, const N: usize> InFlightCore<C, N> {
         if let Some(Aged { value, age_us }) = view.pose {
             self.inbox.put_pose(Stamped { value, at_us: at_us.saturating_sub(age_us.into()) });
         }
-        // A held state would count as fresh; the flight core extrapolates between states itself.
+        // Only new states are passed on. A state that is held between samples would count as fresh, and the flight core
+        // extrapolates by itself.
         match (view.state.filter(|state| view.new && state.is_plausible()), view.missing) {
             (Some(state), _) => self.inbox.locate(stamped(state)),
             (None, Some(missing)) => self.inbox.put_position_lost(view.position_lost.map(stamped), missing),

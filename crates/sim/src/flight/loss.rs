@@ -57,7 +57,7 @@ impl LossDetector {
 
     /// Returns the reason for which the vehicle counts as lost; none if it does not. `descends` is true while a
     /// failsafe brings the vehicle down.
-    // Inlined, so that only the used parts of a sample are ever built.
+    // This function is inlined, so that only the used parts of a sample are ever built.
     #[inline(always)]
     pub(super) fn lost(&mut self, sample: &Sample, descends: bool) -> Option<&'static str> {
         match uncontrolled(sample) {

@@ -60,7 +60,7 @@ struct Rows<W>([[W; CHANNELS]; FRAME_ROWS + 1]);
 /// register.
 pub struct Motors<T: GeneralInstance4Channel, D: UpDma<T>, I, W, A = ()> {
     timer: Timer<'static, T>,
-    /// Kept, since a dropped pin is no longer an output.
+    /// Pins of the motors. They are kept, since a dropped pin is no longer an output.
     _pins: Pins<T>,
     clock: TimerClock,
     dma: Peri<'static, D>,

@@ -206,7 +206,7 @@ pub struct StampHandler<I>(PhantomData<I>);
 impl<I: typelevel::Interrupt> typelevel::Handler<I> for StampHandler<I> {
     #[expect(unsafe_code, reason = "as the trait has it; nothing here is unsafe")]
     unsafe fn on_interrupt() {
-        // Only the lower half, since this core cannot store 64 bits at once.
+        // Only the lower half of the time is stored, since this core cannot store 64 bits at once.
         let now_us = Instant::now().as_micros() as u32;
         // Masked lines may have pending edges, too.
         let lines = EXTI.pr(0).read().0 & EXTI.imr(0).read().0;

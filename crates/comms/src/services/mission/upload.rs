@@ -28,7 +28,7 @@ pub(super) enum Reminder {
 }
 
 impl Upload {
-    /// Creates an upload of `count` items. The caller requests the first one now.
+    /// Creates an upload of `count` items. The caller requests the first item now.
     pub(super) fn new(plan: MissionType, count: u16, from: Address, now_us: u64) -> Self {
         Upload { plan, from, items: Vec::new(), count, asked_us: now_us, tries: 1 }
     }
@@ -38,7 +38,7 @@ impl Upload {
         self.items.len() as u16
     }
 
-    /// Takes the expected item. Returns the number of the next one, if there is one.
+    /// Takes the expected item. Returns the number of the next item, if there is one.
     pub(super) fn put(&mut self, item: MissionItem, now_us: u64) -> Option<u16> {
         self.items.push(item).ok();
         (self.asked_us, self.tries) = (now_us, 1);

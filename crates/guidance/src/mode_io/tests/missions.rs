@@ -58,7 +58,8 @@ fn waypoints_are_reached_within_their_distance() {
         assert_eq!(progress(&mut mission, &stage, &last).output.done, reached, "{case:?}");
         assert_eq!(mission.wanted, if reached { 0 } else { 3 }, "{case:?}");
     }
-    // Once reached, it holds for its time even if it drifts away. A fly-through waypoint does not hold.
+    // A vehicle that has reached a waypoint holds for the waypoint's time, even if it drifts away. At a fly-through
+    // waypoint it does not hold.
     for (hold_s, fly_through, ticks) in [(0.05, false, 50), (0.05, true, 1), (0.0, false, 1)] {
         let mut mission = wanting(0);
         let one = leg(0, item(0.0, fly_through, hold_s));
