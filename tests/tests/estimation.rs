@@ -265,7 +265,7 @@ struct Consistency {
     nees: [f64; TIMES_S.len()],
     /// Squared error divided by the variance of attitude, velocity and position, for each coordinate, at these times.
     ratios: [Vector3<f64>; 3],
-    /// For each aid: sum of normalised innovations squared, number of scalars, number of rejected measurements.
+    /// Sum of normalised innovations squared, number of scalars and number of rejected measurements, for each aid.
     nis: [(f64, u64, u64); AidSource::ALL.len()],
 }
 
@@ -342,8 +342,8 @@ fn consistent_outdoors() {
     for (scenario, height) in [(&slow, 1.3), (&fast, 1.02)] {
         let found = monte_carlo(scenario);
         let name = &scenario.name;
-        // The variances are slightly too large, to allow for vibration. NEES may be below the lower bound but never
-        // above the upper one.
+        // The variances are slightly too large, to allow for vibration. So NEES may be below its lower bound, but never
+        // above its upper bound.
         let most = 9.0 + 1.96 * (18.0 / FLIGHTS as f64).sqrt();
         assert!(found.nees.iter().all(|nees| (6.0..most).contains(nees)), "{name}: {:?}", found.nees);
         assert!(found.ratios.iter().all(|ratio| ratio.max() <= 1.3), "{name}: {:?}", found.ratios);
@@ -397,7 +397,7 @@ fn hours_of_flight() {
         let nees = nees / checks;
         println!("{name}, {hours} h: NEES {nees:.2}, largest sigma {sigmas:.3?}, attitude off by {turned:.4?} rad");
         println!("  of {checks} beyond 3 sigma {far:?}");
-        // By chance, one error in 370 is outside. Outdoors, errors last for minutes.
+        // By chance, one error in 370 exceeds three standard deviations. Outdoors, errors last for minutes.
         assert!(far.iter().all(|far| *far <= 10.0 + 0.01 * checks), "{name}: {far:?} of {checks}");
         assert!(sigmas[0] < 0.05 && sigmas[1] < 0.1 && sigmas[2] < sigma_m, "{name}: {sigmas:?}");
         assert!(nees < nees_max && turned.xy().max() < 0.02 && turned.z < 0.12, "{name}: {nees}, {turned} rad");

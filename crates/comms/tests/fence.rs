@@ -304,7 +304,7 @@ fn a_return_lands_at_the_nearest_place() {
     assert_eq!(vehicle.safe(1200), None);
     vehicle.report.guided.mode = FlightMode::Hold;
     assert_eq!(vehicle.safe(10), Some(points[0]), "at once: it has not been looked for");
-    // Without rally points it is home again.
+    // Without rally points, home is the nearest safe place again.
     vehicle.hear(&Uplink::Mission(MissionMessage::Clear(MissionType::RALLY)));
     assert_eq!((vehicle.safe(510), vehicle.safe(1200)), (Some(HOME), None));
     // A vehicle without a position has no nearest place.

@@ -272,7 +272,7 @@ fn a_tracker_stands_in_for_a_dead_sensor() {
     }
 }
 
-/// If the IMU works again it is used again, and so is the tracker.
+/// An IMU that works again is used again, and so is the tracker.
 #[test]
 fn the_sensor_comes_back() {
     let (mut bench, place) = (Bench::new(), state(0.0));

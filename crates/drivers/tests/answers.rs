@@ -73,7 +73,7 @@ proptest! {
         fields(&give(&mut Lis3mdl, &lis3mdl), [400.0; 3]);
     }
 
-    /// Barometers with random calibrations whose checksum is correct.
+    /// Barometers survive any calibration whose checksum is correct, and any raw values.
     #[test]
     fn any_calibration_is_survived(
         coefficients in vec(any::<u8>(), 18),

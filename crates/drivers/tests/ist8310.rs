@@ -100,7 +100,8 @@ fn right(reading: &MagneticReading) -> bool {
 fn it_passes_the_suite() {
     let others = vec![(Registers { identity: 0x08, ..Registers::new() }, 0x08)];
     let pace = Pace::Polled(950..=1_000);
-    // After a reset it measures on, worse: its registers tell, of which one is read every 16 cycles.
+    // After a reset the part measures on with its worse defaults. The registers show this, and the driver reads one of
+    // them every 16 cycles.
     Suite { part: &|| Ist8310, model: &Registers::new, right, notice_us: 1_500_000, others, pace }.passes();
 }
 

@@ -117,7 +117,7 @@ fn the_tracker_is_gone_in_hover() {
     assert!(one < 0.2 && three < 1.5, "{one} m, {three} m");
 }
 
-/// A tracker that is 250 ms late: on the figure of eight the vehicle has moved half a metre by then.
+/// A tracker may be 250 ms late. On the figure of eight, the vehicle has moved half a metre by then.
 #[test]
 fn a_late_tracker() {
     let truth = fly(eight, 16.0);

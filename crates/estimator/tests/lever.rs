@@ -88,7 +88,7 @@ impl Body {
         self.rates += acceleration * STEP_S;
         self.angles_rad += self.rates * STEP_S;
         self.climb[0] += (self.climb[1] - self.climb[0]) * 10.0 * STEP_S;
-        // Drag, proportional to the velocity that the tilt causes.
+        // Drag is proportional to the velocity that the tilt causes.
         self.velocity +=
             (Vector3::new(G * self.angles_rad.y, -G * self.angles_rad.x, 0.0) - self.velocity * 0.3) * STEP_S;
         let force = Vector3::new(0.0, 0.0, G + self.climb[0]) - self.velocity * 0.3;
@@ -119,8 +119,8 @@ fn lever() -> impl Strategy<Value = Vector3<f64>> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// In 10 s of manoeuvres the vertical distance is found within 1.5 cm. The horizontal ones, which only turns about
-    /// the vertical show well, agree with their standard deviations.
+    /// In 10 s of manoeuvres the vertical distance is found within 1.5 cm. Only turns about the vertical show the
+    /// horizontal distances well. The errors of these distances agree with their standard deviations.
     #[test]
     fn a_lever_is_found(
         seed in any::<u64>(), lever_m in lever(), hover_rad_s in 180.0..1800.0_f64, shaken in 0.0..0.05_f64,
@@ -134,10 +134,11 @@ proptest! {
         let [found_m, sigma_m] = finder.found_m();
         let off_m = found_m.cast::<f64>() - lever_m;
         prop_assert!(off_m.z.abs() < 0.015, "{lever_m} {found_m} {sigma_m}");
-        // Within the standard deviations, apart from drag and turns so fast that the filters' delays matter.
+        // The errors are within the standard deviations, apart from drag and turns so fast that the filters' delays
+        // matter.
         let stated = off_m.iter().zip(&sigma_m).all(|(off_m, sigma_m)| off_m.abs() < 4.0 * f64::from(*sigma_m) + 0.003);
         prop_assert!(stated, "{lever_m} {found_m} {sigma_m}");
-        // Each axis is corrected by the found lever, or not yet.
+        // Each axis is corrected by the found lever, or not corrected yet.
         let corrected_m = finder.corrected_m();
         let mut parts = corrected_m.iter().zip(&found_m);
         let one_or_none = parts.all(|(part, found)| *part == 0.0 || (part - found).abs() < 2e-3);

@@ -239,7 +239,7 @@ impl Inbox {
             None => taken.position_lost = None,
         }
         taken.missing = self.missing;
-        // A pose is rare, and it is taken once.
+        // Poses are rare, and each pose is taken once.
         match &self.pose {
             Some(pose) => {
                 taken.pose = Some(*pose);

@@ -217,7 +217,7 @@ impl Guidance {
         self.memory.rates.as_ref()
     }
 
-    /// Returns what it has against arming, as it was while the vehicle was disarmed.
+    /// Returns the guidance's reasons against arming, as they were while the vehicle was disarmed.
     // These reasons are not in the output of a tick, of which the firmware has a queue, because the flight core's
     // reasons include them.
     pub fn arming_refusals(&self) -> Reasons {

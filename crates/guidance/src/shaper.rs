@@ -179,7 +179,7 @@ impl MotionShaper {
         };
         let jerk = capped(jerk, reach.jerk);
         let next = capped(motion.acceleration + jerk * dt_s, reach.acceleration);
-        // If the acceleration exceeds a limit that has just been lowered, it decreases with the largest jerk.
+        // If a lowered limit is below the present acceleration, the acceleration decreases with the largest jerk.
         let jerk = capped((next - motion.acceleration) / dt_s, reach.jerk);
         motion.advance(jerk, dt_s);
     }

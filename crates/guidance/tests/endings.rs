@@ -202,14 +202,14 @@ fn a_takeoff_without_lift_is_given_up() {
     assert!(after.is_some_and(|ticks| (9_990..10_010).contains(&ticks)), "{after:?}");
     assert_eq!((mode, rests), (FlightMode::Land, false));
     assert_eq!(said, [GuidanceNotice::Mode(FlightMode::Land, ModeReason::NoLift)]);
-    // With thrust in reserve it counts as flying, unless it does not follow: the setpoint is 1 m away after about a
-    // second.
+    // With thrust in reserve the vehicle counts as flying, unless it does not follow: the setpoint is 1 m away after
+    // about a second.
     for given_m_s2 in [Some(1.7 * G), None] {
         let (after, mode, ..) = takes_off(true, given_m_s2, 0.0);
         assert!(after.is_some_and(|ticks| (10_500..12_000).contains(&ticks)), "{after:?}");
         assert_eq!(mode, FlightMode::Land);
     }
-    // Off the ground it is flying.
+    // Off the ground, the vehicle counts as flying.
     assert_eq!(takes_off(true, exhausted, 1.1 * LEFT_M).0, None);
     // If the flight core reports it on the ground, a position change alone does not count as leaving.
     assert!(takes_off(false, None, 1.1 * LEFT_M).0.is_some());

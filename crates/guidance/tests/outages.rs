@@ -115,7 +115,8 @@ impl Flight {
                 prop_assert!(self.bench.state.position_m.z < 0.2, "{:?}", self.bench.state);
                 return Ok(());
             }
-            // On the ground it is about to be disarmed.
+            // Above the ground, a steady vehicle flies in the wanted mode. On the ground, the vehicle may be about to
+            // be disarmed.
             if sees && self.steady_us > RESUME_US + 2000 && self.bench.state.position_m.z > 0.2 {
                 prop_assert_eq!(self.bench.core, Mode::Flying);
                 prop_assert_eq!(guided.mode, self.wanted, "{:?}", self.bench.said);

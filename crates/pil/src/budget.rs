@@ -373,7 +373,7 @@ impl InstructionEffect {
             _ if code & 0xFF80 == 0xB080 => InstructionEffect::Push(4 * (bits & 0x7F)),
             // BLX register; BX other than LR
             _ if code & 0xFF87 == 0x4780 || code & 0xFF87 == 0x4700 && code != 0x4770 => InstructionEffect::Indirect,
-            // B with condition; conditions 14 and 15 are UDF and SVC
+            // This is a conditional branch B. The conditions 14 and 15 mean UDF and SVC.
             _ if code & 0xF000 == 0xD000 && code & 0x0E00 != 0x0E00 => InstructionEffect::Branch(signed(bits << 1, 9)),
             // B
             _ if code & 0xF800 == 0xE000 => InstructionEffect::Branch(signed(bits << 1, 12)),
@@ -392,7 +392,7 @@ impl InstructionEffect {
                 let offset = s << 24 | i1 << 23 | i2 << 22 | (a & 0x3FF) << 12 | (b & 0x7FF) << 1;
                 return InstructionEffect::Branch(signed(offset, 25));
             }
-            // B with condition; 14 and 15 are system instructions
+            // This is a conditional branch B. The conditions 14 and 15 mean system instructions.
             0x0000 if is_branch && a >> 7 & 7 != 7 => {
                 let offset = s << 20 | j2 << 19 | j1 << 18 | (a & 0x3F) << 12 | (b & 0x7FF) << 1;
                 return InstructionEffect::Branch(signed(offset, 21));

@@ -91,7 +91,7 @@ fn the_tick_keeps_its_time_on_any_processor() {
         let mut station = Station::default();
         let ticks = (0..2_500).map(|tick| emulator.exchange(&bytes_of_tick(&mut station, tick)).unwrap());
         let times: Vec<u64> = ticks.map(|reply| reply.time_us).collect();
-        // From the interrupt to the tick it takes some 300 instructions.
+        // The firmware needs some 300 instructions from the interrupt to the tick.
         let latest_us = 10 << slower;
         for pair in times.windows(2) {
             let gap_us = pair[1] - pair[0];

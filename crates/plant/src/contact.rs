@@ -89,7 +89,7 @@ impl Contact {
 
 /// A vehicle counts as near if it can fall to the ground within this time, which is longer than any step \[s\].
 const NEAR_S: f64 = 0.04;
-/// Added to the reach of feet and rotors, so that a vehicle just above the ground counts as near, too \[m\].
+/// Margin on the reach of feet and rotors, so that a vehicle just above the ground counts as near, too \[m\].
 const NEAR_M: f64 = 0.02;
 
 /// Ground below one vehicle.

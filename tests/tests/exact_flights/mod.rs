@@ -34,7 +34,7 @@ fn sends(ms: u64, random: &mut Xoshiro256PlusPlus) -> Option<Uplink> {
         _ => {}
     }
     match random.next_u32() % 300 {
-        // Before it flies, the station only sends parameters.
+        // The station only sends parameters before the vehicle flies.
         number if ms < 9_500 && number != 4 => None,
         0 => command(VehicleCommand::Speed(1.0 + (random.next_u32() % 5) as f32)),
         1 => command(VehicleCommand::Engage),

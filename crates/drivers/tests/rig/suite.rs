@@ -26,7 +26,7 @@ pub struct Suite<'a, P: SensorPart, M> {
     pub right: fn(&P::Reading) -> bool,
     /// The longest that a fault may stay unnoticed \[us\].
     pub notice_us: u64,
-    /// Other parts, and by what they are named.
+    /// Other parts that the driver must refuse, and the identity by which it names each.
     pub others: Vec<(M, u8)>,
     /// Source and number of the readings.
     pub pace: Pace,

@@ -69,7 +69,7 @@ impl BringUpStep {
 pub struct BringUpLog {
     /// About the board, the time and the connection: a name and a value.
     pub head: Vec<(String, String)>,
-    /// Steps in the order they were done.
+    /// Steps in the order in which they were done.
     pub steps: Vec<BringUpStep>,
     /// Names and values of the vehicle's parameters.
     pub parameters: Vec<(String, String)>,

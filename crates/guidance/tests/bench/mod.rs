@@ -113,7 +113,7 @@ impl Bench {
         self.core.armed() && self.landing.airborne()
     }
 
-    /// True once it has been at rest long enough to arm.
+    /// True once the vehicle has been at rest long enough to arm.
     pub(crate) fn rested(&self) -> bool {
         self.rest_us >= REST_US
     }

@@ -29,7 +29,7 @@ pub(crate) fn folder(test: &str) -> PathBuf {
     folder
 }
 
-/// Opens the folder as a command's own.
+/// Opens the output folder of a test, as a command opens its own.
 pub(crate) fn open(folder: &Path) -> Folder {
     Folder::open(folder, "test", "it", false).unwrap()
 }
