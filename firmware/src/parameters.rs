@@ -144,7 +144,7 @@ pub fn trouble() -> Option<&'static str> {
     if UNREAD.swap(false, Ordering::Relaxed) {
         return Some("parameters' flash unreadable: using defaults");
     }
-    UNWRITTEN.swap(false, Ordering::Relaxed).then_some("setting not kept: lost at restart unless set again")
+    UNWRITTEN.swap(false, Ordering::Relaxed).then_some("setting not saved to flash: set it again")
 }
 
 /// Queues the record returned by `record`, if any, once the queue has room. `record` is called outside the queue's

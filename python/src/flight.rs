@@ -314,7 +314,10 @@ fn planned(scenarios: &[Scenario], seeds: Option<u64>) -> PyResult<Vec<PlannedFl
         let seeds = seeds.unwrap_or_else(|| comparison::usual_seeds(scenario));
         let end = scenario.seed.checked_add(seeds);
         let end = end.ok_or_else(|| {
-            error(format!("seeds: {seeds} given; so many seeds from the scenario's on exceed the largest seed"))
+            error(format!(
+                "seeds: {seeds} given; counted from the scenario's seed, the last one exceeds the largest seed; give \
+                 fewer seeds"
+            ))
         })?;
         for contender in &scenario.contenders {
             planned.extend((scenario.seed..end).map(|seed| (scenario, contender, seed)));

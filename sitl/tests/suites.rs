@@ -184,7 +184,7 @@ fn rough_flights_are_alike_on_any_number_of_threads() {
         let [one, three] = ["one", "three"].map(|out| fs::read(folder.join(out).join(file)).unwrap());
         assert!(one == three, "{file}");
     }
-    assert!(table.starts_with("Suite rough-estimate: Seed 3, flights of each vehicle, class and seed: 1"), "{table}");
+    assert!(table.starts_with("Suite rough-estimate: Seed 3; flights of each vehicle, class and seed: 1"), "{table}");
     let classes = ["nothing", "vibration", "bumps", "field", "gnss-jump", "tracker-flip", "mixture", "all"];
     for class in classes {
         assert!(table.lines().any(|line| line.starts_with(&format!("{class} "))), "no {class} in {table}");

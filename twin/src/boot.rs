@@ -126,7 +126,7 @@ fn check_early_revision<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> 
     let (early, later) = (early?, later?);
     println!("{}: writes {early:x?} to {:#x}; a later revision writes {later:x?}", revision.name, revision.register);
     check(early == [revision.value], &format!("the erratum of {}", revision.name))?;
-    check(later.is_empty(), "no workaround where there is no erratum")
+    check(later.is_empty(), "no workaround on a chip without the erratum")
 }
 
 /// Boots an image.
@@ -172,7 +172,7 @@ pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
         Signal::Dshot600(_) => looks * LOOK_EVERY / TICK * BITS * BIT_NS / LOOK_EVERY,
         Signal::Pwm400 => *looks,
     };
-    println!("pulses seen in {pulses:?} of {looks} samples of the motors' pins; stopped motors have {carried}");
+    println!("samples with a pulse on each motor's pin: {pulses:?} of {looks}; expected for stopped motors: {carried}");
     check(wrong.is_empty(), &format!("{:?}: {wrong:?}", M::SIGNAL))?;
     check(pulses.iter().all(|pulses| pulses.abs_diff(carried) * 10 <= carried), "every motor has its pulses")?;
 

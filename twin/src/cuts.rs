@@ -355,7 +355,7 @@ pub fn cut_all(image: &Path, seed: u64, cuts: u64) -> Result<(), Box<dyn Error>>
                 values => wrong.push(format!("cut at {now_ns} ns: {values:?}")),
             }
         }
-        check(olds + news + wrong.len() == instants, "a start after each cut")?;
+        check(olds + news + wrong.len() == instants, "the board starts after each cut")?;
         println!("{what}: afterwards {olds} times the old value, {news} times the new value, {} times another \
              value", wrong.len());
         check(wrong.is_empty(), &wrong.join("\n"))?;

@@ -81,7 +81,7 @@ fn whole(name: &'static str, usual: &'static str, help: &'static str) -> Arg {
 
 fn mission_argument() -> Arg {
     let mission = Arg::new("mission").long("mission").action(ArgAction::SetTrue);
-    mission.help("Fly a mission of two minutes, uploaded over the link, in the place of the hover")
+    mission.help("Fly a mission of two minutes, uploaded over the link, instead of the hover")
 }
 
 /// Declares the command line.
@@ -90,7 +90,7 @@ fn command() -> Command {
          phases", "\
          40", "Number of instants within a control period at which the kill switch's frames \
          arrive");
-    let rate = whole("rate", "250", "Frames per second with which the kill switch is tested; may be repeated")
+    let rate = whole("rate", "250", "Frames per second of the receiver in the test of the kill switch; may be repeated")
         .value_parser(value_parser!(u64).range(1..=1000))
         .action(ArgAction::Append);
     let kept = file_argument("hover", "File that keeps the hover, from which further runs begin");

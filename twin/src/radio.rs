@@ -44,7 +44,7 @@ fn kill<M: Machine>(hover: &PilotedHover<M>, rate: u64, phases: u64) -> Result<u
         let late_ns = phase * TICK_NS / phases;
         let PilotedFlight { stick_pilot, vehicle, .. } =
             hover.resume(1_000_000_000 / rate, late_ns, KillSwitchPilot::default())?;
-        let killed_ns = vehicle.transmitter.killed_ns.ok_or("the switch was not sent")?;
+        let killed_ns = vehicle.transmitter.killed_ns.ok_or("the transmitter has not sent the kill switch")?;
         let stopped_ns = stick_pilot.stopped_ns.ok_or("the motors are not stopped")?;
         took_ns.push((stopped_ns.saturating_sub(killed_ns), late_ns));
     }

@@ -157,7 +157,8 @@ impl StickPilot for ReceiverLossPilot {
                     return Err(format!("the link counts as lost after only {passed_ms} ms"));
                 }
                 if passed_ms > LOST_MS && !(is_lost && says("hold")) {
-                    return Err(format!("the vehicle does not hold: {:?}", vehicle.pilot.heard()));
+                    let heard = vehicle.pilot.heard();
+                    return Err(format!("the vehicle does not change to hold; its texts are {heard:?}"));
                 }
                 self.off_m = self.off_m.max(hovers(vehicle, self.start_m)?);
                 vehicle.transmitter.is_heard = passed_ms >= SILENT_MS;
@@ -179,7 +180,8 @@ impl StickPilot for ReceiverLossPilot {
             }
             LossPhase::Lands => {
                 if self.way_m < WAY_M {
-                    return Err(format!("the stick moves the vehicle by {:.2} m", self.way_m));
+                    let way_m = self.way_m;
+                    return Err(format!("the stick moves the vehicle by only {way_m:.2} m; {WAY_M} m are needed"));
                 }
                 let us = &mut vehicle.transmitter.channels.us;
                 (us[PITCH], us[THROTTLE]) = (1500, 1000);

@@ -20,13 +20,13 @@ parameters! {
         /// alpha_1, alpha_2.
         #[group("")]
         pub backstepping: backstepping::Gains = backstepping::Gains::DEFAULT,
-        /// gamma: adaptation gain of Theta_hat (34).
+        /// gamma: adaptation gain of Theta_hat, the paper's equation 34.
         #[parameter(GAMMA, "input per m or rad", 0.0..=10000.0, tuned)]
         pub gamma: f32 = 1.2,
-        /// eta: adaptation gain of delta_hat (33).
+        /// eta: adaptation gain of delta_hat, the paper's equation 33.
         #[parameter(ETA, "input per m or rad", 0.0..=10000.0, tuned)]
         pub eta: f32 = 0.3,
-        /// epsilon: width of the robust term's transition (32).
+        /// epsilon: width of the robust term's transition, the paper's equation 32.
         #[parameter(EPSILON, "m/s or rad/s", 1e-6..=100.0)]
         pub epsilon: f32 = 0.001,
         /// Gaussians over both inputs of the fuzzy system (22).

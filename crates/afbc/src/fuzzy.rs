@@ -30,7 +30,7 @@ parameters! {
         /// c: distance of the outer Gaussians from zero, in the fuzzy inputs' unit.
         #[parameter(CENTRE, "fuzzy input", 1e-3..=1e3)]
         pub centre: f32 = 0.26,
-        /// s: common width, in the fuzzy inputs' unit.
+        /// s: width of each of the three Gaussians, in the fuzzy inputs' unit.
         #[parameter(WIDTH, "fuzzy input", 1e-3..=1e3)]
         pub width: f32 = 0.1,
     }

@@ -41,10 +41,10 @@ parameters! {
     /// computes and vehicle.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct MonitorBounds {
-        /// Bound on |Theta_hat|, in the subsystem's input.
+        /// Bound on |Theta_hat|, in the unit of the subsystem's input.
         #[parameter(THETA, "input", 0.0..=1e9)]
         pub theta: PerAxis<f32> = PerAxis { roll: 1e9, pitch: 1e9, yaw: 1e9, z: 1e9, x: 1e9, y: 1e9 },
-        /// Bound on delta_hat, in the subsystem's input.
+        /// Bound on delta_hat, in the unit of the subsystem's input.
         #[parameter(DELTA, "input", 0.0..=1e9)]
         pub delta: PerAxis<f32> = PerAxis { roll: 1e9, pitch: 1e9, yaw: 1e9, z: 1e9, x: 1e9, y: 1e9 },
         /// Bound on the mean distance from the reference, |e_1|.
@@ -53,7 +53,7 @@ parameters! {
         /// Largest share of steps with a rotor at a limit.
         #[parameter(SAT_SHARE, "1", 0.01..=1.0)]
         pub saturation_share: f32 = 0.9,
-        /// Smallest reversal of an input that counts as one.
+        /// Smallest swing of an input that counts as a reversal.
         #[parameter(SWING, "N", 1e-3..=1e4)]
         pub swing_n: f32 = 1e4,
         /// Largest number of reversals of one input per second.

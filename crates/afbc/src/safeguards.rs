@@ -30,10 +30,10 @@ parameters! {
         /// kappa: leakage that grows with the error.
         #[parameter(KAPPA, "1/s per m/s or rad/s", 0.0..=100.0)]
         pub kappa: f32 = 0.0,
-        /// Bound on |Theta_hat|, in the subsystem's input.
+        /// Bound on |Theta_hat|, in the unit of the subsystem's input.
         #[parameter(THETAMAX, "input", 0.0..=1e6)]
         pub theta_max: f32 = 1e6,
-        /// Bound on delta_hat, in the subsystem's input.
+        /// Bound on delta_hat, in the unit of the subsystem's input.
         #[parameter(DELTAMAX, "input", 0.0..=1e6, tuned)]
         pub delta_max: f32 = 1e6,
         /// Largest |e_2| without adaptation.

@@ -221,9 +221,15 @@ pub static QUANTITIES: [Quantity; 35] = [
     }),
     needing(
         "tracker_loss_rate_hz",
-        quantity("tracker_loss_mean_s", 0.0, 60.0, "their mean length; by default the scenario's", |f, x| {
-            f.scenario.instruments.tracker.iter_mut().for_each(|tracker| tracker.loss.mean_s = x);
-        }),
+        quantity(
+            "tracker_loss_mean_s",
+            0.0,
+            60.0,
+            "mean length of the tracker's dropouts; by default the scenario's",
+            |f, x| {
+                f.scenario.instruments.tracker.iter_mut().for_each(|tracker| tracker.loss.mean_s = x);
+            },
+        ),
     ),
     quantity("gnss_delay_s", 0.0, 1.0, "mean delay of the GNSS receiver", |f, x| {
         f.scenario.instruments.gnss.iter_mut().for_each(|gnss| gnss.delay_s = x);
@@ -233,9 +239,15 @@ pub static QUANTITIES: [Quantity; 35] = [
     }),
     needing(
         "gnss_loss_rate_hz",
-        quantity("gnss_loss_mean_s", 0.0, 60.0, "their mean length; by default the scenario's", |f, x| {
-            f.scenario.instruments.gnss.iter_mut().for_each(|gnss| gnss.loss.mean_s = x);
-        }),
+        quantity(
+            "gnss_loss_mean_s",
+            0.0,
+            60.0,
+            "mean length of the GNSS receiver's dropouts; by default the scenario's",
+            |f, x| {
+                f.scenario.instruments.gnss.iter_mut().for_each(|gnss| gnss.loss.mean_s = x);
+            },
+        ),
     ),
     whole(quantity(
         "aiding",

@@ -12,7 +12,7 @@ use crate::math;
 use afbc_types::{Declared, Inputs, OutOfRange, parameters};
 
 parameters! {
-    /// Bandwidths w of the filters, and their lead.
+    /// Bandwidths w and lead T of the filters on the inputs U1 to U4.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -35,10 +35,10 @@ parameters! {
         /// Action when the station is lost.
         #[choice(NAV_DLL_ACT)]
         pub station_action: StationAction = StationAction::Return,
-        /// Action when the targets are lost in offboard mode.
+        /// Action in offboard mode when no fresh targets arrive.
         #[choice(COM_OBL_ACT)]
         pub targets_action: TargetsAction = TargetsAction::Hold,
-        /// Action when the sticks are lost in a mode that needs them.
+        /// Action when no fresh stick input arrives in a mode that needs it.
         #[choice(NAV_RCL_ACT)]
         pub sticks_action: SticksAction = SticksAction::Hold,
         /// Action when a sensor fails.

@@ -72,13 +72,13 @@ parameters! {
         /// k_a of roll and pitch.
         #[parameter(TILT_P, "1/s", 1.0..=30.0, tuned)]
         pub tilt_p_1_s: f32 = 13.39,
-        /// k_w of roll and pitch.
+        /// k_w of roll and pitch: gain on the error of the angular rate.
         #[parameter(TILTRATE_P, "1/s", 2.0..=100.0, tuned)]
         pub tilt_rate_p_1_s: f32 = 16.84,
         /// k_a of yaw for small errors; not reduced by `yaw_weight`.
         #[parameter(YAW_P, "1/s", 0.2..=15.0, tuned)]
         pub yaw_p_1_s: f32 = 8.166,
-        /// k_w of yaw.
+        /// k_w of yaw: gain on the error of the yaw rate.
         #[parameter(YAWRATE_P, "1/s", 0.5..=40.0, tuned)]
         pub yaw_rate_p_1_s: f32 = 14.89,
         /// w: bandwidth of the filter on velocity and thrust.

@@ -86,19 +86,19 @@ parameters! {
         /// k_a of yaw for small errors; not reduced by `yaw_weight`.
         #[parameter(YAW_P, "1/s", 0.2..=15.0, tuned)]
         pub yaw_p_1_s: f32 = 7.178,
-        /// k_w of roll and pitch.
+        /// k_w of roll and pitch: gain on the error of the angular rate.
         #[parameter(TILTRATE_P, "1/s", 2.0..=100.0, tuned)]
         pub tilt_rate_p_1_s: f32 = 28.75,
-        /// k_iw of roll and pitch.
+        /// k_iw of roll and pitch: gain on the integral of the angular rate's error.
         #[parameter(TILTRATE_I, "1/s2", 0.0..=500.0, tuned)]
         pub tilt_rate_i_1_s2: f32 = 24.44,
-        /// d_w of roll and pitch.
+        /// d_w of roll and pitch: gain on the derivative of the angular rate.
         #[parameter(TILTRATE_D, "1", 0.0..=3.0, tuned)]
         pub tilt_rate_d: f32 = 0.2859,
-        /// k_w of yaw.
+        /// k_w of yaw: gain on the error of the yaw rate.
         #[parameter(YAWRATE_P, "1/s", 0.5..=40.0, tuned)]
         pub yaw_rate_p_1_s: f32 = 16.93,
-        /// k_iw of yaw.
+        /// k_iw of yaw: gain on the integral of the yaw rate's error.
         #[parameter(YAWRATE_I, "1/s2", 0.0..=100.0, tuned)]
         pub yaw_rate_i_1_s2: f32 = 82.47,
         /// f: feed-forward of the rate setpoint.

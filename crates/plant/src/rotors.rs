@@ -22,7 +22,7 @@ parameters! {
         /// Delay from command to the speed controllers, rounded to whole steps.
         #[parameter(DELAY, "s", 0.0..=0.5)]
         pub delay_s: f64 = 0.0,
-        /// Smallest speed, at which rotors idle; at most the largest.
+        /// Smallest speed, at which rotors idle; must not exceed the largest speed.
         #[parameter(MIN, "rad/s", 0.0..=10_000.0)]
         pub min_rad_s: f64 = 0.0,
         /// Largest speed.

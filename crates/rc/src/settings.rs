@@ -72,13 +72,13 @@ parameters! {
         /// the threshold.
         #[parameter(RC_ARMSWITCH_TH, "share", -1.0..=1.0)]
         pub arm_share: f32 = 0.75,
-        /// Threshold of the kill switch, as for the arming switch.
+        /// Threshold of the kill switch, with the same meaning as `RC_ARMSWITCH_TH`.
         #[parameter(RC_KILLSWITCH_TH, "share", -1.0..=1.0)]
         pub kill_share: f32 = 0.75,
-        /// Threshold of the return switch, as for the arming switch.
+        /// Threshold of the return switch, with the same meaning as `RC_ARMSWITCH_TH`.
         #[parameter(RC_RETURN_TH, "share", -1.0..=1.0)]
         pub return_share: f32 = 0.75,
-        /// Threshold of the hold switch, as for the arming switch.
+        /// Threshold of the hold switch, with the same meaning as `RC_ARMSWITCH_TH`.
         #[parameter(RC_LOITER_TH, "share", -1.0..=1.0)]
         pub hold_share: f32 = 0.75,
         /// Pulse by which the receiver reports a lost link, outside the range of the channel `failsafe_channel`; 0 for

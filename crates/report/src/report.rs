@@ -326,7 +326,7 @@ fn gains(contender: &Contender) -> Markup {
         }
         if limits != PositionControlLimits::NONE {
             settings += &format!(
-                ", limits: tilt {} rad at {} rad/s, {} m/s², {} m/s, climb {} m/s",
+                ", limits: tilt {} rad, tilt rate {} rad/s, acceleration {} m/s², speed {} m/s, climb rate {} m/s",
                 limits.tilt_max_rad,
                 limits.tilt_rate_max_rad_s,
                 limits.acceleration_max_m_s2,
@@ -416,7 +416,7 @@ fn trajectory(trajectory: &Trajectory) -> String {
             format!("circle of {radius_m} m around {}, once round in {period_s} s", place(centre_m))
         }
         Trajectory::Lissajous { centre_m, sines: [x, y, z], .. } => format!(
-            "Lissajous around {}, {}, {}, {} m at periods of {}, {}, {} s",
+            "Lissajous around {} with amplitudes of {}, {}, {} m along x, y, z and periods of {}, {}, {} s",
             place(centre_m),
             x.amplitude_m,
             y.amplitude_m,

@@ -148,7 +148,7 @@ pub fn run(
                 }
                 (ServerAction::Speed(_) | ServerAction::Pause(_), TimeRate::Lockstep) => {
                     let command = line.split_whitespace().next().unwrap_or_default();
-                    let problem = "only step moves time; start without --lockstep";
+                    let problem = "with --lockstep, only step moves time; start without this option";
                     reply.lines = vec![format!("error {command}: {problem}")];
                 }
                 (action, _) => time.change(action, began.elapsed()),

@@ -194,7 +194,7 @@ fn in_lockstep_lines_drive_the_clock() {
     assert_eq!((end, now_s), (RunEnd::Silent, 0.3));
     let wanted = [
         "ok step 250",
-        "error speed: only step moves time; start without --lockstep",
+        "error speed: with --lockstep, only step moves time; start without this option",
         "ok wind 1 0 0",
         "ok step 50",
         "error \"nonsense\": no such command; help lists the commands",

@@ -110,7 +110,8 @@ fn checked(arguments: &[String], program: &CliCommand) -> Result<String, String>
     let is_given = |arg: &&Arg| given.value_source(arg.get_id().as_str()) == Some(ValueSource::CommandLine);
     match places(options).find(is_given).and_then(Arg::get_long) {
         Some(place) => Err(format!(
-            "the manifest's command has --{place}, which no result depends on; run the command yourself if you trust it"
+            "the manifest's command has --{place}, an option that `sitl again` does not run; run the command \
+             yourself if you trust it"
         )),
         None => Ok((*name).into()),
     }

@@ -91,11 +91,11 @@ fn figures(station: &Station) -> String {
     let there = health.link;
     let [min, mean, max] = [round_trip.min(), round_trip.mean(), round_trip.max()];
     format!(
-        "messages to here     {} received, {} lost, {} corrupt\n\
-         messages to vehicle  {} received, {} lost, {} corrupt\n\
-         round trip           min {min:.1}, mean {mean:.1}, max {max:.1} ms of {} questions, {} unanswered\n\
-         state age on board   {:.1} ms at most, of 10 samples per second\n\
-         control tick         {:.1} us at most, {:.0} Hz, {} late, {} saturated\n",
+        "messages from board  {} received, {} lost, {} corrupt\n\
+         messages to board    {} received, {} lost, {} corrupt\n\
+         round trip           min {min:.1}, mean {mean:.1}, max {max:.1} ms of {} pings, {} unanswered\n\
+         state age on board   {:.1} ms at most, sampled 10 times per second\n\
+         control tick         {:.1} us at most, {:.0} Hz, {} late, {} with a saturated rotor\n",
         here.received,
         here.lost,
         here.bad_checksum,

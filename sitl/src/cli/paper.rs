@@ -59,7 +59,7 @@ enum GustReadingArg {
     Forces,
     /// No gusts
     None,
-    /// The three readings above, one after another
+    /// Persistent, pulses and forces, one after another
     All,
 }
 

@@ -104,7 +104,7 @@ impl<const ROW: usize> F405<ROW> {
             converter.set_reference(RAIL_MV);
         }
         if let Some(Sensors { imu, select: (port, pin), i2c, receiver, .. }) = Self::WIRING.sensors {
-            let select = Select { port, pin: Pin::new(pin).expect("one of sixteen pins"), active: Level::Low };
+            let select = Select { port, pin: Pin::new(pin).expect("a pin's number is 0 to 15"), active: Level::Low };
             match imu {
                 InertialModel::Icm42688p => part.spi[SPI].attach_selected(Icm42688p::new(), select),
                 InertialModel::Bmi270 => part.spi[SPI].attach_selected(Bmi270Model::new(), select),
@@ -117,7 +117,7 @@ impl<const ROW: usize> F405<ROW> {
             part.usart[receiver.index].attach(nmea::Receiver::new());
         }
         if let Some(LogWiring { storage, spi, select: (port, pin) }) = Self::WIRING.logs {
-            let select = Select { port, pin: Pin::new(pin).expect("one of sixteen pins"), active: Level::Low };
+            let select = Select { port, pin: Pin::new(pin).expect("a pin's number is 0 to 15"), active: Level::Low };
             match storage {
                 StorageKind::Card => part.spi[spi].attach_selected(SpiSlot::new(), select),
                 StorageKind::Flash => part.spi[spi].attach_selected(FlashChip::new(), select),

@@ -199,7 +199,7 @@ fn inertial_noise(step: &mut BringUpStep, samples: &[InertialSample], elapsed_s:
     let rates = VectorStatistics::of(samples.iter().map(|sample| sample.rates_rad_s));
     let force = VectorStatistics::of(samples.iter().map(|sample| sample.specific_force_m_s2));
     step.found(
-        "samples, means over 20 ms",
+        "samples, each a mean over 20 ms",
         format!("{}, {:.1} Hz", samples.len(), rate(samples.len() as u32, elapsed_s)),
     );
     step.found("gyroscope, mean [rad/s]", three(rates.mean()));

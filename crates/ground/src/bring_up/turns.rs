@@ -74,8 +74,8 @@ pub(crate) fn turns(
         let attitude_rad = talk.latest.attitude_rad.and_then(|attitude_rad| attitude_rad.get(turn.axis).copied());
         let attitude_rad = f64::from(attitude_rad.unwrap_or_default()) * turn.sign;
         step.found("specific force, forward, left, up [m/s2]", three(turned.force_m_s2));
-        step.found("angle turned by the gyroscope, 90 expected", format!("{:.0} degrees", angle_rad.to_degrees()));
-        step.found("angle turned by the estimate, 90 expected", format!("{:.0} degrees", attitude_rad.to_degrees()));
+        step.found("turn angle from the gyroscope, 90 expected", format!("{:.0} degrees", angle_rad.to_degrees()));
+        step.found("turn angle from the estimate, 90 expected", format!("{:.0} degrees", attitude_rad.to_degrees()));
         step.check(is_done, "the accelerometer does not show the requested side facing up; check the IMU's rotation");
         // The gyroscope must show a turn between 45 and 135 degrees.
         step.check(

@@ -31,7 +31,7 @@ fn run() -> Result<bool, Error> {
     if !std::env::args().any(|argument| argument == "--check") {
         std::fs::write(path, written)?;
     } else if written != text {
-        wrong.push(format!("{DOCUMENT} has other tables; `cargo run --release -p pil --bin timing` updates them"));
+        wrong.push(format!("{DOCUMENT} is out of date; `cargo run --release -p pil --bin timing` updates its tables"));
     }
     for wrong in &wrong {
         eprintln!("timing: {wrong}");

@@ -251,7 +251,7 @@ impl InstructionCounts {
         }
         entries.extend([
             RowInput {
-                name: "control tick, to the motors' DMA",
+                name: "control tick, with the motors' frames",
                 priority: priority::CONTROL,
                 period_ns: TICK_NS,
                 instructions: tick + self.dshot * board.timers,

@@ -40,7 +40,7 @@ parameters! {
         /// Height at which the error by the rotors' pressure has fallen to 1/e.
         #[parameter(WASH_HEIGHT, "m", 0.01..=100.0)]
         pub wash_height_m: f64 = 0.3,
-        /// Step of the output; 0 for none.
+        /// Resolution of the output; 0 for no rounding.
         #[parameter(LSB, "m", 0.0..=10.0)]
         pub lsb_m: f64 = 0.0,
     }

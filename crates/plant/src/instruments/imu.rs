@@ -39,7 +39,7 @@ parameters! {
         /// Largest rate that is measured; 0 for no limit.
         #[parameter(RANGE, "rad/s", 0.0..=1000.0)]
         pub range_rad_s: f64 = 0.0,
-        /// Step of the output; 0 for none.
+        /// Resolution of the output; 0 for no rounding.
         #[parameter(LSB, "rad/s", 0.0..=1.0)]
         pub lsb_rad_s: f64 = 0.0,
         /// Cut-off of the second-order anti-alias filter; 0 for none.
@@ -83,7 +83,7 @@ parameters! {
         /// Largest specific force that is measured; 0 for no limit.
         #[parameter(RANGE, "m/s2", 0.0..=10_000.0)]
         pub range_m_s2: f64 = 0.0,
-        /// Step of the output; 0 for none.
+        /// Resolution of the output; 0 for no rounding.
         #[parameter(LSB, "m/s2", 0.0..=1.0)]
         pub lsb_m_s2: f64 = 0.0,
         /// Cut-off of the second-order anti-alias filter; 0 for none.

@@ -47,7 +47,7 @@ parameters! {
         /// Largest field that is measured, per axis; 0 for no limit.
         #[parameter(RANGE, "uT", 0.0..=100_000.0)]
         pub range_ut: f64 = 0.0,
-        /// Step of the output; 0 for none.
+        /// Resolution of the output; 0 for no rounding.
         #[parameter(LSB, "uT", 0.0..=100.0)]
         pub lsb_ut: f64 = 0.0,
     }

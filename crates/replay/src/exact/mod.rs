@@ -49,7 +49,9 @@ pub fn replay(
         Some(_) => None,
         None => Some(named(&start.vehicle).map_err(failed)??),
     };
-    let Some(vehicle) = vehicle.or(known.as_ref()) else { return Err(failed("the log names no vehicle".into())) };
+    let Some(vehicle) = vehicle.or(known.as_ref()) else {
+        return Err(failed("the log names no vehicle; give the vehicle's file by --vehicle".into()));
+    };
     let players = player::TickPlayers::of(vehicle, &start, changes).map_err(|problem| problem.of(&shown))?;
     run::run(&mut bytes, start, players, &mut progress).map_err(failed)
 }

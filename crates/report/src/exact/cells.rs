@@ -167,8 +167,8 @@ pub fn problem(log: &ReplayedLog<'_>) -> Option<String> {
 pub(super) fn changed(comparison: &ChangeComparison) -> Vec<String> {
     let changes: Vec<_> = comparison.changes.iter().map(SettingChange::to_string).collect();
     let mut said = vec![format!(
-        "With {}, from the same inputs. The vehicle did not fly with these settings; its readings come from the flight \
-         as flown.",
+        "Replayed from the same inputs with {}. The vehicle did not fly with these settings; its readings come from \
+         the flight as flown.",
         changes.join(" and ")
     )];
     if let Some(at_s) = comparison.other_mode_s {

@@ -13,7 +13,7 @@ pub(super) fn page(log: &ReplayedLog<'_>, pictures: &[Picture]) -> String {
     sheet(
         &format!("{}, under other settings", log.name),
         &html! {
-            p.quiet { "The firmware's own code over the inputs of a recorded flight." }
+            p.quiet { "The firmware's own code, run again on the inputs of a recorded flight." }
             p { (cells::conditions(replay)) "." }
             @for sentence in cells::contents(replay) { p { (sentence) } }
             p { (cells::verdict(replay)) }

@@ -19,7 +19,11 @@ pub(super) fn grids(judged: &RandomResults<'_>) -> Vec<Grid> {
             caption: format!("{}, {} flights, {}", group.name(), group.flights, judged.words()),
             heads: heads.clone(),
             rows: rows.collect(),
-            note: format!("{} {TEST_LEGEND} Pairs are seeds, or the flights of a single seed.", legend(judged)),
+            note: format!(
+                "{} {TEST_LEGEND} A pair compares both laws in one seed or, if only one seed was flown, \
+                 in one of its flights.",
+                legend(judged)
+            ),
         }
     };
     judged.groups.iter().map(grid).collect()

@@ -25,8 +25,8 @@ pub(super) fn page(judged: &RandomResults<'_>, shown: Vec<ShownFlight>) -> Strin
             }
             @if !shown.is_empty() {
                 p {
-                    "Of each vehicle the flight in which " (judged.baseline()) " stands worst against the best, or "
-                    "which it lost and another kept:"
+                    "For each vehicle, the flight in which " (judged.baseline()) " is worst relative to the best "
+                    "contender, or in which it lost the vehicle and another contender did not:"
                 }
             }
             @for flight in shown {

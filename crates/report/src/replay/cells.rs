@@ -70,15 +70,15 @@ pub(super) fn sentences(replay: &ReplayedRecording<'_>) -> Vec<String> {
     let rate_hz = recording.imu_rate_hz();
     if rate_hz < 90.0 {
         said.push(format!(
-            "The inertial sensor was logged at {rate_hz:.0} Hz, but the estimator needs 100 Hz; these figures also \
-             show what the log lost."
+            "The inertial sensor was logged at {rate_hz:.0} Hz, but the estimator needs 100 Hz: the missing \
+             samples also increase the errors shown here."
         ));
     }
     said.push(start(replay));
     if let Some(by) = replayed.moved_m {
         said.push(format!(
             "The log does not state the origin of its positions: they were moved by ({:.1}, {:.1}, {:.1}) m to agree \
-             at the first time compared.",
+             with the estimate at the first time compared.",
             by.x, by.y, by.z
         ));
     }

@@ -56,7 +56,7 @@ pub(super) fn words(results: &RoughResults<'_>) -> String {
     let flights = rough.flights;
     let law = contender(results).map_or("", Contender::title);
     format!(
-        "{seeds}, flights of each vehicle, class and seed: {flights}, by {law}, of {lasts}; {}",
+        "{seeds}; flights of each vehicle, class and seed: {flights}; law: {law}; duration: {lasts}; vehicles: {}",
         vehicles.join(", ")
     )
 }

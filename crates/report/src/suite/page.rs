@@ -16,8 +16,9 @@ pub(super) fn page(flown: FlownSuite<'_>, drawn: Vec<FlightFigures>) -> String {
         &html! {
             p { (suite.description) "." }
             p.quiet {
-                "Every contender flies the same vehicle through the same noise and weather, with gains tuned for it by "
-                "the vehicle's rule. Figures are evaluated from " (SETTLED_S) " s to the end. *: best of the flight."
+                "Every contender flies the same vehicle through the same noise and weather, with the gains of the "
+                "vehicle's file or, without these, gains scaled to the vehicle by rule. Figures are evaluated from "
+                (SETTLED_S) " s to the end. *: best of the flight."
             }
             h2 { "Where they stand" }
             p.quiet {

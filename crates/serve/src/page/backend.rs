@@ -181,7 +181,7 @@ impl PageBackend {
 
     fn go_to(&mut self, server: &mut Server, place_m: Vector3<f32>) -> PageReply {
         if !place_m.iter().all(|number| number.abs() <= FAR_M) {
-            return PageReply::refused("the place is too far away");
+            return PageReply::refused("the place is more than 10 km from the origin; choose a nearer one");
         }
         let local_m = self.frame.local(&place_m);
         let origin = server.vehicles().first().and_then(|vehicle| vehicle.origin());
@@ -203,7 +203,7 @@ impl PageBackend {
         let is_near = |number: &f32| number.abs() <= FAR_M;
         let known = waypoints_m.iter().flatten().all(is_near) && fence_m.iter().flatten().all(is_near);
         if !known || waypoints_m.len().max(fence_m.len()) > PLACES_MAX {
-            return PageReply::refused("a plan has at most 50 places, within 10 km");
+            return PageReply::refused("a plan has at most 50 places, each within 10 km of the origin");
         }
         let local = |place_m: &[f32; 3]| self.frame.local(&Vector3::from(*place_m));
         let places_m: Vec<_> = waypoints_m.iter().map(local).collect();
