@@ -70,8 +70,8 @@ impl PyBatch {
         let first = scenario.seed;
         if first > SEEDS.end() - count {
             return Err(error(format!(
-                "seed: {first} given; counted from this seed, the last of {count} vehicles exceeds the largest seed; give \
-                 a smaller seed"
+                "seed: {first} given; counted from this seed, the last of {count} vehicles exceeds the largest \
+                 seed; give a smaller seed"
             )));
         }
         let mut worlds = Vec::new();
