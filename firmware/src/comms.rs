@@ -75,7 +75,7 @@ pub fn make<B: Board>(
         let mut comms = Comms::with(setup);
         comms.set_signing(signing);
         if table.configuration().escs.answers && !B::ANSWERS {
-            comms.warn("DSHOT_BIDIR_EN: not on this board");
+            comms.warn("DSHOT_BIDIR_EN: board cannot read ESC replies");
         }
         (comms, table, log, radio, black_box)
     })

@@ -23,13 +23,13 @@ macro_rules! image {
             let logging: &[&str] = &[$(stringify!($logging))?];
             assert!(
                 <$board as $crate::board::Board>::HAS_LOG != logging.is_empty(),
-                "a board that keeps logs, and no other, names an interrupt line for its executor: logging"
+                "name an interrupt line for the executor `logging` if the board keeps logs, and only then"
             );
             assert!(
                 <<$board as $crate::board::Board>::Sampler as $crate::samples::Sampler>::SENSES != sampling.is_empty()
                     && <<$board as $crate::board::Board>::Aids as $crate::samples::Sampler>::SENSES
                         != aiding.is_empty(),
-                "a board with sensors, and no other, names interrupt lines for their executors: sampling, aiding"
+                "name interrupt lines for the executors `sampling` and `aiding` if the board has sensors, and only then"
             )
         };
 

@@ -288,7 +288,7 @@ const BAD_FILES: [(&str, &str); 28] = [
     (
         "[trajectory]\nkind = \"circle\"\ncentre_m = [0, 0, 1]\nradius_m = 100\nperiod_s = 0.5",
         ":5: trajectory.period_s: it asks for 1.257e3 m/s, 1.579e4 m/s2, 1.984e5 m/s3 and 2.494e6 m/s4, more than a \
-         controller accepts (1e3, 1e3, 1e5 and 1e7 of these units); allow more time",
+         controller accepts (1e3 m/s, 1e3 m/s2, 1e5 m/s3, 1e7 m/s4); allow more time",
     ),
     (
         "[trajectory]\nkind = \"waypoints\"",

@@ -102,7 +102,7 @@ fn medians_and_differences_are_those_of_the_flights() {
     let folder = soft("statistics");
     let fly = ["compare", "soft.toml", "--controllers", "pid,soft,afbc", "--seeds", "7", "--against", "pid"];
     let table = succeeds(&sitl(&folder, &fly));
-    assert!(table.contains("less PID's"), "{table}");
+    assert!(table.contains("minus PID's"), "{table}");
     let out = folder.join("out/compare");
     let compared = &json(&out.join("comparison.json"))[0];
     assert_eq!(compared["against"], "pid");

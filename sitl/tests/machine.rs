@@ -242,17 +242,17 @@ fn a_campaign_is_distinguished_from_a_scenario() {
     for file in ["small.toml", "./small.toml", "plain", "robustness"] {
         let said = succeeds(&folder, &["check", file]);
         assert!(said.contains(": ok, ") && said.contains(" flights of "), "{said}");
-        assert!(said.ends_with(&format!("; this is a campaign: sitl campaign {file}\n")), "{said}");
+        assert!(said.ends_with(&format!("; this is a campaign; fly it with `sitl campaign {file}`\n")), "{said}");
     }
     for file in ["small.toml", "plain", "robustness", "bad.toml"] {
         for command in [&["fly"][..], &["compare"], &["pil"], &["tune", "pid", "--scenario"]] {
             let said = refused(&folder, &[command, &[file]].concat());
-            assert_eq!(said, format!("{file}: this is a campaign: sitl campaign {file}\n"));
+            assert_eq!(said, format!("{file}: this is a campaign; fly it with `sitl campaign {file}`\n"));
         }
     }
     for file in ["hardware", "flight.toml", "bad-flight.toml"] {
         let said = refused(&folder, &["campaign", file]);
-        assert!(said.starts_with(&format!("{file}: this is a scenario: sitl fly {file}; ")), "{said}");
+        assert!(said.starts_with(&format!("{file}: this is a scenario; fly it with `sitl fly {file}`; ")), "{said}");
     }
     assert_eq!(refused(&folder, &["campaign", "robustnes"]), "robustnes: no such campaign; did you mean robustness?\n");
     assert!(refused(&folder, &["check", "bad.toml"]).starts_with("bad.toml:8: spread.thrust_factor_ratio: 120 is out"));

@@ -96,7 +96,7 @@ fn ulog_and_mcap_are_drawn_alike() {
     let crossed = ["plot", "a.ulg", "--y", "vehicle_local_position.x", "--x", "vehicle_attitude.q[0]"];
     let line = refused(&sitl(&folder, &crossed));
     assert!(
-        line.contains("vehicle_attitude.q[0]: the topic has other times than that of vehicle_local_position.x"),
+        line.contains("vehicle_attitude.q[0]: its topic has other times than the topic of vehicle_local_position.x"),
         "{line}"
     );
 }

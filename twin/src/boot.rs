@@ -151,7 +151,7 @@ pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
         messages += 1;
         heartbeats += u32::from(matches!(message, Downlink::Heartbeat { .. }));
         match message {
-            Downlink::Text { text, .. } => println!("it says: {}", text.to_str().unwrap_or("?")),
+            Downlink::Text { text, .. } => println!("the vehicle says: {}", text.to_str().unwrap_or("?")),
             Downlink::Telemetry(Telemetry::System(system)) => battery_mv = Some(system.voltage_mv),
             _ => {}
         }
@@ -172,7 +172,7 @@ pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
         Signal::Dshot600(_) => looks * LOOK_EVERY / TICK * BITS * BIT_NS / LOOK_EVERY,
         Signal::Pwm400 => *looks,
     };
-    println!("samples with a pulse on each motor's pin: {pulses:?} of {looks}; expected for stopped motors: {carried}");
+    println!("of {looks} samples, each motor's pin had a pulse in {pulses:?}; stopped motors should have {carried}");
     check(wrong.is_empty(), &format!("{:?}: {wrong:?}", M::SIGNAL))?;
     check(pulses.iter().all(|pulses| pulses.abs_diff(carried) * 10 <= carried), "every motor has its pulses")?;
 

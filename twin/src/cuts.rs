@@ -8,7 +8,7 @@ use crate::machine::{Machine, quiet_usb};
 use crate::parameter_flash::ParameterFlash;
 use crate::random::Xorshift;
 use crate::wire::UartWire;
-use afbc_mavlink::{Address, Decoder, Downlink, FRAME_MAX, ParameterName, ParameterRequest, Encoder, Uplink};
+use afbc_mavlink::{Address, Decoder, Downlink, Encoder, FRAME_MAX, ParameterName, ParameterRequest, Uplink};
 use rigless::emulator::{AccessKind, Driver, Host, Settled, Start, Stop, run};
 use rigless::image::Image;
 use rigless::machine::matekh743::MatekH743;
@@ -344,7 +344,7 @@ pub fn cut_all(image: &Path, seed: u64, cuts: u64) -> Result<(), Box<dyn Error>>
         let images = [image.clone(), flash(before.bytes(WORD as usize)?)?];
         let kept = run(session, &Start::new(&images), cut)?.driver.kept;
         let (erases, programs): (Vec<_>, Vec<_>) = kept.into_iter().partition(|kept| kept.in_erase);
-        println!("{what}: cut at {} instants of word writes and {} of erases", programs.len(), erases.len());
+        println!("{what}: power cut at {} instants of word writes and {} of erases", programs.len(), erases.len());
         let kept: Vec<_> = thinned(programs, cuts).into_iter().chain(thinned(erases, cuts)).collect();
         let instants = kept.len();
         let (mut olds, mut news, mut wrong) = (0, 0, Vec::new());
@@ -356,8 +356,11 @@ pub fn cut_all(image: &Path, seed: u64, cuts: u64) -> Result<(), Box<dyn Error>>
             }
         }
         check(olds + news + wrong.len() == instants, "the board starts after each cut")?;
-        println!("{what}: afterwards {olds} times the old value, {news} times the new value, {} times another \
-             value", wrong.len());
+        println!(
+            "{what}: afterwards {olds} times the old value, {news} times the new value, {} times another \
+             value",
+            wrong.len()
+        );
         check(wrong.is_empty(), &wrong.join("\n"))?;
         check(during == During::Erase || news > 0 && olds > 0, "cuts before and after the write")?;
         check(during == During::Write || olds > 0, "cuts in a start that erases")?;

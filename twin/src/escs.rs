@@ -55,8 +55,10 @@ impl StickPilot for TelemetryCheck {
                 let off_rad_s = (least - told_rad_s).max(told_rad_s - most).max(0.0);
                 self.most_rad_s = self.most_rad_s.max(off_rad_s);
                 if off_rad_s > COARSE_RAD_S + 0.1 {
-                    return Err(format!("rotor {rotor}: telemetry reports {told_rad_s:.1} rad/s, the rotor turned at \
-                         {least:.1} to {most:.1} rad/s"));
+                    return Err(format!(
+                        "rotor {rotor}: telemetry reports {told_rad_s:.1} rad/s, the rotor turned at \
+                         {least:.1} to {most:.1} rad/s"
+                    ));
                 }
                 let expected_v = f32::from(voltage_cv(rotor)) * 0.01;
                 // Bidirectional DSHOT reports speeds only.

@@ -147,9 +147,9 @@ impl Fetch {
     /// Compares the list and the downloads with the logs on the card.
     pub fn compare(&self, logs: &[Vec<u8>]) -> Result<(), Box<dyn Error>> {
         let sizes: Vec<_> = self.entries.iter().map(|entry| entry.size as usize).collect();
-        println!("listed {sizes:?} bytes; {END} bytes each in {:?} ms", self.took_ms);
+        println!("logs listed with {sizes:?} bytes; parts of {END} bytes downloaded in {:?} ms", self.took_ms);
         check(sizes == logs.iter().map(Vec::len).collect::<Vec<_>>(), "the list equals the card's files")?;
-        let first = logs.first().ok_or("there is a log")?;
+        let first = logs.first().ok_or("there is no log on the card")?;
         for (part, held) in self.parts.iter().enumerate() {
             let [offset, length] = self.span(part).map(|number| number as usize);
             check(first[offset..offset + length] == held[..], "the download equals the file on the card")?;

@@ -190,8 +190,11 @@ impl TwinFlight {
         let (Some(cuts), Some(storage)) = (&self.cuts, session.board_mut().log_storage()) else { return };
         if cuts.at_ms.contains(&now_ms) {
             match card_logs::save(storage, &cuts.folder.join(format!("cut-{now_ms}"))) {
-                Ok(logs) => println!("{:8.3} s  storage of the logs saved as if the power was cut here; logs: \
-                     {logs:?}", now_ms as f64 * 1e-3),
+                Ok(logs) => println!(
+                    "{:8.3} s  storage of the logs saved as if the power was cut here; logs: \
+                     {logs:?}",
+                    now_ms as f64 * 1e-3
+                ),
                 Err(error) => println!("{:8.3} s  cut here: {error}", now_ms as f64 * 1e-3),
             }
         }

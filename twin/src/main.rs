@@ -86,47 +86,86 @@ fn mission_argument() -> Arg {
 
 /// Declares the command line.
 fn command() -> Command {
-    let phases = whole("\
-         phases", "\
-         40", "Number of instants within a control period at which the kill switch's frames \
-         arrive");
-    let rate = whole("rate", "250", "Frames per second of the receiver in the test of the kill switch; may be repeated")
-        .value_parser(value_parser!(u64).range(1..=1000))
-        .action(ArgAction::Append);
+    let phases = whole(
+        "\
+         phases",
+        "\
+         40",
+        "Number of instants within a control period at which the kill switch's frames \
+         arrive",
+    );
+    let rate =
+        whole("rate", "250", "Frames per second of the receiver in the test of the kill switch; may be repeated")
+            .value_parser(value_parser!(u64).range(1..=1000))
+            .action(ArgAction::Append);
     let kept = file_argument("hover", "File that keeps the hover, from which further runs begin");
-    let only = option("\
-         only", "\
-         NAME", "Only faults whose names begin with this text; may be \
-         repeated").action(ArgAction::Append);
-    let seeds = [whole("\
-         seeds", "\
-         1", "Number of flights for each \
-         fault"), whole("\
-         first", "\
-         1", "Seed of the first \
-         flight")];
+    let only = option(
+        "\
+         only",
+        "\
+         NAME",
+        "Only faults whose names begin with this text; may be \
+         repeated",
+    )
+    .action(ArgAction::Append);
+    let seeds = [
+        whole(
+            "\
+         seeds",
+            "\
+         1",
+            "Number of flights for each \
+         fault",
+        ),
+        whole(
+            "\
+         first",
+            "\
+         1",
+            "Seed of the first \
+         flight",
+        ),
+    ];
     let in_turn = Arg::new("in-turn").long("in-turn").action(ArgAction::SetTrue);
     let in_turn = in_turn.help("Fly only one fault with each seed, the faults in turn, instead of all faults");
-    let cuts =
-        [whole("\
-             cuts", "\
-             100", "Approximate number of cuts in a write, and in an \
-             erase"), whole("\
-             seed", "\
-             1", "Seed of \
-             the random numbers")];
+    let cuts = [
+        whole(
+            "\
+             cuts",
+            "\
+             100",
+            "Approximate number of cuts in a write, and in an \
+             erase",
+        ),
+        whole(
+            "\
+             seed",
+            "\
+             1",
+            "Seed of \
+             the random numbers",
+        ),
+    ];
     let escs = Command::new("escs").about("Fly with motor controllers that send telemetry, and stop rotors");
     let lines = Arg::new("lines").long("lines").action(ArgAction::SetTrue);
-    let lines = lines.help("The motor controllers answer on the motors' lines (bidirectional DSHOT), not over the \
-         telemetry line");
+    let lines = lines.help(
+        "The motor controllers answer on the motors' lines (bidirectional DSHOT), not over the \
+         telemetry line",
+    );
     Command::new("twin")
         .about("Runs a board's flight image, exactly as flashed, on register-level models of the board")
         .subcommand_required(true)
         .arg_required_else_help(true)
         .subcommand(
-            Command::new("\
-                 boot").about("Boot the image, and check buses and \
-                 pins").args([machine_argument(), image_argument()]),
+            Command::new(
+                "\
+                 boot",
+            )
+            .about(
+                "Boot the image, and check buses and \
+                 pins",
+            )
+            .args([machine_argument(), image_argument()]),
         )
         .subcommand(fly_command())
         .subcommand(Command::new("radio").about("Fly by radio control, and stop the motors by the kill switch").args([
@@ -165,11 +204,14 @@ fn fly_command() -> Command {
         .value_parser(PossibleValuesParser::new(RECEIVERS.map(|(name, _)| name)))
         .default_value("nmea")
         .help("GNSS receiver: the board's usual model, or an unconfigured u-blox");
-    let hover = whole("hover", "30", "Seconds of hover, of which three do not count; at most six with --fetch")
-        .value_parser(value_parser!(u64).range(4..=3600));
-    let log =
-        option("log", "FILE", "Write the exact log to this file, and replay it on this machine: the results must be \
-             the same to the last bit");
+    let seconds = "Seconds of hover, at most six with --fetch; the position error counts from the fourth on";
+    let hover = whole("hover", "30", seconds).value_parser(value_parser!(u64).range(4..=3600));
+    let log = option(
+        "log",
+        "FILE",
+        "Write the exact log to this file, and replay it on this machine: the results must be \
+             the same to the last bit",
+    );
     let card = option(
         "card",
         "FOLDER",
@@ -178,11 +220,8 @@ fn fly_command() -> Command {
     let from_until = |name, help| {
         Arg::new(name).long(name).num_args(2).value_names(["MS", "MS"]).value_parser(value_parser!(u64)).help(help)
     };
-    let cut = option(
-        "card-cut",
-        "MS",
-        "Save the card's content at this time, as if the power was cut then; may be repeated",
-    );
+    let cut =
+        option("card-cut", "MS", "Save the card's content at this time, as if the power was cut then; may be repeated");
     let fetch = Arg::new("fetch").long("fetch").action(ArgAction::SetTrue).requires("card");
     Command::new("fly").about("Take off, hover and land, in lockstep with the plant").args([
         machine_argument(),

@@ -8,7 +8,7 @@ use crate::world::Transducers;
 use afbc_flight_core::motor::{THROTTLE_MAX, THROTTLE_MIN};
 use afbc_ground::{Client, RetryPolicy};
 use afbc_mavlink::telemetry::EscStatus;
-use afbc_mavlink::{VehicleCommand, Datum, Decoder, Downlink, Height, MissionMessage, MissionType, Telemetry, Uplink};
+use afbc_mavlink::{Datum, Decoder, Downlink, Height, MissionMessage, MissionType, Telemetry, Uplink, VehicleCommand};
 use afbc_onboard::Readings;
 use afbc_plant::Motion;
 use afbc_scenario::Scenario;

@@ -94,7 +94,7 @@ impl BoardWires {
         check(board.attach_link(self.link.clone()), "the link is wired")?;
         let port = board.attach_radio(self.receiver.clone());
         board.attach_escs(self.escs.clone());
-        Ok((board, port.ok_or("this board has no UART for a radio receiver here")?))
+        Ok((board, port.ok_or("the model of this board has no UART for a radio receiver")?))
     }
 }
 

@@ -53,8 +53,8 @@ fn kill<M: Machine>(hover: &PilotedHover<M>, rate: u64, phases: u64) -> Result<u
     let (least, most) = (took_ns.iter().min().ok_or("no phase")?, took_ns.iter().max().ok_or("no phase")?);
     println!(
         "kill switch, {rate} frames per second: the motors get the stop command {:.2} to {:.2} ms after the last byte \
-         of the first frame, {mean_ms:.2} ms on average over {phases} phases; the latest frame came {:.3} ms after a \
-         millisecond",
+         of the first frame, {mean_ms:.2} ms on average over {phases} phases; slowest for a frame {:.3} ms into a \
+         control period",
         ms(least.0),
         ms(most.0),
         ms(most.1)

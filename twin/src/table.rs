@@ -99,12 +99,12 @@ pub const ROWS: &[PinFault] = &[
         }
     })
     .with_one(Lost),
-    row("imu-1-flip", "one bit of one byte of the first IMU, 20 times in 2 s", FliesOn, 3_000, |t| {
+    row("imu-1-flip", "one bit of one byte of the first IMU flips, 20 times in 2 s", FliesOn, 3_000, |t| {
         if t.now_and_then(100 * MS) && t.since_ns < 2_000 * MS {
             t.flip_a_bit(FIRST);
         }
     }),
-    row("imu-1-flips", "one bit of the first IMU every 2 ms", FliesOn, 3_000, |t| {
+    row("imu-1-flips", "one bit of the first IMU flips every 2 ms", FliesOn, 3_000, |t| {
         if t.now_and_then(2 * MS) {
             t.flip_a_bit(FIRST);
         }
@@ -131,7 +131,7 @@ pub const ROWS: &[PinFault] = &[
     .with_one(Lost),
     row(
         "imus-in-turn",
-        "the first IMU silent for 0.5 s, and a second later the second for good",
+        "the first IMU is silent for 0.5 s; 1 s later the second IMU falls silent for good",
         FliesOn,
         3_000,
         |t| {
@@ -185,7 +185,7 @@ pub const ROWS: &[PinFault] = &[
         t.target.garble_link(20_000)
     })
     .of_any(),
-    row("telemetry-broken", "noise at full rate in place of the station", FliesOn, 3_000, |t| {
+    row("telemetry-broken", "random bytes at full rate reach the link instead of the station's", FliesOn, 3_000, |t| {
         t.target.garble_link(Rate::EVERY_WORD);
         t.flood();
     })
@@ -195,9 +195,15 @@ pub const ROWS: &[PinFault] = &[
         t.storm(TELEMETRY);
     })
     .of_any(),
-    row("\
-         uart-storm-gnss", "an interrupt of the GNSS receiver's UART every 5 us for 2 \
-         s", FliesOn, 3_000, |t| t.storm(GNSS)),
+    row(
+        "\
+         uart-storm-gnss",
+        "an interrupt of the GNSS receiver's UART every 5 us for 2 \
+         s",
+        FliesOn,
+        3_000,
+        |t| t.storm(GNSS),
+    ),
     row("reset", "a reset, as by the watchdog", Lost, 3_000, |t| {
         if t.looks == 0 {
             t.target.reset(t.at, t.instructions, t.host);

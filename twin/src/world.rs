@@ -1,6 +1,6 @@
 //! Converts the readings of the plant's instruments into signals of the board's transducers.
 
-use afbc_estimator::{Measurement, GeodeticOrigin};
+use afbc_estimator::{GeodeticOrigin, Measurement};
 use afbc_onboard::Readings;
 use nalgebra::Vector3;
 use rigless::chip::nmea::Position;

@@ -35,17 +35,17 @@ const W_MIN_RAD_S: f32 = 1.0;
 pub const JUMP_M_S: f32 = 0.1;
 
 parameters! {
-    /// The observer. The default is none.
+    /// Disturbance observer. By default there is none.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct DisturbanceObserver {
-        /// w of the disturbance observer; 0 for none.
+        /// w: bandwidth of the disturbance observer; 0 for none.
         #[parameter(DIST_XY, "rad/s", 0.0..=200.0, tuned)]
         pub disturbance_rad_s: f32 = 0.0,
-        /// w of the observer of moments about x and y; 0 for none.
+        /// w: bandwidth of the observer of moments about x and y; 0 for none.
         #[parameter(DIST_TILT, "rad/s", 0.0..=500.0, tuned)]
         pub disturbance_tilt_rad_s: f32 = 0.0,
-        /// w of the observer of moments about z; 0 for none.
+        /// w: bandwidth of the observer of moments about z; 0 for none.
         #[parameter(DIST_YAW, "rad/s", 0.0..=500.0, tuned)]
         pub disturbance_yaw_rad_s: f32 = 0.0,
         /// gamma: rate at which the memory learns the disturbance observer's estimate; 0 for no memory.

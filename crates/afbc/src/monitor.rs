@@ -37,8 +37,8 @@ pub const TRIM_SHARE: PerAxis<f32> = PerAxis { roll: 0.75, pitch: 0.75, yaw: 2.2
 const THETA_SHARE: f32 = 0.95;
 
 parameters! {
-    /// Bounds of the monitor. The defaults suit every vehicle; [`MonitorBounds::new`] the bounds that depend on gains
-    /// computes and vehicle.
+    /// Bounds of the monitor. The defaults suit every vehicle; [`MonitorBounds::new`] computes the bounds that
+    /// depend on gains and vehicle.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct MonitorBounds {
         /// Bound on |Theta_hat|, in the unit of the subsystem's input.

@@ -25,22 +25,22 @@ parameters! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct ReferenceModel {
-        /// w of x and y; 0 for none.
+        /// w: bandwidth of the reference model of x and y; 0 for none.
         #[parameter(REF_XY, "rad/s", 0.0..=50.0, tuned)]
         pub reference_xy_rad_s: f32 = 0.0,
-        /// w of z; 0 for none.
+        /// w: bandwidth of the reference model of z; 0 for none.
         #[parameter(REF_Z, "rad/s", 0.0..=50.0, tuned)]
         pub reference_z_rad_s: f32 = 0.0,
-        /// w of yaw; 0 for none.
+        /// w: bandwidth of the reference model of yaw; 0 for none.
         #[parameter(REF_YAW, "rad/s", 0.0..=50.0, tuned)]
         pub reference_yaw_rad_s: f32 = 0.0,
-        /// a_max of x, y and z, each.
+        /// a_max: largest acceleration of the reference model along x, y and z, each.
         #[parameter(REF_ACC, "m/s2", 0.1..=1e3)]
         pub reference_acceleration_m_s2: f32 = 1e3,
-        /// a_max of yaw.
+        /// a_max: largest angular acceleration of yaw in the reference model.
         #[parameter(REF_TURN, "rad/s2", 0.1..=1e3, tuned)]
         pub reference_turn_rad_s2: f32 = 1e3,
-        /// v_max of yaw. For x, y and z, v_max is the cascade's speed limit.
+        /// v_max: largest yaw rate of the reference model. For x, y and z, v_max is the cascade's speed limit.
         #[parameter(REF_YAWRATE, "rad/s", 0.1..=1e3)]
         pub reference_yaw_rate_rad_s: f32 = 1e3,
     }

@@ -157,8 +157,8 @@ fn idle(name: &str, scenario: &Scenario) -> Option<&'static str> {
             lacks(gnss.is_some(), "the scenario has no GNSS receiver; add gnss to its [instruments]")
         }
         "sensor_delay_s" | "dropout_rate_hz" if imu.is_some() => Some(
-            "the spread has no effect on a vehicle that estimates its own state; draw the instruments instead, such as \
-             tracker_delay_s",
+            "the spread has no effect on a vehicle that estimates its own state; vary an instrument instead, by a \
+             key such as tracker_delay_s",
         ),
         "wind_m_s" | "wind_20ft_m_s" if scenario.realism.drag.is_none() => {
             Some("wind has no effect on a vehicle without drag; add [drag] to the scenario")

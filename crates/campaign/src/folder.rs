@@ -164,7 +164,7 @@ impl CampaignFolder {
         if wanted.eq(rows.iter().map(|row| (row.flight, &row.contender))) {
             Ok(rows)
         } else {
-            Err(damaged(&path, "the file holds other flights"))
+            Err(damaged(&path, "the file does not hold the flights that belong into it"))
         }
     }
 

@@ -139,10 +139,10 @@ impl FoundFile {
         let problem = match found {
             _ if *found == kind => return Ok(self),
             SubjectKind::Scenario => format!(
-                "this is a scenario: sitl fly {shown}; `sitl campaigns robustness` prints a campaign to start from"
+                "this is a scenario; fly it with `sitl fly {shown}`; `sitl campaigns robustness` prints a campaign"
             ),
-            SubjectKind::Campaign => format!("this is a campaign: sitl campaign {shown}"),
-            SubjectKind::Vehicle => format!("this is a vehicle: sitl fly hover --vehicle {shown}"),
+            SubjectKind::Campaign => format!("this is a campaign; fly it with `sitl campaign {shown}`"),
+            SubjectKind::Vehicle => format!("this is a vehicle; fly it with `sitl fly hover --vehicle {shown}`"),
         };
         Err(FileError::whole(shown, problem))
     }

@@ -54,7 +54,7 @@ const SAMPLE_MAX: usize = FRAME + 62;
 const REPLIES_PER_TICK: usize = 2;
 
 /// Warning to a station whose SETUP_SIGNING is refused.
-const KEY_OVER_WIRE: &str = "signing key refused: use a wire or sign this";
+const KEY_OVER_WIRE: &str = "signing key refused: send it by wire or signed";
 
 /// Text to the pilot when the clock has failed.
 pub const CLOCK_FAILED: &str = "crystal failed, on internal clock: land now";

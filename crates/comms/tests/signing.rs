@@ -133,7 +133,7 @@ fn only_what_is_signed_and_new_is_heard() {
 /// The refusal of a key is announced to all stations. Accepted keys and unsigned frames cause no such text.
 #[test]
 fn a_key_that_is_refused_is_told_of() {
-    const REFUSED: &str = "signing key refused: use a wire or sign this";
+    const REFUSED: &str = "signing key refused: send it by wire or signed";
     let told = |locked: &mut Locked| {
         let is_it =
             |it: &Downlink| matches!(it, Downlink::Text { text, .. } if text.to_str().is_ok_and(|it| it == REFUSED));

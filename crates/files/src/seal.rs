@@ -87,7 +87,7 @@ pub fn hash_of_file(path: &Path) -> io::Result<String> {
 pub fn hash_of(decides: &impl serde::Serialize) -> String {
     let mut out = HashingWriter::new(io::sink());
     let written = serde_json::to_writer(&mut out, decides);
-    debug_assert!(written.is_ok(), "nothing in it cannot be written");
+    debug_assert!(written.is_ok(), "the data cannot be written as JSON");
     format!("{:016x}", out.hash.finish())
 }
 

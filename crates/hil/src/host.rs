@@ -373,7 +373,7 @@ impl Host {
             self.esc_reports.adopt(self.table.configuration());
             // The configuration is adopted at once, because the vehicle is disarmed and each change has been checked.
             let adopted = self.flight.adopt(&self.law, self.table.configuration());
-            debug_assert_eq!(adopted, Ok(true), "a checked change was not adopted");
+            debug_assert_eq!(adopted, Ok(true), "a parameter change that passed its checks was not adopted");
         }
         if let Some(files) = &mut self.files {
             let (transfers, store) = &mut **files;

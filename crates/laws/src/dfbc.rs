@@ -45,7 +45,7 @@ parameters! {
     /// Gains and limits. Defaults are for the paper's vehicle with a rotor lag of 20 ms: a short search of `sitl tune`,
     /// integrals of the position raised by hand for slower vehicles (`docs/tuning.md`).
     ///
-    /// For the law of the source, leave both integrals (names with `_i_`) at 0.
+    /// For the law of Sun et al. 2022, leave both integrals (names with `_i_`) at 0.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Gains {
@@ -67,16 +67,16 @@ parameters! {
         /// k_i along z.
         #[parameter(HEIGHT_I, "1/s3", 0.0..=300.0, tuned)]
         pub height_i_1_s3: f32 = 47.74,
-        /// k_R of roll and pitch.
+        /// k_R of roll and pitch: gain on the attitude error.
         #[parameter(TILT_P, "1/s2", 10.0..=1000.0, tuned)]
         pub tilt_p_1_s2: f32 = 410.0,
-        /// k_Omega of roll and pitch.
+        /// k_Omega of roll and pitch: gain on the error of the angular rate.
         #[parameter(TILT_D, "1/s", 2.0..=100.0, tuned)]
         pub tilt_d_1_s: f32 = 39.24,
-        /// k_R of yaw.
+        /// k_R of yaw: gain on the yaw error.
         #[parameter(YAW_P, "1/s2", 0.5..=200.0, tuned)]
         pub yaw_p_1_s2: f32 = 128.2,
-        /// k_Omega of yaw.
+        /// k_Omega of yaw: gain on the error of the yaw rate.
         #[parameter(YAW_D, "1/s", 0.5..=40.0, tuned)]
         pub yaw_d_1_s: f32 = 21.2,
         /// w: bandwidth of the filter on rates and U1..U3.

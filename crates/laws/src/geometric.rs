@@ -47,7 +47,7 @@ parameters! {
     /// Gains and limits. Defaults are the result of `sitl tune` for the paper's vehicle with a rotor lag of 20 ms
     /// (`docs/tuning.md`).
     ///
-    /// For the law of 2010, leave the four integrals (names with `_i_`) at 0.
+    /// For the law of Lee et al. 2010, leave the four integrals (names with `_i_`) at 0.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Gains {
@@ -69,22 +69,22 @@ parameters! {
         /// k_i along z.
         #[parameter(HEIGHT_I, "1/s3", 0.0..=300.0, tuned)]
         pub height_i_1_s3: f32 = 47.22,
-        /// k_R of roll and pitch.
+        /// k_R of roll and pitch: gain on the attitude error.
         #[parameter(TILT_P, "1/s2", 10.0..=1000.0, tuned)]
         pub tilt_p_1_s2: f32 = 191.2,
-        /// k_Omega of roll and pitch.
+        /// k_Omega of roll and pitch: gain on the error of the angular rate.
         #[parameter(TILT_D, "1/s", 2.0..=100.0, tuned)]
         pub tilt_d_1_s: f32 = 35.66,
-        /// k_I of roll and pitch.
+        /// k_I of roll and pitch: gain on the integral of the attitude error.
         #[parameter(TILT_I, "1/s2", 0.0..=500.0, tuned)]
         pub tilt_i_1_s2: f32 = 43.27,
-        /// k_R of yaw.
+        /// k_R of yaw: gain on the yaw error.
         #[parameter(YAW_P, "1/s2", 0.5..=200.0, tuned)]
         pub yaw_p_1_s2: f32 = 80.45,
-        /// k_Omega of yaw.
+        /// k_Omega of yaw: gain on the error of the yaw rate.
         #[parameter(YAW_D, "1/s", 0.5..=40.0, tuned)]
         pub yaw_d_1_s: f32 = 16.45,
-        /// k_I of yaw.
+        /// k_I of yaw: gain on the integral of the yaw error.
         #[parameter(YAW_I, "1/s2", 0.0..=100.0, tuned)]
         pub yaw_i_1_s2: f32 = 26.96,
         /// w: bandwidth of the filter on the specific force.

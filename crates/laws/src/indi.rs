@@ -69,7 +69,7 @@ parameters! {
         /// k_v along z.
         #[parameter(CLIMB_P, "1/s", 0.5..=40.0, tuned)]
         pub climb_p_1_s: f32 = 13.2,
-        /// k_a of roll and pitch.
+        /// k_a of roll and pitch: gain on the attitude error.
         #[parameter(TILT_P, "1/s", 1.0..=30.0, tuned)]
         pub tilt_p_1_s: f32 = 13.39,
         /// k_w of roll and pitch: gain on the error of the angular rate.

@@ -83,16 +83,16 @@ parameters! {
         /// w: bandwidth of the filter on velocity and thrust, behind which the disturbance is observed.
         #[parameter(POS_FILTER, "rad/s", 5.0..=300.0, tuned)]
         pub position_filter_rad_s: f32 = 80.95,
-        /// k_R of roll and pitch.
+        /// k_R of roll and pitch: gain on the attitude error.
         #[parameter(TILT_P, "1/s2", 10.0..=1000.0, tuned)]
         pub tilt_p_1_s2: f32 = 293.3,
-        /// k_Omega of roll and pitch.
+        /// k_Omega of roll and pitch: gain on the error of the angular rate.
         #[parameter(TILT_D, "1/s", 2.0..=100.0, tuned)]
         pub tilt_d_1_s: f32 = 22.21,
-        /// k_R of yaw.
+        /// k_R of yaw: gain on the yaw error.
         #[parameter(YAW_P, "1/s2", 0.5..=200.0, tuned)]
         pub yaw_p_1_s2: f32 = 84.19,
-        /// k_Omega of yaw.
+        /// k_Omega of yaw: gain on the error of the yaw rate.
         #[parameter(YAW_D, "1/s", 0.5..=40.0, tuned)]
         pub yaw_d_1_s: f32 = 13.11,
         /// w: bandwidth of the filter on rates and U1..U3.

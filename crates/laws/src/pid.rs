@@ -80,7 +80,7 @@ parameters! {
         /// w: bandwidth of the estimate of the hover thrust; 0 for none.
         #[parameter(HOVER, "1/s", 0.0..=2.0, tuned)]
         pub hover_thrust_1_s: f32 = 0.1255,
-        /// k_a of roll and pitch.
+        /// k_a of roll and pitch: gain on the attitude error.
         #[parameter(TILT_P, "1/s", 1.0..=30.0, tuned)]
         pub tilt_p_1_s: f32 = 25.42,
         /// k_a of yaw for small errors; not reduced by `yaw_weight`.

@@ -67,7 +67,9 @@ impl EmulatedBoard {
         gdb.watch(Watchpoint::Access, vectors)?;
         match gdb.run(WRITE_TIMEOUT)? {
             Some(address) if address == vectors => Ok(clock_tree.register(RTC_BKP0R)),
-            other => Err(Error::Protocol(format!("no vector table at {vectors:#x}, but an access to {other:x?}"))),
+            other => Err(Error::Protocol(format!(
+                "the image does not read the vector table at {vectors:#x}; the first access is {other:x?}"
+            ))),
         }
     }
 

@@ -81,7 +81,7 @@ fn report(board: &BoardTimes, work: &InstructionCounts) -> BoardReport {
     };
     let _ = writeln!(text, "| load | | {} | {} | | | | | |\n", share(&best), share(&bound));
 
-    let _ = writeln!(text, "| known to be late | at most | borne, because |\n|---|--:|---|");
+    let _ = writeln!(text, "| known to be late | at most | accepted because |\n|---|--:|---|");
     for known in board.known {
         let _ = writeln!(text, "{known}");
     }

@@ -72,7 +72,7 @@ impl LogColumns {
             None => {
                 self.find(x)?;
                 let problem =
-                    format!("{x}: the topic has other times than that of {y}; name a column of the same topic");
+                    format!("{x}: its topic has other times than the topic of {y}; name a column of that topic");
                 return Err(FileError::whole(&self.file, problem));
             }
         };

@@ -222,7 +222,7 @@ fn range(panel: &FigurePanel, [from, to]: [f64; 2], is_logarithmic: bool) -> Res
     let values = lines.chain(bands).filter(|(x, y)| is_shown(*x) && (!is_logarithmic || *y > 0.0)).map(|(_, y)| y);
     let Some([low, high]) = extent(values) else {
         let positive = if is_logarithmic { " that are positive" } else { "" };
-        return Err(format!("{}: no numbers{positive} to draw in this range", panel.y_title));
+        return Err(format!("{}: no numbers{positive} to draw on this x-axis; choose another range", panel.y_title));
     };
     if is_logarithmic {
         let room = libm::pow((high / low).max(1.2), ROOM);

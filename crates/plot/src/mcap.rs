@@ -50,7 +50,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Vec<LogTable>, String> {
         topics.into_values().flatten().map(|(layout, topic)| topic.table(layout.topic)).collect();
     if tables.iter().all(|table| table.numbers.len() < 2) {
         return Err(format!(
-            "the file has no topic in ROS 2's encoding (cdr, ros2msg); its topics are {}",
+            "the file has no topic in ROS 2's encoding (cdr, ros2msg); its topics are {}; record in that encoding",
             others.join(", ")
         ));
     }

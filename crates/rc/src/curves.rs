@@ -17,7 +17,7 @@ parameters! {
         /// Yaw in altitude and position mode: 0 linear, 1 cubic.
         #[parameter(MPC_YAW_EXPO, "1", 0.0..=1.0)]
         pub yaw_expo: f32 = 0.6,
-        /// Dead zone around the centre of these sticks, as a share of full deflection.
+        /// Dead zone around the centre of the sticks in altitude and position mode, as a share of full deflection.
         #[parameter(MPC_HOLD_DZ, "1", 0.0..=1.0)]
         pub dead_zone: f32 = 0.1,
         /// Roll and pitch in acro mode: 0 linear, 1 cubic.

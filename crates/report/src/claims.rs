@@ -70,7 +70,7 @@ fn weigh(afbc: &FlightResult, baseline: &FlightResult) -> [(&'static str, bool, 
             format!("RMSE {} against {}", outputs(&close), outputs(&far)),
         ),
         (
-            "AFBC's inputs are less smooth",
+            "AFBC's inputs are less smooth than backstepping's",
             below(&smooth, &rough),
             format!("mean |change| per step of U1..U4: {} against {} mN", four(&rough, 2), four(&smooth, 2)),
         ),

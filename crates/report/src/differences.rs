@@ -66,7 +66,7 @@ pub(crate) fn grid(comparison: &Comparison) -> Option<Grid> {
     };
     let paired = comparison.paired_differences(DISTANCE.value);
     let mut rows: Vec<(String, Vec<GridCell>)> = comparison.entries.iter().zip(paired).map(row).collect();
-    let less = format!("less {baseline}'s");
+    let less = format!("minus {baseline}'s");
     let mut heads: Vec<String> = ["law", DISTANCE.title, &less].into_iter().chain(TEST).map(String::from).collect();
     if comparison.entries.iter().any(|entry| entry.lost() > 0) {
         heads.push("lost".into());
@@ -78,7 +78,7 @@ pub(crate) fn grid(comparison: &Comparison) -> Option<Grid> {
         format!("{}: root mean square distance from the reference over {seeds} seeds", comparison.scenario.name);
     let note = format!(
         "Medians, with intervals of at least 95 % in brackets (order statistics, from six seeds on). A lost vehicle \
-         counts as infinitely far. less {baseline}'s: median of the differences over the same seeds. {TEST_LEGEND}"
+         counts as infinitely far. minus {baseline}'s: median of the differences over the same seeds. {TEST_LEGEND}"
     );
     Some(Grid { caption, heads, rows, note })
 }

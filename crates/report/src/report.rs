@@ -307,7 +307,7 @@ fn gains(contender: &Contender) -> Markup {
     } = contender.settings;
     let mut settings = format!("steps of {dt_s} s, at most {rotor_force_max_n} N a rotor");
     if raised_thrust_max < afbc_control::Settings::RAISE_MAX.range.max as f32 {
-        settings += &format!(", thrust raised to {raised_thrust_max} of the weight");
+        settings += &format!(", thrust raised to at most {raised_thrust_max} times the weight for roll and pitch");
     }
     if contender.kind().in_cascade() {
         settings += &format!(", command filter {command_filter_rad_s} rad/s");
@@ -322,7 +322,7 @@ fn gains(contender: &Contender) -> Markup {
         ];
         settings.extend(also.into_iter().filter(|(on, _)| *on).map(|(_, word)| format!(", {word}")));
         if feed_forward {
-            settings += &format!(", corners fed forward at {forward_rad_s} rad/s");
+            settings += &format!(", jumps of the jerk fed forward at {forward_rad_s} rad/s");
         }
         if limits != PositionControlLimits::NONE {
             settings += &format!(

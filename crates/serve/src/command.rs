@@ -138,10 +138,10 @@ pub const COMMANDS: [[&str; 3]; 20] = [
     ["status", "", "prints each vehicle's position and its faults"],
     ["speed", "FACTOR", "speed of time relative to real time; 0: as fast as possible"],
     ["pause", "", "time stands still"],
-    ["resume", "", "and goes on"],
+    ["resume", "", "lets time go on"],
     ["step", "MILLISECONDS", "lets this much time pass, if started with --lockstep"],
-    ["help", "", "this"],
-    ["quit", "", "end"],
+    ["help", "", "lists the commands"],
+    ["quit", "", "ends the program"],
     [
         "at",
         "SECONDS COMMAND",

@@ -33,6 +33,6 @@ fn main() -> Result<(), OutOfRange> {
         plant.step(&action.speeds, DT_S);
     }
     let distance_m = (plant.motion().measure().position_m - setpoint.position_m).norm();
-    assert!(distance_m < 0.01, "{distance_m} m from its place in the end");
+    assert!(distance_m < 0.01, "the vehicle is {distance_m} m from its setpoint at the end");
     Ok(())
 }

@@ -55,6 +55,6 @@ fn main() {
         distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
         ControlFlow::Continue(())
     });
-    println!("{}: {:?}, {distance_m:.4} m from its place in the end", scenario.name, end.lost);
+    println!("{}: {:?}, {distance_m:.4} m from its setpoint at the end", scenario.name, end.lost);
     assert!(end.lost.is_none() && distance_m < 0.05);
 }

@@ -30,9 +30,9 @@ impl<E> Error<E> {
     /// Returns the reason as text of at most 50 characters.
     pub const fn reason(&self) -> &'static str {
         match self {
-            Error::Flash(_) => "not kept: the flash cannot be written",
-            Error::NeedsErase => "not kept: store is full, restart to clean up",
-            Error::Full => "not kept: store is full, reset parameters",
+            Error::Flash(_) => "parameter not kept: flash cannot be written",
+            Error::NeedsErase => "parameter not kept: store full, restart vehicle",
+            Error::Full => "parameter not kept: store full, reset parameters",
         }
     }
 }
@@ -108,9 +108,12 @@ impl<F: NorFlash> Store<F> {
     const PLACES: u32 = {
         assert!(
             RECORD.is_multiple_of(F::WRITE_SIZE) && RECORD.is_multiple_of(F::READ_SIZE),
-            "words of 1, 2 or 4 bytes"
+            "the flash must read and write words of 1, 2 or 4 bytes"
         );
-        assert!(F::ERASE_SIZE >= 8 * RECORD && F::ERASE_SIZE <= 1 << 20, "sectors of some hundred bytes to 1 MiB");
+        assert!(
+            F::ERASE_SIZE >= 8 * RECORD && F::ERASE_SIZE <= 1 << 20,
+            "the flash must have sectors of some hundred bytes to 1 MiB"
+        );
         (F::ERASE_SIZE / RECORD) as u32
     };
 

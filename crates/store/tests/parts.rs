@@ -196,7 +196,10 @@ proptest! {
 fn errors_say_what_to_do() {
     let errors = [Error::Flash("busy"), Error::NeedsErase, Error::Full];
     let reasons = errors.map(|error| error.reason());
-    assert!(reasons.iter().all(|reason| reason.starts_with("not kept: ") && reason.len() <= 50), "{reasons:?}");
+    assert!(
+        reasons.iter().all(|reason| reason.starts_with("parameter not kept: ") && reason.len() <= 50),
+        "{reasons:?}"
+    );
     assert!(reasons[0] != reasons[1] && reasons[1] != reasons[2] && reasons[0] != reasons[2]);
     let told = errors.map(|error| error.to_string());
     assert_eq!(told, [format!("{} (\"busy\")", reasons[0]), reasons[1].into(), reasons[2].into()]);

@@ -40,7 +40,7 @@ enum Task {
 struct Build {
     #[command(flatten)]
     image: Image,
-    /// Flash and run it by probe-rs, and show its log.
+    /// Flash the image, run it by probe-rs, and show its log.
     #[arg(long)]
     run: bool,
 }

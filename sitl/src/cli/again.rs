@@ -50,7 +50,11 @@ impl AgainArgs {
         ] {
             if then != now {
                 let word = |it: Option<String>| it.unwrap_or_else(|| "unknown".into());
-                say(&format!("{what}: {} at that time, {} now; results may differ", word(then), word(now)));
+                say(&format!(
+                    "{what}: {} when the results were made, {} now; results may differ",
+                    word(then),
+                    word(now)
+                ));
             }
         }
         // Runs this program's own file, since another `sitl` in the path may have another version.

@@ -57,7 +57,9 @@ impl FromStr for BoardAddress {
         match text.split_once(':') {
             Some(("serial", rest)) if !rest.is_empty() => Ok(match rest.rsplit_once(':') {
                 Some((device, baud)) => {
-                    let baud = baud.parse().map_err(|_| format!("{baud} is no baud rate, such as {BAUD}"))?;
+                    let baud = baud
+                        .parse()
+                        .map_err(|_| format!("{baud} is not a baud rate; write a number such as {BAUD}"))?;
                     BoardAddress::Serial(device.into(), baud)
                 }
                 None => BoardAddress::Serial(rest.into(), BAUD),
@@ -86,7 +88,7 @@ impl BringUpArgs {
             ("connection", connected),
             ("begun before", date(SystemTime::now())),
             ("by", concat!("sitl ", env!("CARGO_PKG_VERSION")).into()),
-            ("with somebody's hands", if self.yes { "no" } else { "yes" }.into()),
+            ("somebody is at the board", if self.yes { "no" } else { "yes" }.into()),
         ];
         log.head = head.map(|(what, value)| (what.into(), value)).into();
         output.write(|to| to.write_all(log.page().as_bytes()))?;

@@ -47,9 +47,11 @@ impl FleetArgs<'_> {
                 .into());
             }
             if vehicle.name.contains(['/', '\\']) || vehicle.name.starts_with('.') {
-                return Err(
-                    format!("{}: the name cannot be a file name; change it", vehicle.name.escape_debug()).into()
-                );
+                return Err(format!(
+                    "--vehicle {}: a vehicle's name must be a valid file name; rename the vehicle",
+                    vehicle.name.escape_debug()
+                )
+                .into());
             }
         }
         // The files are checked before the search, which takes hours.
@@ -148,7 +150,11 @@ fn replaced(text: &str, gains: &str) -> Result<String, String> {
         (None, false) => (text, ""),
         (Some((before, rest)), true) => match rest.split_once(END) {
             Some((_, after)) => (before, after.trim_start_matches('\n')),
-            None => return Err("the line that ends the gains stands before the one that begins them".into()),
+            None => {
+                return Err(
+                    "the end line of the gains stands before their begin line; delete both lines and the gains".into(),
+                );
+            }
         },
         _ => {
             return Err(

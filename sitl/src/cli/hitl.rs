@@ -75,7 +75,7 @@ impl HitlArgs {
         let metrics = recorder.finish()?;
 
         print(&format!(
-            "\n{}this side            {late_ms:.1} ms behind real time at most\n\n{}",
+            "\n{}simulator            {late_ms:.1} ms behind real time at most\n\n{}",
             figures(&station),
             outcome(&scenario, &metrics, &end)?,
         ))?;

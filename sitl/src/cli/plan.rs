@@ -66,10 +66,10 @@ impl PlanFlight {
         let (items, reached) = (plan.mission.len(), end.reached.len());
         let fence = plan.fence.len();
         print(&format!(
-            "{file}: {items} items, {fence} of the geofence, {} rally points; {reached} items reached in {:.1} s: \
+            "{file}: {items} mission items ({reached} reached in {:.1} s), {fence} geofence items, {} rally points: \
              {how}\n",
-            plan.rally.len(),
-            end.flight_s
+            end.flight_s,
+            plan.rally.len()
         ))?;
         logged?;
         recorded.transpose()?;

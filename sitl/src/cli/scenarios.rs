@@ -96,14 +96,16 @@ impl CheckArgs {
                 let Campaign { name, flights, scenario: Scenario { duration_s, model, contenders, .. }, .. } = campaign;
                 let (plant, titles, file) = (model.name(), titles(&contenders), self.scenario);
                 print(&format!(
-                    "{name}: ok, {flights} flights of {duration_s} s, {plant} plant, {titles}; this is a campaign: \
-                     sitl campaign {file}\n"
+                    "{name}: ok, {flights} flights of {duration_s} s, {plant} plant, {titles}; this is a campaign; \
+                     fly it with `sitl campaign {file}`\n"
                 ))?;
             }
             (Subject::Vehicle(vehicle), false) => {
                 let (Vehicle { name, rotors, .. }, file) = (*vehicle, self.scenario);
                 let rotors = rotors.len();
-                print(&format!("{name}: ok, {rotors} rotors; this is a vehicle: sitl fly hover --vehicle {file}\n"))?;
+                print(&format!(
+                    "{name}: ok, {rotors} rotors; this is a vehicle; fly it with `sitl fly hover --vehicle {file}`\n"
+                ))?;
             }
         }
         Ok(ExitCode::SUCCESS)

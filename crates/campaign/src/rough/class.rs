@@ -58,12 +58,12 @@ const OUTDOORS: Option<Venue> = Some(Venue::Outdoors);
 
 /// All classes except [`MIXTURE`].
 pub static CLASSES: [SensorClass; 24] = [
-    class("nothing", None, true, "every sensor behaves as the vehicle is told", |_| {}),
+    class("nothing", None, true, "every sensor behaves as the vehicle assumes", |_| {}),
     class(
         "vibration",
         None,
         false,
-        "a hovering rotor shakes the IMU by 0.02 to 0.2 rad/s and 1 to 10 m/s2; the vehicle is told 0.02 and 1",
+        "a hovering rotor shakes the IMU by 0.02 to 0.2 rad/s and 1 to 10 m/s2; the vehicle assumes 0.02 and 1",
         |d| {
             let (rate, force) = (d.logarithmic(0.02, 0.2), d.logarithmic(1.0, 10.0));
             d.imu(|imu| (imu.gyro.vibration_rad_s, imu.accel.vibration_m_s2) = (rate, force));
@@ -121,7 +121,7 @@ pub static CLASSES: [SensorClass; 24] = [
         let lever_m = d.direction() * d.between(0.0, 0.05);
         d.imu(|imu| imu.lever_m = lever_m);
     }),
-    class("hard-iron", OUTDOORS, false, "hard iron has a deviation of 1 to 10 uT; the vehicle is told 0.5", |d| {
+    class("hard-iron", OUTDOORS, false, "hard iron has a deviation of 1 to 10 uT; the vehicle assumes 0.5", |d| {
         let iron = d.logarithmic(1.0, 10.0);
         d.magnetometer(|part| part.hard_iron_ut = iron);
     }),

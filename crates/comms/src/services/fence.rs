@@ -101,7 +101,7 @@ pub fn check(
             continue;
         }
         if area.iter().any(|item| chart.local([item.x, item.y]).amax() > FAR_M) {
-            return refuse(item, MissionResult::INVALID_X, "farther away than 20 km");
+            return refuse(item, MissionResult::INVALID_X, "over 20 km from the origin");
         }
         if vertices(item).is_some() {
             let vertex = |place: usize| area.get(place).map_or(Vector2::zeros(), |item| chart.local([item.x, item.y]));

@@ -102,7 +102,7 @@ pub fn check(item: &MissionItem) -> Result<(), Invalid> {
         WAYPOINT | LOITER | LOITER_TURNS | LOITER_TIME | LAND | TAKE_OFF | LOITER_TO_ALTITUDE | LOOK => (),
         OLD_LOOK if first == 3.0 => (),
         OLD_LOOK if first == 0.0 => return Ok(()),
-        OLD_LOOK => return refuse(MissionResult::INVALID_PARAM1, "kind of region is not supported"),
+        OLD_LOOK => return refuse(MissionResult::INVALID_PARAM1, "ROI mode is not supported"),
         RETURN | LOOK_NOWHERE => return Ok(()),
         SPEED => {
             let speed_known = KEPT.contains(&second) || (second > 0.0 && second <= 1e3);

@@ -357,9 +357,9 @@ pub(crate) fn arming(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> 
     talk.listen(1_500)?;
     step.check(answer.is_some(), "not answered");
     for text in talk.texts_after(told) {
-        step.found("it says", text);
+        step.found("the vehicle says", text);
     }
-    step.check(talk.texts_after(told).next().is_some(), "it says nothing");
+    step.check(talk.texts_after(told).next().is_some(), "the vehicle gives no reason");
     Ok(step)
 }
 

@@ -62,7 +62,7 @@ pub(crate) fn turns(
             add(step.skipped("nobody is there to turn the board, or there is no inertial sensor"));
             continue;
         }
-        tell("hold it level");
+        tell("hold the board level");
         let mut level = TurnProgress::default();
         let is_level = talk.wait(PATIENCE_MS, |talk| level.follow(&mut talk.latest, &Vector3::z()))?;
         step.check(is_level, "the board was not held level");

@@ -83,8 +83,8 @@ fn run() -> Result<bool, Error> {
     let before = start_up.stack_bytes;
     let after = flight.reach_without("main", &BEFORE_LINKS)?.stack_bytes;
     let mut nested = [before, after];
-    println!("{after:6} bytes of stack: start-up from the links' task on, and idling");
-    println!("{before:6} bytes of stack: start-up, by");
+    println!("{after:6} bytes of stack: start-up once the links' task exists, and the idle loop");
+    println!("{before:6} bytes of stack: start-up, of which:");
     for (name, bytes) in start_up.deepest.iter().filter(|(_, bytes)| *bytes > 0) {
         println!("    {bytes:6} {name}");
     }
@@ -148,7 +148,12 @@ fn run() -> Result<bool, Error> {
             vital.len() as u64,
             Some(VITAL_PANICS),
         ),
-        line("panics reachable from link, housekeeping and USB, contained", "", dispensable.len() as u64, None),
+        line(
+            "panics reachable from link, housekeeping and USB, which do not end the flight",
+            "",
+            dispensable.len() as u64,
+            None,
+        ),
         line("flash", "bytes", flight.flash_bytes, Some(464 * 1024)),
         line("static RAM, without the stack", "bytes", flight.ram_bytes, Some(48 * 1024)),
     ];
@@ -166,7 +171,7 @@ fn worst(source: StateSource, searches: u64) -> Result<u64, Error> {
     for seed in 1..=searches {
         let found = search(Emulator::start(&FirmwareImage::Pil.find()?)?, source, seed, CANDIDATES)?;
         println!(
-            "{source:?}, seed {seed}: worst of {} candidates: number {}, {} instructions",
+            "{source:?}, seed {seed}: of {} candidate ticks, number {} is the worst, with {} instructions",
             found.candidates, found.candidate, found.instructions
         );
         worst = worst.max(found.instructions.into());

@@ -19,7 +19,7 @@ parameters! {
         /// Measurements per second.
         #[parameter(RATE, "Hz", 0.1..=1000.0)]
         pub rate_hz: f64 = 50.0,
-        /// Delay from motion to arrival.
+        /// Delay from a motion to the arrival of its measurement.
         #[parameter(DELAY, "s", 0.0..=1.0)]
         pub delay_s: f64 = 0.0,
         /// Strength of the earth's field.

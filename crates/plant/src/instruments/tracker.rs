@@ -18,7 +18,7 @@ parameters! {
         /// Fixes per second.
         #[parameter(RATE, "Hz", 0.1..=1000.0)]
         pub rate_hz: f64 = 100.0,
-        /// Mean delay from motion to arrival.
+        /// Mean delay from a motion to the arrival of its measurement.
         #[parameter(DELAY, "s", 0.0..=1.0)]
         pub delay_s: f64 = 0.0,
         /// Largest deviation of the delay, uniform; no fix arrives before its motion.

@@ -167,7 +167,7 @@ impl<W: Write + Seek> Conversion<W> {
         }
         if output.messages == 0 {
             let why = if damaged == 0 { "the log ends before the first message" } else { "all messages are damaged" };
-            return Err(format!("no message can be read: {why}; copy it from the vehicle again"));
+            return Err(format!("no message can be read: {why}; copy the log from the vehicle again"));
         }
         for (name, metadata) in [("parameters", parameters), ("information", information)] {
             output.writer.write_metadata(&Metadata { name: name.to_owned(), metadata }).map_err(unwritten)?;

@@ -22,7 +22,7 @@ pub(super) fn page(summary: &CampaignSummary, figures: &[Picture]) -> String {
             div.scroll { (results(summary)) }
             p.quiet { (legend(summary)) }
             @for figure in figures { (picture(figure)) }
-            h3 { "Not lost, by trajectory" }
+            h3 { "Share of flights not lost, by trajectory" }
             div.scroll { (by_trajectory(summary)) }
             p.quiet { "The 95 % interval stands below each share." }
             h3 { "Worst flights" }

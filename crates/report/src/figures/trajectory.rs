@@ -146,7 +146,7 @@ pub(super) fn picture(
         caption += " Dots: position of the reference at the onset of a gust.";
     }
     if bands {
-        caption += " Shaded: its path during the event named in the legend.";
+        caption += " Shaded: the reference's path during the event named in the legend.";
     }
     if crosses {
         caption += CROSS;

@@ -42,12 +42,12 @@ fn ratio(difference: &RankingDifference) -> String {
 pub(super) fn legend(judged: &RandomResults<'_>) -> String {
     let baseline = judged.baseline();
     format!(
-        "Of the root mean square distance from the reference, from {SETTLED_S} s to the end. best or level: flights in \
-         which a law is best, or within 5 % or 0.2 mm of the best, and their share of those that a law keeps. lost: \
-         vehicles lost. alone: those that another law keeps. median: over all flights, lost ones last. geometric: \
-         geometric mean over the flights that the law keeps. over {baseline}: geometric mean of the law's distance \
-         over that of {baseline} in the flights that both keep, above 1 where {baseline} is nearer, with its 95 % \
-         interval ({RESAMPLES} resamples, clustered by seed)."
+        "Figures of the root mean square distance from the reference, from {SETTLED_S} s to the end. best or level: \
+         flights in which a law is best, or within 5 % or 0.2 mm of the best, and their share of the flights that not \
+         every law loses. lost: vehicles lost. alone: of these, those that another law does not lose. median: over all \
+         flights, lost ones last. geometric: geometric mean over the flights that the law keeps. over {baseline}: \
+         geometric mean of the law's distance over that of {baseline} in the flights that both keep, above 1 \
+         where {baseline} is nearer, with its 95 % interval ({RESAMPLES} resamples, clustered by seed)."
     )
 }
 

@@ -12,7 +12,7 @@ pub(super) fn page(judged: &RandomResults<'_>, shown: Vec<ShownFlight>) -> Strin
     sheet(
         "Suite random",
         &html! {
-            p { "Flights drawn over vehicles: " (judged.words()) "." }
+            p { "Randomly drawn flights of each vehicle: " (judged.words()) "." }
             p.quiet {
                 "Every contender flies the same flights with the vehicle's own gains and a tilt of up to "
                 (TILT_MAX_RAD) " rad. Every flight is in flights.csv."

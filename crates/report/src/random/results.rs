@@ -83,7 +83,7 @@ impl<'a> RandomResults<'a> {
         let (first, last) = (self.random.seeds.start, self.random.seeds.end.saturating_sub(1));
         let seeds = if first == last { format!("seed {first}") } else { format!("seeds {first} to {last}") };
         let seen = match self.random.seen {
-            FeedbackSource::Truth => "on the truth with the noise of the scenario hardware".into(),
+            FeedbackSource::Truth => "on the true state, with the noise of the scenario hardware".into(),
             seen => format!("on the vehicle's own estimate by the instruments of the scenario {}", seen.scenario()),
         };
         format!("{seeds}, {} flights of each vehicle and seed, {seen}", self.random.flights)

@@ -44,11 +44,11 @@ fn excess(at: &Reference) -> String {
         let heading = format!("{yaw_rad:.3e} rad, {yaw_rate_rad_s:.3e} rad/s and {yaw_acceleration_rad_s2:.3e} rad/s2");
         let place = format!("{:.3e} m from the origin and a heading of {heading}", at.position_m.norm());
         return format!(
-            "{place}, more than a controller accepts (1e5 m, 1e3 of each heading unit); stay nearer, or turn less"
+            "{place}, more than a controller accepts (1e5 m, 1e3 rad, 1e3 rad/s, 1e3 rad/s2); stay nearer, or turn less"
         );
     }
     let [speed, acceleration, jerk, snap] =
         [velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4].map(|part| part.norm());
     let motion = format!("{speed:.3e} m/s, {acceleration:.3e} m/s2, {jerk:.3e} m/s3 and {snap:.3e} m/s4");
-    format!("{motion}, more than a controller accepts (1e3, 1e3, 1e5 and 1e7 of these units); allow more time")
+    format!("{motion}, more than a controller accepts (1e3 m/s, 1e3 m/s2, 1e5 m/s3, 1e7 m/s4); allow more time")
 }

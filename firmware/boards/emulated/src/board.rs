@@ -52,8 +52,8 @@ impl Board for Emulated {
     /// Opens the FIFOs and waits for the bytes of the first tick.
     fn start(_core: &mut cortex_m::Peripherals, _control: SendSpawner) -> Parts<Self> {
         let mut transmitter = Transmitter {
-            to_firmware: File::open(c"to_firmware").expect("the host made the FIFO"),
-            from_firmware: File::create(c"from_firmware").expect("the host made the FIFO"),
+            to_firmware: File::open(c"to_firmware").expect("the host should have made the FIFO"),
+            from_firmware: File::create(c"from_firmware").expect("the host should have made the FIFO"),
         };
         transmitter.take_bytes();
         Parts {
@@ -155,12 +155,12 @@ impl Transmitter {
         }
         READINGS.signal(Readings::from_bytes(&readings));
         let mut length = [0; 4];
-        self.to_firmware.read_exact(&mut length).expect("the host sends what it announced");
+        self.to_firmware.read_exact(&mut length).expect("the host should send all that it announced");
         let mut length = u32::from_le_bytes(length) as usize;
         let mut buffer = [0; 256];
         while length > 0 {
             let part = buffer.get_mut(..length.min(256)).unwrap_or_default();
-            self.to_firmware.read_exact(part).expect("the host sends what it announced");
+            self.to_firmware.read_exact(part).expect("the host should send all that it announced");
             let mut left = &part[..];
             while !left.is_empty() {
                 // The ring buffer first accepts bytes up to its end, then the rest.

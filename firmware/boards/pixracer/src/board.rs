@@ -181,7 +181,7 @@ impl Board for Pixracer {
         // An idle TX would be high and switch the heater on.
         heater.hold_low();
         let uarts = [first, second, radio];
-        let [first, second, radio] = uarts.map(|uart| link::new(uart.expect("the baud rate divides the clock")));
+        let [first, second, radio] = uarts.map(|uart| link::new(uart.expect("the UART should run at this baud rate")));
         let links = [first, second, link::of_usb(usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs)), radio];
         let tx = GNSS_TX.init([0; TX_RING]);
         let receiver = BufferedUart::new(p.UART4, p.PA1, p.PA0, tx, rx3, Irqs, link::uart());
@@ -210,7 +210,7 @@ impl Board for Pixracer {
         let aids = Aids {
             barometer: Driver::new(Ms5611::default(), SpiRegisters::new(barometer, format), Polled),
             compass: Driver::new(Qmc5883l, I2cRegisters::new(outside, 0x0D), Polled),
-            receiver: receiver.expect("the baud rate divides the clock"),
+            receiver: receiver.expect("the UART should run at this baud rate"),
             // Scale of the common power module. The board's page lists another module's.
             battery: BatteryConverter::new(
                 Adc::new(p.ADC1),

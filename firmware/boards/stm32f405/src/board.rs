@@ -72,7 +72,7 @@ impl Board for Stm32f405 {
 
         let (tx, rx) = (TX.init([0; 1024]), RX.init([0; 1024]));
         let uart = BufferedUart::new(p.USART1, p.PA10, p.PA9, tx, rx, Irqs, link::config());
-        let link = link::new(uart.expect("the baud rate divides the clock"));
+        let link = link::new(uart.expect("the UART should run at this baud rate"));
         interrupt::USART1.set_priority(Priority::from(priority::UART));
 
         let motors = Motors::new(p.TIM8, pin(p.PC6), pin(p.PC7), pin(p.PC8), pin(p.PC9), p.DMA2_CH1, Irqs);

@@ -158,7 +158,7 @@ impl Board for Stm32h743 {
         let receiving = [Line::of(p.PE7.reborrow()), Line::of(p.PA10.reborrow())];
         let first = BufferedUart::new(p.UART7, p.PE7, p.PE8, tx, rx, Irqs, link::config());
         let second = BufferedUart::new(p.USART1, p.PA10, p.PA9, tx2, rx2, Irqs, link::config());
-        let [first, second] = [first, second].map(|uart| uart.expect("the baud rate divides the clock"));
+        let [first, second] = [first, second].map(|uart| uart.expect("the UART should run at this baud rate"));
         let [first_rx, second_rx] = receiving;
         let (first, second) = (link::inverting(first, first_rx), link::inverting(second, second_rx));
         let links = [first, second, link::of_usb(usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs))];
@@ -167,7 +167,7 @@ impl Board for Stm32h743 {
 
         let (tx, rx) = (ESCS_TX.init([0; escs::TX_RING]), ESCS_RX.init([0; escs::RX_RING]));
         let line = BufferedUart::new(p.UART8, p.PE0, p.PE1, tx, rx, Irqs, escs::config());
-        let line = line.expect("the baud rate divides the clock");
+        let line = line.expect("the UART should run at this baud rate");
         interrupt::UART8.set_priority(Priority::from(priority::UART));
         executors::housekeeping().spawn(executors::once(escs::listen(line)));
 
@@ -197,7 +197,7 @@ impl Board for Stm32h743 {
                 (u16::MAX, |adc, pin| adc.blocking_read(pin, SampleTime::CYCLES387_5)),
                 BatteryScale { volts_per_volt: 11.0, amperes_per_volt: 40.0 },
             ),
-            receiver: receiver.expect("the baud rate divides the clock"),
+            receiver: receiver.expect("the UART should run at this baud rate"),
         };
         for line in IMU_INTERRUPTS {
             line.set_priority(Priority::from(priority::SAMPLING));

@@ -140,14 +140,14 @@ impl board::Transmitter for Transmitter {
         if let Transmitter::Uart(uart, _) = self
             && uart.set_baudrate(baud).is_err()
         {
-            defmt::warn!("{=u32} baud do not divide the clock", baud);
+            defmt::warn!("no divider of the clock gives {=u32} baud", baud);
         }
     }
 
     fn set_sbus(&mut self) {
         if let Transmitter::Uart(uart, inverts) = self {
             if uart.set_config(&sbus()).is_err() {
-                defmt::warn!("SBUS does not divide the clock");
+                defmt::warn!("no divider of the clock gives the baud rate of SBUS");
             }
             if let Some(rx) = inverts {
                 rx.pull_down();

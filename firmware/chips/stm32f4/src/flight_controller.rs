@@ -197,7 +197,7 @@ macro_rules! flight_controller {
                     let rx = ESCS_RX.init([0; chip_stm32::escs::RX_RING]);
                     let config = chip_stm32::escs::config();
                     let line = BufferedUart::new(p.$escs, p.$escs_rx, p.$escs_tx, tx, rx, Irqs, config);
-                    let line = line.expect("the UART can run at this baud rate");
+                    let line = line.expect("the UART should run at this baud rate");
                     let task = firmware::executors::once(chip_stm32::escs::listen(line));
                     firmware::executors::housekeeping().spawn(task);
                 )?
@@ -258,17 +258,17 @@ macro_rules! flight_controller {
                     ),
                     aids: chip_stm32::sensor_set::SlowSensors::new(
                         bus,
-                        gnss.expect("the UART can run at this baud rate"),
+                        gnss.expect("the UART should run at this baud rate"),
                         battery,
                     ),
                     links: [
-                        chip_stm32::link::new(link.expect("the UART can run at this baud rate")),
+                        chip_stm32::link::new(link.expect("the UART should run at this baud rate")),
                         chip_stm32::link::of_usb(chip_stm32::usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs)),
                         $({
                             // The pad's name is for the board's documentation page; a test compares the page with this
                             // table.
                             let _: &str = $sbus;
-                            chip_stm32::link::new(radio.expect("the UART can run at this baud rate"))
+                            chip_stm32::link::new(radio.expect("the UART should run at this baud rate"))
                         },)?
                     ],
                     memory: embassy_stm32::flash::Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1,

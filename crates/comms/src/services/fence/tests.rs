@@ -272,10 +272,10 @@ fn a_fence_that_is_none_is_refused_by_name() {
         (with(&|item| item.command = 16), Is::UNSUPPORTED, "fence item 0: command 16 unsupported"),
         (with(&|item| item.x = 900_000_001), Is::INVALID_X, "fence item 0: latitude is out of range"),
         (with(&|item| item.y = -1_800_000_001), Is::INVALID_Y, "fence item 0: longitude is out of range"),
-        (with(&|item| item.x = 0), Is::INVALID_X, "fence item 0: farther away than 20 km"),
+        (with(&|item| item.x = 0), Is::INVALID_X, "fence item 0: over 20 km from the origin"),
         // These places are valid, but too far away.
-        (with(&|item| item.x = -900_000_000), Is::INVALID_X, "fence item 0: farther away than 20 km"),
-        (with(&|item| item.y = 1_800_000_000), Is::INVALID_X, "fence item 0: farther away than 20 km"),
+        (with(&|item| item.x = -900_000_000), Is::INVALID_X, "fence item 0: over 20 km from the origin"),
+        (with(&|item| item.y = 1_800_000_000), Is::INVALID_X, "fence item 0: over 20 km from the origin"),
     ];
     for (items, result, text) in cases {
         let mut missions = Missions::default();
