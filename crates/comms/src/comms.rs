@@ -5,6 +5,7 @@ mod report;
 
 use self::dispatch::{PARAMETER_TASKS_MAX, ParameterTask, REPLIES_MAX, Reply};
 use crate::failsafes::Failsafes;
+use crate::ignored::IgnoredAids;
 use crate::link_share::LinkShare;
 use crate::log_server::LogServer;
 use crate::parameters::{Service, VALUE_BYTES};
@@ -130,6 +131,7 @@ pub struct Comms {
     /// True if a state has arrived since the last rotor command.
     state_is_news: bool,
     failsafes: Failsafes,
+    ignored: IgnoredAids,
     norms: PerAxis<EstimateNorms>,
     fallback: Option<&'static str>,
     rate: rate::RateReport,
@@ -198,6 +200,7 @@ impl Comms {
             saturated_ticks: 0,
             state_is_news: false,
             failsafes: Failsafes::default(),
+            ignored: IgnoredAids::default(),
             norms: PerAxis::default(),
             fallback: None,
             rate: rate::RateReport::default(),

@@ -22,6 +22,7 @@
 mod comms;
 mod escs;
 mod failsafes;
+mod ignored;
 mod link_share;
 mod log_server;
 pub mod parameters;

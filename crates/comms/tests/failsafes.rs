@@ -1,6 +1,7 @@
 //! Failsafes are reported once as text, and in at least one heartbeat.
 
 use crate::common::Bench;
+use afbc_estimator::{AidSet, AidSource};
 use afbc_flight_core::{EndReason, Mode};
 use afbc_guidance::FailsafeCause;
 use afbc_mavlink::{Downlink, MavSeverity, Uplink};
@@ -136,6 +137,48 @@ fn other_states_are_reported_once_each_time() {
             assert_eq!(received, expected.collect::<Vec<_>>());
             assert_eq!(heartbeats.last(), Some(&(on && is_failsafe)), "{heartbeats:?}");
         }
+    }
+}
+
+/// In the air, a sensor that the estimator ignores is announced once, also if it is ignored on and off, and once more
+/// after it has been used for five seconds.
+#[test]
+fn an_ignored_sensor_is_announced_in_the_air() {
+    let names = [
+        "tracker position",
+        "tracker attitude",
+        "GNSS position",
+        "GNSS height",
+        "GNSS velocity",
+        "barometer",
+        "compass",
+    ];
+    for (aid, name) in AidSource::ALL.into_iter().zip(names) {
+        let mut bench = Bench::new();
+        let (mut report, _) = bench.step();
+        report.mode = Mode::Flying;
+        let mut fly = |airborne, ignored, ticks| {
+            report.guided.airborne = airborne;
+            report.ignored = if ignored { AidSet::default().with(aid) } else { AidSet::default() };
+            let mut received = Vec::new();
+            for _ in 0..ticks {
+                bench.now_us += 1000;
+                report.time_us = bench.now_us;
+                received.extend(notices(&bench.said(&report)));
+            }
+            received
+        };
+        assert_eq!(fly(false, true, 100), []);
+        assert_eq!(fly(true, true, 100), [(WARNING, format!("{name} disagrees with other sensors"))]);
+        for _ in 0..5 {
+            assert_eq!(fly(true, false, 4900), []);
+            assert_eq!(fly(true, true, 100), []);
+        }
+        assert_eq!(fly(true, false, 5100), [(INFO, format!("{name} used again"))]);
+        assert_eq!(fly(true, false, 10_000), []);
+        // A landing ends it.
+        assert_eq!(fly(true, true, 100).len(), 1);
+        assert_eq!(fly(false, false, 10_000), []);
     }
 }
 

@@ -3,6 +3,10 @@
 
 use nalgebra::Vector3;
 
+/// An aid whose measurements arrive counts as ignored if none of them was fused for this time, which is longer than the
+/// period of a 1 Hz receiver \[us\].
+const IGNORED_US: u64 = 1_200_000;
+
 /// Kind of measurement from an aiding sensor. Each kind in a fix passes its own gate: a receiver whose position jumps
 /// may still measure a good velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -36,6 +40,24 @@ impl AidSource {
     ];
 }
 
+/// Set of kinds of aid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AidSet(u8);
+
+impl AidSet {
+    /// Returns the set with this kind added.
+    #[must_use]
+    pub const fn with(self, aid: AidSource) -> Self {
+        AidSet(self.0 | 1 << aid as u8)
+    }
+
+    /// Returns true if this kind is in the set.
+    #[must_use]
+    pub const fn contains(self, aid: AidSource) -> bool {
+        self.0 & 1 << aid as u8 != 0
+    }
+}
+
 /// Fusion record of one kind of aid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AidRecord {
@@ -67,6 +89,13 @@ impl AidRecord {
         self.accepted = self.accepted.saturating_add(1);
         self.accepted_us = Some(at_us);
         self.rejected_since_us = None;
+    }
+
+    /// Returns true if measurements arrive at `now_us`, but none has been fused for [`IGNORED_US`]. An aid that was never
+    /// fused is not ignored: it has not started.
+    fn is_ignored(&self, now_us: u64) -> bool {
+        let (Some(newest_us), Some(accepted_us)) = (self.newest_us, self.accepted_us) else { return false };
+        newest_us.saturating_sub(accepted_us) > IGNORED_US && now_us.saturating_sub(newest_us) <= IGNORED_US
     }
 
     /// Counts a rejection and returns the time since the first rejection in this row \[us\].
@@ -178,6 +207,12 @@ impl AidRecords {
             // A height reset changes only the barometer's offset, which no other aid measures.
             AidSource::Height => ResetDelay::Soon,
         }
+    }
+
+    /// Returns the aids whose measurements arrive at `now_us` without being fused.
+    pub(crate) fn ignored(&self, now_us: u64) -> AidSet {
+        let ignored = AidSource::ALL.into_iter().filter(|aid| self.of(*aid).is_ignored(now_us));
+        ignored.fold(AidSet::default(), AidSet::with)
     }
 
     /// Returns true if a position or velocity was fused within the last `time_us`.

@@ -97,6 +97,8 @@ impl Estimator {
         let Some(measurement) = memory.queue.take(due) else {
             return self.rest(memory);
         };
+        // All earlier measurements have been fused or rejected by now.
+        memory.ignored = memory.aids.ignored(newest_us);
         let at_us = measurement.at_us;
         if at_us > newest_us {
             count(&mut memory.dropped.early);

@@ -154,7 +154,7 @@ mod slow;
 mod yaw_bank;
 
 pub use afbc_types::Stamped;
-pub use aid::{AidRecord, AidRecords, AidSource};
+pub use aid::{AidRecord, AidRecords, AidSet, AidSource};
 pub use align::Unready;
 pub use calibration::ImuCalibration;
 pub use data_sheet::{DataSheet, InertialSensorFigures};

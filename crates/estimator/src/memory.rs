@@ -1,6 +1,6 @@
 //! Memory of the estimator: everything that changes from step to step.
 
-use crate::aid::{AidRecords, FrozenPoseDetector};
+use crate::aid::{AidRecords, AidSet, AidSource, FrozenPoseDetector};
 use crate::align::Alignment;
 use crate::covariance::Covariance;
 use crate::errors::PredictionInterval;
@@ -66,6 +66,8 @@ pub struct Memory {
     /// Strength and sine of the inclination of the magnetic field, `None` until measured.
     pub(crate) field: Option<(f32, f32)>,
     pub(crate) aids: AidRecords,
+    /// Aids that were ignored when the newest measurement was taken.
+    pub(crate) ignored: AidSet,
     /// Mean innovations of motion and rotation along the earth's axes, in standard deviations.
     pub(crate) leaning: [Vector3<f32>; 2],
     /// True while the innovations about the vertical lean to one side: field or gyroscope bias drifts.
@@ -131,6 +133,7 @@ impl Default for Memory {
             knows: KnownStates::default(),
             field: None,
             aids: AidRecords::default(),
+            ignored: AidSet::default(),
             leaning: [Vector3::zeros(); 2],
             doubts_field: false,
             height_watch: HeightWatch::default(),
@@ -188,6 +191,13 @@ impl Memory {
     #[must_use]
     pub fn aids(&self) -> &AidRecords {
         &self.aids
+    }
+
+    /// Returns the aids that contradict the state: their measurements arrive, but none was fused for 1.2 s, or only as a
+    /// weak hint (a magnetic field that seems to drift).
+    #[must_use]
+    pub fn ignored(&self) -> AidSet {
+        if self.doubts_field { self.ignored.with(AidSource::Heading) } else { self.ignored }
     }
 
     /// Returns the numbers of measurements dropped before the gate.

@@ -5,7 +5,7 @@ use crate::common::checks::{at_rest, flown, position_error};
 use crate::common::{
     Flight, ICM, MOCAP, NOTHING, Noise, OUTDOOR, Path, Sensors, V3, double, eight, fly, hover, settings, single,
 };
-use afbc_estimator::{Estimator, ImuSample, Measurement, Memory, Settings, Stamped};
+use afbc_estimator::{AidSet, AidSource, Estimator, ImuSample, Measurement, Memory, Settings, Stamped};
 use nalgebra::Vector3;
 
 #[test]
@@ -198,12 +198,13 @@ fn a_gyroscope_that_drifts_is_told_from_a_field_that_rises() {
 }
 
 /// Flies with a receiver whose height has a slow error, after changes of the measurements. Returns the largest error of
-/// the height \[m\], the error at the end, and the number of the receiver's heights that were rejected.
-fn heights(path: Path, seed: u64, change: impl Fn(usize, &mut Measurement)) -> (f64, f64, u32) {
+/// the height \[m\], the error at the end, the number of the receiver's heights that were rejected, and true if they were
+/// named as ignored.
+fn heights(path: Path, seed: u64, change: impl Fn(usize, &mut Measurement)) -> (f64, f64, u32, bool) {
     let truth = fly(path, 90.0);
     let sensors = Sensors { gnss: Some((0.4, 0.6, 0.05)), slow: Some((1.2, 120.0)), ..OUTDOOR };
     let mut flight = Flight::with(&truth, ICM, sensors, seed, Settings { gnss_noise_m: 0.5, ..settings(&ICM) });
-    let (mut most_m, mut last_m, mut rejected) = (0.0_f64, 0.0, 0);
+    let (mut most_m, mut last_m, mut rejected, mut named) = (0.0_f64, 0.0, 0, false);
     for ms in 0..90_000 {
         let deliver = |measurement: &mut Stamped<Measurement>| {
             change(ms, &mut measurement.value);
@@ -216,20 +217,21 @@ fn heights(path: Path, seed: u64, change: impl Fn(usize, &mut Measurement)) -> (
             assert!(estimate.validity.position, "{ms} ms");
         }
         rejected = flight.memory.aids().gnss_height.rejected;
+        named |= flight.memory.ignored().contains(AidSource::GnssHeight);
     }
-    (most_m, last_m, rejected)
+    (most_m, last_m, rejected, named)
 }
 
 /// A receiver's height that creeps by 20 m is doubted: barometer and velocity agree without it.
 #[test]
 fn a_receivers_height_that_creeps_is_not_followed() {
     for (seed, rise_ms, by_m) in [(1, 20_000, 20.0), (2, 40_000, -20.0), (3, 60_000, 20.0), (4, 60_000, -20.0)] {
-        let (most_m, last_m, _) = heights(if seed % 2 == 0 { hover } else { eight }, seed, |ms, measurement| {
+        let (most_m, last_m, _, named) = heights(if seed % 2 == 0 { hover } else { eight }, seed, |ms, measurement| {
             if let Measurement::Gnss { position_m, .. } = measurement {
                 position_m.z += by_m * (ms.saturating_sub(10_000) as f32 / rise_ms as f32).min(1.0);
             }
         });
-        assert!(most_m < 9.0 && last_m < 5.0, "{rise_ms} ms, {by_m} m: {most_m} m, {last_m} m in the end");
+        assert!(most_m < 9.0 && last_m < 5.0 && named, "{rise_ms} ms, {by_m} m: {most_m} m, {last_m} m in the end");
     }
 }
 
@@ -237,12 +239,62 @@ fn a_receivers_height_that_creeps_is_not_followed() {
 #[test]
 fn a_barometer_that_creeps_leaves_the_receivers_height_alone() {
     for (seed, by_m) in [(1, 0.0), (2, 20.0), (3, -20.0), (4, 0.0)] {
-        let (most_m, _, rejected) = heights(if seed % 2 == 0 { hover } else { eight }, seed, |ms, measurement| {
-            if let Measurement::Height { height_m, .. } = measurement {
-                *height_m += by_m * (ms.saturating_sub(10_000) as f32 / 60_000.0).min(1.0);
+        let (most_m, _, rejected, named) =
+            heights(if seed % 2 == 0 { hover } else { eight }, seed, |ms, measurement| {
+                if let Measurement::Height { height_m, .. } = measurement {
+                    *height_m += by_m * (ms.saturating_sub(10_000) as f32 / 60_000.0).min(1.0);
+                }
+            });
+        assert!(most_m < 4.0 && rejected < 5 && !named, "{by_m} m: {most_m} m, {rejected} rejected");
+    }
+}
+
+/// Each kind of aid is wrong for 2.5 s. It is named as ignored then, and only then.
+#[test]
+fn an_aid_that_contradicts_the_others_is_named() {
+    type Change = fn(&mut Measurement);
+    let cases: [(AidSource, Change); 4] = [
+        (AidSource::GnssPosition, |measurement| {
+            if let Measurement::Gnss { position_m, .. } = measurement {
+                position_m.x += 40.0;
             }
-        });
-        assert!(most_m < 4.0 && rejected < 5, "{by_m} m: {most_m} m, {rejected} rejected");
+        }),
+        (AidSource::GnssHeight, |measurement| {
+            if let Measurement::Gnss { position_m, .. } = measurement {
+                position_m.z += 60.0;
+            }
+        }),
+        (AidSource::Height, |measurement| {
+            if let Measurement::Height { height_m, .. } = measurement {
+                *height_m += 40.0;
+            }
+        }),
+        (AidSource::Heading, |measurement| {
+            if let Measurement::MagneticField { field, .. } = measurement {
+                *field += Vector3::new(0.3, 0.5, 0.2);
+            }
+        }),
+    ];
+    for (aid, spoil) in cases {
+        flown(
+            eight,
+            OUTDOOR,
+            14,
+            |_, _| true,
+            |ms, measurement| {
+                if (8000..10_500).contains(&ms) {
+                    spoil(&mut measurement.value);
+                }
+                true
+            },
+            |ms, _, flight| {
+                let ignored = flight.memory.ignored();
+                let expected =
+                    if (9700..10_500).contains(&ms) { AidSet::default().with(aid) } else { AidSet::default() };
+                let changes = (9000..9700).contains(&ms) || (10_500..11_000).contains(&ms);
+                assert!(ms < 4000 || changes || ignored == expected, "{aid:?} at {ms} ms: {ignored:?}");
+            },
+        );
     }
 }
 

@@ -236,6 +236,7 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
             saturated_ticks: self.saturated_ticks,
             norms: self.memory.control().and_then(C::norms),
             shaken: airborne && self.front_end.is_shaken(),
+            ignored: self.front_end.ignored(),
             answer: outcome.answer,
             ended: outcome.ended,
             against: outcome.against,

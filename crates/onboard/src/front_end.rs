@@ -8,7 +8,7 @@ use crate::tick_record::{TickBefore, TickInputs};
 use crate::vibration::Vibration;
 use afbc_control::math::{max, min};
 use afbc_estimator::{
-    Estimate, Estimator, ImuCalibration, ImuSample, InertialState, LeverArmEstimator, Measurement, Memory,
+    AidSet, Estimate, Estimator, ImuCalibration, ImuSample, InertialState, LeverArmEstimator, Measurement, Memory,
     OutputFilter, Stamped, VelocityNotch,
 };
 use afbc_flight_core::{Inbox, Refusal};
@@ -242,6 +242,11 @@ impl EstimatorFrontEnd {
     /// Returns true while vibration of the accelerometer is too high.
     pub fn is_shaken(&self) -> bool {
         self.vibration.is_high()
+    }
+
+    /// Returns the aiding sensors that contradict the estimate ([`Memory::ignored`]).
+    pub fn ignored(&self) -> AidSet {
+        self.memory.ignored()
     }
 
     /// Returns the estimated offset of the inertial sensor, for evaluation.

@@ -4,7 +4,7 @@
 use crate::readings::{AIDS_MAX, Readings};
 use afbc::monitor::EstimateNorms;
 use afbc_control::Trace;
-use afbc_estimator::{AidRecords, Estimate, ImuSample, Measurement};
+use afbc_estimator::{AidRecords, AidSet, Estimate, ImuSample, Measurement};
 use afbc_flight_core::{EndReason, Mode, Reasons, RequestAnswer, TickHealth};
 use afbc_guidance::{BatteryReading, GuidanceOutputs, Sticks};
 use afbc_types::{Axis, Pose, ROTORS_MAX, RotorSpeeds, Stamped, State};
@@ -34,6 +34,8 @@ pub struct Report {
     pub norms: Option<(Axis, EstimateNorms)>,
     /// True in the air while [vibration](crate::vibration) of the accelerometer is too high.
     pub shaken: bool,
+    /// Aiding sensors that contradict the estimate ([`Memory::ignored`](afbc_estimator::Memory::ignored)).
+    pub ignored: AidSet,
     /// Answer to a request.
     pub answer: Option<RequestAnswer>,
     /// Reason for the flight's end, if it ended in this tick.

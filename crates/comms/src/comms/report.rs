@@ -120,6 +120,9 @@ impl Comms {
         for (severity, notice) in self.failsafes.watch(report, self.tick) {
             self.texts.put(severity, notice);
         }
+        for (severity, notice) in self.ignored.watch(report.ignored, report.guided.airborne, self.tick) {
+            self.texts.put(severity, notice);
+        }
         let fallback = report.health.control.fallback;
         if let (Some(reason), None) = (fallback, self.fallback) {
             self.texts.put(warning, reason);
