@@ -12,7 +12,7 @@ use afbc_mavlink::{
 
 /// A ground station or companion computer that talks to one vehicle.
 ///
-/// The client has no socket, clock or thread: [`Client::hear`] takes received bytes, [`Client::turn`] takes the time,
+/// The client has no socket, clock or thread: [`Client::hear`] takes received bytes, [`Client::update`] takes the time,
 /// and [`Client::send`] hands out the frames to send.
 pub struct Client {
     address: Address,
