@@ -3,8 +3,7 @@
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
 use crate::common::{refused, succeeds};
-use crate::compare::{SOFT, json, sitl, sitl_on, soft};
-use crate::suites::SUITE;
+use crate::compare::{SOFT, SUITE, json, sitl, sitl_on, soft};
 use afbc_files::seal;
 use std::fs;
 use std::io::Write as _;

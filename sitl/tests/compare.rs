@@ -3,7 +3,6 @@
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
 use crate::common::{command, folder, refused, succeeds};
-use crate::suites::SUITE;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
@@ -21,6 +20,30 @@ pub(crate) fn sitl(folder: &Path, arguments: &[&str]) -> Output {
 pub(crate) fn json(path: &Path) -> Value {
     serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
+
+/// Two flights on the racer, with a published result.
+pub(crate) const SUITE: &str = r#"
+description = "two"
+
+[[source]]
+name = "someone"
+citation = "a paper"
+differs = "flown"
+
+[[flight]]
+name = "racing"
+duration_s = 9.0
+vehicle = { name = "racer" }
+sensors = { noise = 0.001 }
+trajectory = { kind = "circle", centre_m = [0, 0, 2], radius_m = 1.0, period_s = 4.0 }
+published = [{ law = "theirs", rms_m = 0.0123, source = "someone" }]
+
+[[flight]]
+name = "weak"
+like = "racing"
+sensors = { noise = 0.0 }
+rotor_fault = [{ rotor = 2, efficiency = 0.0, start_s = 6.0 }]
+"#;
 
 /// Noisy circle of 8 s, and a PID with far too low gains.
 pub(crate) const SOFT: &str = r#"

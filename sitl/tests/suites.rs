@@ -3,33 +3,9 @@
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
 use crate::common::{folder, refused, succeeds};
-use crate::compare::{json, sitl, sitl_on};
+use crate::compare::{SUITE, json, sitl, sitl_on};
 use serde_json::Value;
 use std::fs;
-
-/// Two flights on the racer, with a published result.
-pub(crate) const SUITE: &str = r#"
-description = "two"
-
-[[source]]
-name = "someone"
-citation = "a paper"
-differs = "flown"
-
-[[flight]]
-name = "racing"
-duration_s = 9.0
-vehicle = { name = "racer" }
-sensors = { noise = 0.001 }
-trajectory = { kind = "circle", centre_m = [0, 0, 2], radius_m = 1.0, period_s = 4.0 }
-published = [{ law = "theirs", rms_m = 0.0123, source = "someone" }]
-
-[[flight]]
-name = "weak"
-like = "racing"
-sensors = { noise = 0.0 }
-rotor_fault = [{ rotor = 2, efficiency = 0.0, start_s = 6.0 }]
-"#;
 
 #[test]
 fn a_suite_is_one_report_alike_on_any_number_of_threads() {

@@ -9,8 +9,10 @@
 //! use afbc_comms::Comms;
 //!
 //! let mut flight = Flight::<4>::new(&Configuration::default())?;
-//! let (mut comms, mut inputs, mut taken) = (Comms::new(), ControlInputs::EMPTY, ControlInputs::EMPTY);
-//! inputs.merge(&comms.receive(b"MAVLink, or noise"));
+//! let (mut inputs, mut taken) = (ControlInputs::EMPTY, ControlInputs::EMPTY);
+//! let mut comms = Comms::new();
+//! let mut decoder = comms.decoder();
+//! inputs.merge(&comms.receive(&mut decoder, b"MAVLink, or noise"));
 //! inputs.take_into(&mut taken);
 //! let report = flight.tick(1_000, &mut taken, &Readings::NONE);
 //! assert_eq!(report.throttles, [0; 8]); // disarmed

@@ -14,11 +14,11 @@
 //! No input makes the crate panic or block. Its memory is one frame.
 //!
 //! ```
-//! use afbc_mavlink::{Address, Decoder, FRAME_MAX, Sender, Uplink};
+//! use afbc_mavlink::{Address, Decoder, Encoder, FRAME_MAX, Uplink};
 //!
 //! let (station, vehicle) = (Address { system: 255, component: 190 }, Address { system: 1, component: 1 });
 //! let mut buffer = [0; FRAME_MAX];
-//! let bytes = Sender::new(station).send(&Uplink::Heartbeat, &mut buffer);
+//! let bytes = Encoder::new(station).send(&Uplink::Heartbeat, &mut buffer);
 //! assert_eq!(bytes.len(), 12 + 9);
 //!
 //! let mut decoder = Decoder::<Uplink>::new(vehicle);

@@ -14,9 +14,9 @@
 //!   status bits of the clock tree, which the emulator lacks.
 //!
 //! ```no_run
-//! use pil::{Emulator, Image};
+//! use pil::{Emulator, FirmwareImage};
 //!
-//! let mut emulator = Emulator::start(&Image::Pil.build(None)?)?;
+//! let mut emulator = Emulator::start(&FirmwareImage::Pil.build(None)?)?;
 //! let reply = emulator.exchange(b"MAVLink in")?;
 //! println!("{} instructions, {} bytes out", reply.instructions, reply.bytes.len());
 //! # Ok::<(), pil::Error>(())

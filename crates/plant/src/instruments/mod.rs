@@ -6,14 +6,14 @@
 //!
 //! ```
 //! use afbc_types::{Parameters, RotorSpeeds};
-//! use afbc_plant::instruments::{Imu, TrackerModel};
-//! use afbc_plant::{Environment, InstrumentSuite, Instruments, Motion, Plant, PlantModel};
+//! use afbc_plant::instruments::{ImuModel, TrackerModel};
+//! use afbc_plant::{Environment, InstrumentSuite, Motion, Plant, PlantModel, SimulatedInstruments};
 //! use nalgebra::Vector4;
 //!
 //! let mut suite = InstrumentSuite::default();
-//! suite.imu = Some(Imu::ICM_42688_P);
+//! suite.imu = Some(ImuModel::ICM_42688_P);
 //! suite.tracker = Some(TrackerModel::MOCAP_100);
-//! let mut instruments = Instruments::new(&suite, &[], 7, 0.001)?;
+//! let mut instruments = SimulatedInstruments::new(&suite, &[], 7, 0.001)?;
 //! let mut plant = Plant::new(PlantModel::RigidBody, Motion::default(), Environment::calm(Parameters::PAPER)?);
 //! let mut poses = 0;
 //! for _ in 0..1000 {
