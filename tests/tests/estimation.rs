@@ -368,7 +368,8 @@ fn consistent_outdoors() {
 #[test]
 fn hours_of_flight() {
     let hours: f64 = std::env::var("HOURS").map_or(0.1, |hours| hours.parse().unwrap());
-    for (name, sigma_m, nees_max) in [("mocap", 0.01, 10.0), ("outdoor", 3.0, 12.0)] {
+        // Outdoors the heading's standard deviation grows while the field is doubted.
+    for (name, sigma_rad, sigma_m, nees_max) in [("mocap", 0.05, 0.01, 10.0), ("outdoor", 0.08, 3.0, 12.0)] {
         let scenario = Scenario { duration_s: 3600.0 * hours, ..scenario(name) };
         let (mut checks, mut far, mut nees, mut sigmas) = (0.0, Vec::from([0.0; 9]), 0.0, [0.0_f32; 3]);
         let mut turned = Vector3::<f32>::zeros();
@@ -399,7 +400,7 @@ fn hours_of_flight() {
         println!("  of {checks} beyond 3 sigma {far:?}");
         // By chance, one error in 370 exceeds three standard deviations. Outdoors, errors last for minutes.
         assert!(far.iter().all(|far| *far <= 10.0 + 0.01 * checks), "{name}: {far:?} of {checks}");
-        assert!(sigmas[0] < 0.05 && sigmas[1] < 0.1 && sigmas[2] < sigma_m, "{name}: {sigmas:?}");
+        assert!(sigmas[0] < sigma_rad && sigmas[1] < 0.1 && sigmas[2] < sigma_m, "{name}: {sigmas:?}");
         assert!(nees < nees_max && turned.xy().max() < 0.02 && turned.z < 0.12, "{name}: {nees}, {turned} rad");
     }
 }

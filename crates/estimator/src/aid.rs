@@ -91,8 +91,8 @@ impl AidRecord {
         self.rejected_since_us = None;
     }
 
-    /// Returns true if measurements arrive at `now_us`, but none has been fused for [`IGNORED_US`]. An aid that was never
-    /// fused is not ignored: it has not started.
+    /// Returns true if measurements arrive at `now_us`, but none has been fused for [`IGNORED_US`]. An aid that was
+    /// never fused is not ignored: it has not started.
     fn is_ignored(&self, now_us: u64) -> bool {
         let (Some(newest_us), Some(accepted_us)) = (self.newest_us, self.accepted_us) else { return false };
         newest_us.saturating_sub(accepted_us) > IGNORED_US && now_us.saturating_sub(newest_us) <= IGNORED_US

@@ -5,46 +5,24 @@
 //! up: the height has moved farther than the velocity says, and the offset has changed by as much. A barometer that
 //! drifts moves only its offset, and a wrong velocity only the height.
 
-use crate::aid::AidSource;
-use crate::estimate::count;
-use crate::estimator::Estimator;
-use crate::history::PastState;
-use crate::horizon::ObservedQuantity;
-use crate::memory::Memory;
-use crate::queue::AidObservation;
-use crate::rotation::identity;
 use afbc_control::math::{max, min};
-use nalgebra::Vector3;
 
 /// Time in which the watch forgets corrections: the usual time of a receiver's slow error \[s\].
 const FORGETS_S: f32 = 100.0;
 /// Longest time between two fixes over which corrections are summed \[s\].
 const APART_S: f32 = 1.0;
-/// Usual variance of the change of a receiver's slow error within [`FORGETS_S`], as a share of the receiver's variance.
-const CHANGES: f32 = 0.5;
-/// Usual variance of the change of a barometer's drift within [`FORGETS_S`] \[m2\].
-const DRIFTS_M2: f32 = 1.0;
-/// Beyond this many standard deviations, corrections of the height show that the receiver's height is wrong. The second
-/// number applies once the height has been rejected for [`REJECTED_US`].
-const FAR_SIGMAS: f32 = 4.0;
-const FAR_REJECTED_SIGMAS: f32 = 2.0;
-const REJECTED_US: u64 = 3_000_000;
-/// A doubted height is fused again once it is within this many standard deviations of the estimate.
-const NEAR_SIGMAS: f32 = 2.0;
-/// Time since the last fusion within which barometer and velocity count as present \[us\].
-const PRESENT_US: u64 = 1_000_000;
 
 /// Recent corrections of the height.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct HeightWatch {
     /// Sum of the recent corrections of the height, beyond what the velocity explains \[m\].
-    lifted: f32,
+    pub(crate) lifted: f32,
     /// Sum of the recent changes of the barometer's offset \[m\].
-    offset: f32,
+    pub(crate) offset: f32,
     /// Height \[m\], climb rate \[m/s\] and barometer offset \[m\] at the last fix.
     last: Option<(f32, f32, f32)>,
     /// True while the receiver's height is not fused.
-    doubts: bool,
+    pub(crate) doubts: bool,
 }
 
 impl HeightWatch {
@@ -54,7 +32,7 @@ impl HeightWatch {
     }
 
     /// Takes the state at a fix, `since_s` after the last fix.
-    fn advance(&mut self, now: (f32, f32, f32), since_s: f32) {
+    pub(crate) fn advance(&mut self, now: (f32, f32, f32), since_s: f32) {
         let last = self.last.replace(now).filter(|_| since_s < APART_S);
         let kept = max(1.0 - since_s * (1.0 / FORGETS_S), 0.0);
         (self.lifted, self.offset) = (self.lifted * kept, self.offset * kept);
@@ -65,59 +43,7 @@ impl HeightWatch {
     }
 
     /// Returns the square of the error that the sums of height corrections and of barometer offsets both show \[m2\].
-    fn crept(&self) -> f32 {
+    pub(crate) fn crept(&self) -> f32 {
         if self.lifted * self.offset < 0.0 { min(self.lifted * self.lifted, self.offset * self.offset) } else { 0.0 }
-    }
-}
-
-impl Estimator {
-    /// Watches the height of a receiver's fix. Returns false if barometer and vertical velocity contradict the
-    /// receiver's height. The estimated height is then moved back by the distance that the receiver's height has moved
-    /// it.
-    #[inline(never)]
-    pub(crate) fn trusts_height(
-        &self,
-        memory: &mut Memory,
-        part: &AidObservation,
-        raw: &PastState,
-        at_us: u64,
-        since_us: u64,
-    ) -> bool {
-        let ObservedQuantity::Position(fix) = &part.target else { return true };
-        // The state at the time of the fix. A fix is older than the present state.
-        let Some(past) = memory.history.corrected(raw, self.settings.gravity_m_s2) else { return true };
-        let (mut height, climb) = (past.position.z, past.velocity.z);
-        memory.height_watch.advance((height, climb, memory.height_offset), min(since_us as f32 * 1e-6, 1e3));
-        let live = |aid: AidSource| memory.aids.of(aid).is_live(at_us, PRESENT_US);
-        let contradicted =
-            live(AidSource::GnssVelocity) && live(AidSource::Height) && !live(AidSource::TrackerPosition);
-        let watch = &mut memory.height_watch;
-        if !contradicted || !memory.knows.height_offset {
-            watch.doubts = false;
-            return true;
-        }
-        let rejected_us =
-            memory.aids.gnss_height.rejected_since_us.map_or(0, |since_us| at_us.saturating_sub(since_us));
-        let sigmas = if rejected_us > REJECTED_US { FAR_REJECTED_SIGMAS } else { FAR_SIGMAS };
-        let usual = CHANGES * part.variance.z + DRIFTS_M2;
-        if watch.crept() > sigmas * sigmas * usual {
-            let (lifted, offset) = (watch.lifted, watch.offset);
-            *watch = HeightWatch { doubts: true, ..HeightWatch::default() };
-            // Unlike other resets, this reset is not passed on to the guidance. The vehicle itself has followed the
-            // wrong height and has to come back.
-            let by = Vector3::new(0.0, 0.0, -lifted);
-            memory.nominal.move_by(&by);
-            memory.height_offset -= offset;
-            memory.history.correct(&identity(), &Vector3::zeros(), &Vector3::zeros(), &by);
-            height -= lifted;
-            count(&mut memory.resets.height);
-        }
-        let watch = &mut memory.height_watch;
-        if watch.doubts {
-            let off = fix.z - height;
-            let variance = part.variance.z + memory.covariance.variances().position.z;
-            watch.doubts = off * off > NEAR_SIGMAS * NEAR_SIGMAS * variance;
-        }
-        !watch.doubts
     }
 }

@@ -135,6 +135,7 @@ mod estimator;
 mod follow;
 mod fusion;
 mod geodetic;
+mod height_check;
 mod height_watch;
 mod history;
 mod horizon;

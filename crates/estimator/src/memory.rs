@@ -193,8 +193,8 @@ impl Memory {
         &self.aids
     }
 
-    /// Returns the aids that contradict the state: their measurements arrive, but none was fused for 1.2 s, or only as a
-    /// weak hint (a magnetic field that seems to drift).
+    /// Returns the aids that contradict the state: their measurements arrive, but none was fused for 1.2 s, or only as
+    /// a weak hint (a magnetic field that seems to drift).
     #[must_use]
     pub fn ignored(&self) -> AidSet {
         if self.doubts_field { self.ignored.with(AidSource::Heading) } else { self.ignored }

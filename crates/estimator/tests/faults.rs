@@ -198,8 +198,8 @@ fn a_gyroscope_that_drifts_is_told_from_a_field_that_rises() {
 }
 
 /// Flies with a receiver whose height has a slow error, after changes of the measurements. Returns the largest error of
-/// the height \[m\], the error at the end, the number of the receiver's heights that were rejected, and true if they were
-/// named as ignored.
+/// the height \[m\], the error at the end, the number of the receiver's heights that were rejected, and true if they
+/// were named as ignored.
 fn heights(path: Path, seed: u64, change: impl Fn(usize, &mut Measurement)) -> (f64, f64, u32, bool) {
     let truth = fly(path, 90.0);
     let sensors = Sensors { gnss: Some((0.4, 0.6, 0.05)), slow: Some((1.2, 120.0)), ..OUTDOOR };
