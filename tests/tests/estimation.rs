@@ -368,7 +368,7 @@ fn consistent_outdoors() {
 #[test]
 fn hours_of_flight() {
     let hours: f64 = std::env::var("HOURS").map_or(0.1, |hours| hours.parse().unwrap());
-        // Outdoors the heading's standard deviation grows while the field is doubted.
+    // Outdoors the heading's standard deviation grows while the field is doubted.
     for (name, sigma_rad, sigma_m, nees_max) in [("mocap", 0.05, 0.01, 10.0), ("outdoor", 0.08, 3.0, 12.0)] {
         let scenario = Scenario { duration_s: 3600.0 * hours, ..scenario(name) };
         let (mut checks, mut far, mut nees, mut sigmas) = (0.0, Vec::from([0.0; 9]), 0.0, [0.0_f32; 3]);

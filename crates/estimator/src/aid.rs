@@ -3,8 +3,7 @@
 
 use nalgebra::Vector3;
 
-/// An aid whose measurements arrive counts as ignored if none of them was fused for this time, which is longer than the
-/// period of a 1 Hz receiver \[us\].
+/// An aid whose measurements arrive counts as ignored if none of them was fused for this time \[us\].
 const IGNORED_US: u64 = 1_200_000;
 
 /// Kind of measurement from an aiding sensor. Each kind in a fix passes its own gate: a receiver whose position jumps
@@ -51,6 +50,12 @@ impl AidSet {
         AidSet(self.0 | 1 << aid as u8)
     }
 
+    /// Adds this kind or takes it out.
+    pub(crate) fn set(&mut self, aid: AidSource, is_in: bool) {
+        let bit = 1 << aid as u8;
+        self.0 = if is_in { self.0 | bit } else { self.0 & !bit };
+    }
+
     /// Returns true if this kind is in the set.
     #[must_use]
     pub const fn contains(self, aid: AidSource) -> bool {
@@ -91,11 +96,11 @@ impl AidRecord {
         self.rejected_since_us = None;
     }
 
-    /// Returns true if measurements arrive at `now_us`, but none has been fused for [`IGNORED_US`]. An aid that was
-    /// never fused is not ignored: it has not started.
-    fn is_ignored(&self, now_us: u64) -> bool {
+    /// Returns true if the last measurement was not fused, and none has been for [`IGNORED_US`] before the one at
+    /// `at_us`. An aid that was never fused is not ignored: it has not started.
+    pub(crate) fn is_ignored(&self, at_us: u64) -> bool {
         let (Some(newest_us), Some(accepted_us)) = (self.newest_us, self.accepted_us) else { return false };
-        newest_us.saturating_sub(accepted_us) > IGNORED_US && now_us.saturating_sub(newest_us) <= IGNORED_US
+        newest_us > accepted_us && at_us.saturating_sub(accepted_us) > IGNORED_US
     }
 
     /// Counts a rejection and returns the time since the first rejection in this row \[us\].
@@ -207,12 +212,6 @@ impl AidRecords {
             // A height reset changes only the barometer's offset, which no other aid measures.
             AidSource::Height => ResetDelay::Soon,
         }
-    }
-
-    /// Returns the aids whose measurements arrive at `now_us` without being fused.
-    pub(crate) fn ignored(&self, now_us: u64) -> AidSet {
-        let ignored = AidSource::ALL.into_iter().filter(|aid| self.of(*aid).is_ignored(now_us));
-        ignored.fold(AidSet::default(), AidSet::with)
     }
 
     /// Returns true if a position or velocity was fused within the last `time_us`.

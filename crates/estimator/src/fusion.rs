@@ -97,8 +97,6 @@ impl Estimator {
         let Some(measurement) = memory.queue.take(due) else {
             return self.rest(memory);
         };
-        // All earlier measurements have been fused or rejected by now.
-        memory.ignored = memory.aids.ignored(newest_us);
         let at_us = measurement.at_us;
         if at_us > newest_us {
             count(&mut memory.dropped.early);
@@ -122,6 +120,8 @@ impl Estimator {
                 count(&mut memory.dropped.overtaken);
                 *part = None;
             } else {
+                // The earlier measurements of this kind have been fused or rejected by now.
+                memory.ignored.set(aid, record.is_ignored(at_us));
                 record.newest_us = Some(at_us);
             }
         }

@@ -66,7 +66,7 @@ pub struct Memory {
     /// Strength and sine of the inclination of the magnetic field, `None` until measured.
     pub(crate) field: Option<(f32, f32)>,
     pub(crate) aids: AidRecords,
-    /// Aids that were ignored when the newest measurement was taken.
+    /// Aids that were ignored when their last measurement was taken.
     pub(crate) ignored: AidSet,
     /// Mean innovations of motion and rotation along the earth's axes, in standard deviations.
     pub(crate) leaning: [Vector3<f32>; 2],
@@ -194,7 +194,7 @@ impl Memory {
     }
 
     /// Returns the aids that contradict the state: their measurements arrive, but none was fused for 1.2 s, or only as
-    /// a weak hint (a magnetic field that seems to drift).
+    /// a weak hint (a magnetic field that seems to drift). An aid that falls silent then stays in the set.
     #[must_use]
     pub fn ignored(&self) -> AidSet {
         if self.doubts_field { self.ignored.with(AidSource::Heading) } else { self.ignored }
