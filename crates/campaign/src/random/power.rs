@@ -1,4 +1,4 @@
-//! The capability of a vehicle and the demands of a reference on it. `docs/suites.md` has the formulas.
+//! The capability of a vehicle and the demands of a reference on it. `docs/reference/suites.md` has the formulas.
 
 use super::bisection::largest;
 use super::mismatch::ModelMismatch;
