@@ -1,9 +1,10 @@
 //! The vehicle's MAVLink endpoint: receives and sends messages.
 
 mod dispatch;
+mod queued;
 mod report;
 
-use self::dispatch::{PARAMETER_TASKS_MAX, ParameterTask, REPLIES_MAX, Reply};
+use self::queued::{PARAMETER_TASKS_MAX, ParameterTask, REPLIES_MAX, Reply};
 use crate::failsafes::Failsafes;
 use crate::ignored::IgnoredAids;
 use crate::link_share::LinkShare;

@@ -6,6 +6,7 @@ mod fence;
 mod parameters;
 mod targets;
 
+use super::queued::{ParameterTask, Reply};
 use super::{Comms, KEY_OVER_WIRE};
 use crate::log_server::LogServer;
 use crate::services::commands::BUSY;
@@ -21,40 +22,14 @@ use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Sighting};
 use afbc_guidance::{Item, Order, RequestedItem};
 use afbc_mavlink::telemetry::OrbitStatus;
 use afbc_mavlink::{
-    Address, CommandResult, ControlAnswer, DataStream, Decoder, Downlink, FrameHandler, MavSeverity, MessageInterval,
-    MissionMessage, ParameterError, ParameterRequest, ReceivedFrame, ServiceRefusal, ServiceRequest, SetupSigning,
-    Telemetry, TimeMessage, Uplink, VehicleCommand,
+    Address, CommandResult, Decoder, Downlink, FrameHandler, MavSeverity, MissionMessage, ReceivedFrame,
+    ServiceRefusal, ServiceRequest, SetupSigning, Telemetry, Uplink, VehicleCommand,
 };
 use afbc_onboard::ControlInputs;
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 
-/// Largest number of queued replies, besides answers to commands. Further replies are dropped, since stations repeat
-/// requests.
-pub(super) const REPLIES_MAX: usize = 16;
-/// Largest number of queued parameter requests. A tick carries out all that read, and at most one that changes a value.
-/// Further requests are dropped, since stations repeat them.
-pub(super) const PARAMETER_TASKS_MAX: usize = 24;
 /// Shortest time between two reports to the guidance that the station in control was heard \[us\].
 const HEARD_EVERY_US: u64 = 50_000;
-
-/// A reply to a message other than a command.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Reply {
-    Clock(TimeMessage),
-    Control(ControlAnswer),
-    Interval(MessageInterval),
-    Stream(DataStream),
-    Reached(u16),
-    ParameterError(ParameterError, Address),
-    Refusal(ServiceRefusal, Address),
-}
-
-/// A queued request about parameters.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum ParameterTask {
-    Ask(ParameterRequest, Address),
-    Restore,
-}
 
 /// Handler of the frames in received bytes.
 struct FrameDispatcher<'a, R> {

@@ -86,7 +86,7 @@ pub(crate) fn reason(declined: OrderRefusal) -> &'static str {
         OrderRefusal::OnGround => "refused: on the ground",
         OrderRefusal::InFlight => "refused: in flight",
         OrderRefusal::NoTargets => "refused: no fresh targets",
-        OrderRefusal::NoSticks => "refused: no fresh stick input",
+        OrderRefusal::NoSticks => "refused: no fresh input from the sticks",
         OrderRefusal::NoMission => "refused: no mission, or item does not exist",
         OrderRefusal::OutsideFence => "refused: outside the geofence",
         OrderRefusal::OutOfRange => "refused: target or value out of range",
