@@ -23,9 +23,9 @@ pub struct Height {
 /// A position on the earth. Coordinates that are not given mean "unchanged".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GlobalPosition {
-    /// Latitude \[1e-7 deg\]; [`GlobalPositionInt::AS_IT_IS`] if not given.
+    /// Latitude \[1e-7 deg\]; [`GlobalPosition::AS_IT_IS`] if not given.
     pub latitude_e7: i32,
-    /// Longitude \[1e-7 deg\]; [`GlobalPositionInt::AS_IT_IS`] if not given.
+    /// Longitude \[1e-7 deg\]; [`GlobalPosition::AS_IT_IS`] if not given.
     pub longitude_e7: i32,
     /// Height.
     pub height: Height,
