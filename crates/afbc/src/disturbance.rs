@@ -34,8 +34,8 @@ const W_MIN_RAD_S: f32 = 1.0;
 /// Largest v - v_hat that f can cause, at most f/(e w) \[m/s\]. A larger difference is noise, or a jump of the state,
 /// as after an outage.
 pub const JUMP_M_S: f32 = 0.1;
-/// A larger difference in more than this many measured states in a row is a jump.
-const JUMPS: u8 = 9;
+/// A larger difference is a jump if no velocity has agreed for this many steps.
+const JUMP_STEPS: u8 = 9;
 /// Standard deviation of the velocity's noise up to which the observer keeps its bandwidth \[m/s\]. Beyond it the
 /// bandwidth falls in proportion, so that the noise of f_hat does not grow.
 pub const QUIET_M_S: f32 = 0.01;
@@ -116,18 +116,22 @@ struct AxisForce {
     velocity_m_s: f32,
     /// f_hat \[m/s2\].
     acceleration_m_s2: f32,
-    /// v - v_hat of the last measured state \[m/s\].
+    /// v - v_hat of the last velocity that agreed with v_hat \[m/s\].
     off_m_s: f32,
-    /// Measured states in a row with a difference that f cannot cause.
-    jumps: u8,
 }
 
 /// Memory of the force observer: the observers along x and y, and T.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceObserverMemory {
     axes: [AxisForce; 2],
+    /// Last measured velocity along x and y \[m/s\].
+    last_m_s: [f32; 2],
     /// Mean square of the change of v - v_hat, of x and y together \[m2/s2\].
     noise_m2_s2: f32,
+    /// True if the last step's velocity was measured.
+    measured: bool,
+    /// Steps since the last velocity that agreed with v_hat.
+    steps: u8,
     thrust_n: f32,
     /// Learnt relation between velocity and force.
     pub remembered: ForceMapWeights,
@@ -184,7 +188,10 @@ impl ForceObserver {
         let measured = [state.velocity_m_s.x, state.velocity_m_s.y];
         let start = |thrust_n, remembered| ForceObserverMemory {
             axes: measured.map(|velocity_m_s| AxisForce { velocity_m_s, ..AxisForce::default() }),
+            last_m_s: measured,
             noise_m2_s2: 0.0,
+            measured: false,
+            steps: 0,
             thrust_n,
             remembered,
             held: false,
@@ -198,7 +205,8 @@ impl ForceObserver {
         }
         let share = observed.thrust_n / hover_n;
         let mut drag = self.drag.acceleration(&state.velocity_m_s, up, share);
-        let ForceObserverMemory { axes, noise_m2_s2, remembered, held, .. } = observed;
+        let ForceObserverMemory { axes, last_m_s, noise_m2_s2, measured: before, steps, remembered, held, .. } =
+            observed;
         if let Some(memory) = &self.memory {
             let weights = memory.weights(measured);
             if fresh && !*held {
@@ -208,45 +216,57 @@ impl ForceObserver {
             (drag.x, drag.y) = (drag.x + x, drag.y + y);
         }
         let known = [drag.x + up.x * share * self.gravity_m_s2, drag.y + up.y * share * self.gravity_m_s2];
-        // A difference that arose while the velocity was not measured is no disturbance, so f_hat stays.
+        // A velocity that is older than the rates is repeated until it is measured again.
+        let is_new = fresh && measured != *last_m_s;
         if *held {
+            // A difference that arose while the velocity was not measured is no disturbance, so f_hat stays.
             for (axis, v) in axes.iter_mut().zip(measured) {
                 (axis.velocity_m_s, axis.off_m_s) = (v, 0.0);
             }
-        } else if fresh {
-            let [x, y] = axes;
-            let off = [measured[0] - x.velocity_m_s, measured[1] - y.velocity_m_s];
-            let change = [off[0] - x.off_m_s, off[1] - y.off_m_s];
-            (x.off_m_s, y.off_m_s) = (off[0], off[1]);
-            // A jump is not the noise's.
-            let square = math::min(change[0] * change[0] + change[1] * change[1], JUMP_M_S * JUMP_M_S);
-            *noise_m2_s2 = math::settled(*noise_m2_s2 + (square - *noise_m2_s2) * NOISE_SHARE);
-            let quiet = if *noise_m2_s2 > QUIET { math::sqrt(QUIET / *noise_m2_s2) } else { 1.0 };
-            for ((axis, off), a) in [x, y].into_iter().zip(off).zip(known) {
-                self.correct(axis, off, quiet);
+        } else {
+            if is_new {
+                *last_m_s = measured;
+                let [x, y] = &mut *axes;
+                let off = [measured[0] - x.velocity_m_s, measured[1] - y.velocity_m_s];
+                // Motion since an older velocity is no noise, nor is a jump.
+                if *before {
+                    let change = [off[0] - x.off_m_s, off[1] - y.off_m_s];
+                    let square = math::min(change[0] * change[0] + change[1] * change[1], JUMP_M_S * JUMP_M_S);
+                    *noise_m2_s2 = math::settled(*noise_m2_s2 + (square - *noise_m2_s2) * NOISE_SHARE);
+                }
+                let quiet = if *noise_m2_s2 > QUIET { math::sqrt(QUIET / *noise_m2_s2) } else { 1.0 };
+                let jumped = *steps >= JUMP_STEPS;
+                if self.correct(x, off[0], quiet, jumped) & self.correct(y, off[1], quiet, jumped) {
+                    *steps = 0;
+                }
+            }
+            *steps = steps.saturating_add(1);
+            for (axis, a) in axes.iter_mut().zip(known) {
                 let change = (a + axis.acceleration_m_s2) * self.dt_s;
                 axis.velocity_m_s = math::settled(axis.velocity_m_s + change);
             }
         }
-        *held = false;
+        (*held, *before) = (false, is_new);
         let [x, y] = axes.map(|axis| axis.acceleration_m_s2);
         drag + Vector3::new(x, y, 0.0)
     }
 
-    /// Corrects v_hat and f_hat of an axis by a measured velocity that differs by `off` from v_hat. `quiet` is the
-    /// share of the bandwidth that the noise leaves.
+    /// Corrects v_hat and f_hat of an axis by a measured velocity that differs by `off` from v_hat, or takes over the
+    /// velocity if it has `jumped`. `quiet` is the share of the bandwidth that the noise leaves. Returns true if v_hat
+    /// agrees with the velocity.
     #[inline(always)]
-    fn correct(&self, axis: &mut AxisForce, off: f32, quiet: f32) {
+    fn correct(&self, axis: &mut AxisForce, off: f32, quiet: f32, jumped: bool) -> bool {
         if off.abs() <= JUMP_M_S {
             let f = math::settled(axis.acceleration_m_s2 + self.acceleration * (quiet * quiet) * off);
             axis.acceleration_m_s2 = math::limited(f, ACCELERATION_MAX_M_S2);
             axis.velocity_m_s += self.velocity * quiet * off;
-            axis.jumps = 0;
-        } else if axis.jumps < JUMPS {
-            axis.jumps += 1;
+            axis.off_m_s = off;
+        } else if jumped {
+            (axis.velocity_m_s, axis.off_m_s) = (axis.velocity_m_s + off, 0.0);
         } else {
-            (axis.velocity_m_s, axis.off_m_s, axis.jumps) = (axis.velocity_m_s + off, 0.0, 0);
+            return false;
         }
+        true
     }
 
     /// Stores the total thrust commanded in this step \[N\].
