@@ -5,6 +5,7 @@
 
 use super::reference::{START, flyable};
 use crate::trajectory::polynomial::{COEFFICIENTS, PolynomialCoefficients, PolynomialPiece, through};
+use crate::trajectory::smoothing::{disturbs, median_step, smoothed};
 use crate::trajectory::spline::PathSamples;
 use crate::trajectory::{Reference, Trajectory, nearest_heading};
 use afbc_files::read::{DelimitedFormat, FileError, SourceFile, Table};
@@ -20,6 +21,8 @@ const PACE: Range = Range::new("pace", 0.01, 100.0);
 const LINES: usize = 200_000;
 /// Largest coordinate and largest angle \[m, rad\].
 const LARGEST: f64 = 10_000.0;
+/// Coarsest rounding that is smoothed. Numbers with fewer decimals count as exact: people type them.
+const COARSEST: f64 = 0.01;
 /// First column of a file of polynomials.
 const DURATION: &str = "duration";
 /// Coordinates with the columns of their value, first and second derivative.
@@ -123,7 +126,11 @@ impl PathLines<'_> {
         if samples.time_s.len() < 2 {
             return Err(self.whole("the path has fewer than two lines of numbers; add lines"));
         }
+        let mut units = [[COARSEST; 3]; 4];
         for (axis, [value, rate, acceleration]) in COLUMNS.into_iter().enumerate() {
+            for (unit, names) in units.get_mut(axis).into_iter().flatten().zip([value, rate, acceleration]) {
+                *unit = place(names).map_or(COARSEST, |place| unit_of(rows, place).min(COARSEST));
+            }
             let known = |names| place(names).map(|place| self.column(rows, place, head)).transpose();
             let values = match (axis, place(value)) {
                 (3, None) => vec![0.0; rows.len()],
@@ -136,7 +143,11 @@ impl PathLines<'_> {
                 (*rates, *accelerations) = (known(rate)?, known(acceleration)?);
             }
         }
-        Ok(through(&samples.knots()))
+        let columns = samples.columns(&units);
+        let step_s = median_step(&samples.time_s);
+        let is_rounded = units.iter().take(3).any(|[unit, ..]| disturbs(*unit, step_s));
+        let smooth = if is_rounded { smoothed(&samples.time_s, columns.each_ref().map(Vec::as_slice)) } else { None };
+        Ok(smooth.unwrap_or_else(|| through(&samples.knots())))
     }
 
     /// Reads polynomials that follow one another.
@@ -222,6 +233,17 @@ impl PathLines<'_> {
         };
         FileError::at(self.source, at, "", problem)
     }
+}
+
+/// Returns the unit to which a column's numbers are rounded: one of the last decimal of the number with most decimals.
+fn unit_of(rows: &[StringRecord], place: usize) -> f64 {
+    let decimals = |text: &str| {
+        let (digits, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
+        let after = digits.split_once(['.', ',']).map_or(0, |(_, after)| after.len() as i32);
+        after - exponent.parse::<i32>().unwrap_or_default().clamp(-30, 30)
+    };
+    let most = rows.iter().filter_map(|row| row.get(place)).map(decimals).max().unwrap_or_default();
+    0.1_f64.powi(most.min(30))
 }
 
 /// Returns the angles without jumps of whole turns.

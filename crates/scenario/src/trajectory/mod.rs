@@ -6,6 +6,7 @@
 pub mod minimum_snap;
 pub mod polynomial;
 mod reference;
+pub mod smoothing;
 pub mod spline;
 
 use core::f64::consts::{PI, TAU};

@@ -1,6 +1,7 @@
 //! Makes a smooth curve through samples.
 
 use super::polynomial::Knot;
+use super::smoothing::RoundedColumn;
 
 /// Samples of x, y, z \[m\] and yaw \[rad\] over time, with derivatives where known.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -31,6 +32,19 @@ impl PathSamples {
             Knot { time_s: *time_s, values }
         };
         self.time_s.iter().enumerate().map(knot).collect()
+    }
+
+    /// Returns the known columns of each coordinate, rounded to multiples of these units.
+    pub fn columns(&self, units: &[[f64; 3]; 4]) -> [Vec<RoundedColumn<'_>>; 4] {
+        let mut axes: [Vec<RoundedColumn<'_>>; 4] = Default::default();
+        let known = self.values.iter().zip(&self.rates).zip(&self.accelerations);
+        for ((axis, ((values, rates), accelerations)), units) in axes.iter_mut().zip(known).zip(units) {
+            let columns = [Some(values), rates.as_ref(), accelerations.as_ref()];
+            for (order, (values, unit)) in columns.into_iter().zip(units).enumerate() {
+                axis.extend(values.map(|values| RoundedColumn { order, values, unit: *unit }));
+            }
+        }
+        axes
     }
 
     /// Returns first and second derivatives of a coordinate.
