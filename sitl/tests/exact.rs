@@ -36,7 +36,10 @@ fn a_flight_is_the_same_again_under_every_law() {
 fn a_change_is_shown() {
     let folder = flown("changed", "afbc");
     let said = succeeds(&sitl(&folder, &["replay", "--exact", "flight.log", "--change", "law=pid"]));
-    assert!(said.contains("the same inputs with law=pid") && said.contains("rotor 4") && said.contains("roll setpoint"), "{said}");
+    assert!(
+        said.contains("the same inputs with law=pid") && said.contains("rotor 4") && said.contains("roll setpoint"),
+        "{said}"
+    );
     let out = folder.join("out/replay-flight");
     let summary: Value = serde_json::from_slice(&fs::read(out.join("summary.json")).unwrap()).unwrap();
     let differences = summary["change"]["differences"].as_array().unwrap();

@@ -99,7 +99,10 @@ fn random_flights_are_alike_on_any_number_of_threads() {
         let [one, three] = ["one", "three"].map(|out| fs::read(folder.join(out).join(file)).unwrap());
         assert!(one == three, "{file}");
     }
-    assert!(table.starts_with("Suite random: seed 2, 2 flights of each vehicle and seed, on the true state"), "{table}");
+    assert!(
+        table.starts_with("Suite random: seed 2, 2 flights of each vehicle and seed, on the true state"),
+        "{table}"
+    );
     assert!(table.contains("all vehicles, 12 flights") && table.contains("over PID [95 %]"), "{table}");
     let rows = fs::read_to_string(folder.join("one/flights.csv")).unwrap();
     assert_eq!(rows.lines().count(), 1 + 6 * 2 * 2);

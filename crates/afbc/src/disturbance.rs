@@ -36,6 +36,8 @@ const W_MIN_RAD_S: f32 = 1.0;
 pub const JUMP_M_S: f32 = 0.1;
 /// A larger difference is a jump if no velocity has agreed for this many steps.
 const JUMP_STEPS: u8 = 9;
+/// A velocity that is repeated for more than this many steps is constant.
+const REPEATS_MAX: u8 = 120;
 /// Standard deviation of the velocity's noise up to which the observer keeps its bandwidth \[m/s\]. Beyond it the
 /// bandwidth falls in proportion, so that the noise of f_hat does not grow.
 pub const QUIET_M_S: f32 = 0.01;
@@ -124,8 +126,9 @@ struct AxisForce {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceObserverMemory {
     axes: [AxisForce; 2],
-    /// Last measured velocity along x and y \[m/s\].
+    /// Last measured velocity along x and y \[m/s\], and the number of steps for which it has been repeated.
     last_m_s: [f32; 2],
+    repeats: u8,
     /// Mean square of the change of v - v_hat, of x and y together \[m2/s2\].
     noise_m2_s2: f32,
     /// True if the last step's velocity was measured.
@@ -189,6 +192,7 @@ impl ForceObserver {
         let start = |thrust_n, remembered| ForceObserverMemory {
             axes: measured.map(|velocity_m_s| AxisForce { velocity_m_s, ..AxisForce::default() }),
             last_m_s: measured,
+            repeats: 0,
             noise_m2_s2: 0.0,
             measured: false,
             steps: 0,
@@ -205,8 +209,9 @@ impl ForceObserver {
         }
         let share = observed.thrust_n / hover_n;
         let mut drag = self.drag.acceleration(&state.velocity_m_s, up, share);
-        let ForceObserverMemory { axes, last_m_s, noise_m2_s2, measured: before, steps, remembered, held, .. } =
-            observed;
+        let ForceObserverMemory {
+            axes, last_m_s, repeats, noise_m2_s2, measured: before, steps, remembered, held, ..
+        } = observed;
         if let Some(memory) = &self.memory {
             let weights = memory.weights(measured);
             if fresh && !*held {
@@ -217,8 +222,9 @@ impl ForceObserver {
         }
         let known = [drag.x + up.x * share * self.gravity_m_s2, drag.y + up.y * share * self.gravity_m_s2];
         // A velocity that is older than the rates is repeated until it is measured again.
-        let is_new = fresh && measured != *last_m_s;
-        if *held {
+        *repeats = if measured == *last_m_s { repeats.saturating_add(1) } else { 0 };
+        let is_new = fresh && (*repeats == 0 || *repeats > REPEATS_MAX);
+        if *held || *repeats == REPEATS_MAX + 1 {
             // A difference that arose while the velocity was not measured is no disturbance, so f_hat stays.
             for (axis, v) in axes.iter_mut().zip(measured) {
                 (axis.velocity_m_s, axis.off_m_s) = (v, 0.0);

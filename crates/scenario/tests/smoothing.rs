@@ -73,7 +73,8 @@ proptest! {
             times.iter().map(norm).fold(0.0, f64::max)
         };
         // The ends of a path are known from one side only.
-        let (first, last) = (times[0] + 0.5, times[count - 1] - 0.5);
+        let end_s = f64::max(0.5, 10.0 / rate_hz);
+        let (first, last) = (times[0] + end_s, times[count - 1] - end_s);
         let inner: Vec<_> = pieces.iter().filter(|p| p.start_s > first && p.end_s() < last).copied().collect();
         let [_, acceleration, jerk, snap] = peaks(&inner, 8);
         prop_assert!(acceleration < 1.15 * most(2) + 0.3, "{acceleration} m/s2, {}", most(2));

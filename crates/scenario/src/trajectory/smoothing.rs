@@ -26,7 +26,7 @@ const AMPLIFICATION: f64 = 8.366_600_265_340_756;
 const EXPONENTS: [f64; 2] = [-9.0, 9.0];
 const BISECTIONS: usize = 14;
 /// Largest mean square of the errors over that of rounding. Larger ones have another cause.
-const SQUARE_MAX: f64 = 1.2;
+const SQUARE_MAX: f64 = 1.5;
 /// Largest number of knots for each sample. Samples with wider gaps are not smoothed.
 const KNOTS_PER_SAMPLE: usize = 4;
 
@@ -159,7 +159,7 @@ impl Knots {
         // By chance, the errors of rounding may be a little larger than expected.
         let limits = observed.iter().map(|column| {
             let least = mean_square(column, &best).filter(|least| *least <= SQUARE_MAX)?;
-            Some((1.02 * least).max(1.0))
+            Some((1.1 * least).max(1.0))
         });
         let limits: Vec<f64> = limits.collect::<Option<_>>()?;
         let is_near = |spline: &[f64]| {
@@ -213,7 +213,7 @@ fn mean_square(column: &[Observation], spline: &[f64]) -> Option<f64> {
     let mut squares = 0.0;
     for observation in column {
         let error = observation.error(spline);
-        if !(error.abs() <= observation.unit) {
+        if error.is_nan() || error.abs() > observation.unit {
             return None;
         }
         squares += (error * observation.inverse_sigma).powi(2);
