@@ -15,7 +15,7 @@ const SILENT_MS: u32 = 500;
 /// until the first report.
 static LAST: AtomicU32 = AtomicU32::new(0);
 
-/// Stores the indication of a tick's report.
+/// Stores what LED and buzzer must show, according to a tick's report.
 pub(crate) fn put(report: &Report) {
     let indication = Indication::of(report);
     let number = Indication::ALL.iter().position(|one| *one == indication).map_or(0, |at| at as u32 + 1);

@@ -50,13 +50,13 @@ parameters! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Gains {
-        /// alpha_1 (12).
+        /// alpha_1: gain on e_1 in the paper's equation 12.
         #[parameter(ALPHA1, "1/s", 1e-2..=100.0, tuned)]
         pub alpha1: f32 = 1.0,
-        /// alpha_2 (21).
+        /// alpha_2: gain on e_2 in the paper's equation 21.
         #[parameter(ALPHA2, "input per m/s or rad/s", 0.0..=1000.0, tuned)]
         pub alpha2: f32 = 2.0,
-        /// c: weight of e_1 in V = c e_1^2/2 + e_2^2/2g, and therefore in (16). The paper uses 1.
+        /// c: weight of e_1 in V = c e_1^2/2 + e_2^2/(2g), and therefore in the paper's equation 16. The paper uses 1.
         #[parameter(STIFF, "1/s2", 0.0..=10000.0, tuned)]
         pub stiffness: f32 = 1.0,
     }

@@ -39,9 +39,9 @@ parameters! {
         /// at its first command.
         #[switch(BUMPLESS)]
         pub bumpless: bool = false,
-        /// Whether the nominal model supplies the known part of (16), so that the law only learns the rest. Roll and
-        /// pitch then use derivatives computed from the setpoint's jerk and snap instead of the command filter's second
-        /// derivative, which is mostly noise.
+        /// Whether the nominal model supplies the known part of the paper's equation 16, so that the law only learns
+        /// the rest. Roll and pitch then use derivatives computed from the setpoint's jerk and snap instead of the
+        /// command filter's second derivative, which is mostly noise.
         #[switch(FEED_FORWARD)]
         pub feed_forward: bool = false,
         /// Whether attitude errors are taken from the rotation to the desired attitude, tilt before yaw, and rates from

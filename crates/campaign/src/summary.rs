@@ -59,7 +59,7 @@ impl WorstFlight {
 pub struct ContenderSummary {
     /// Name of the contender.
     pub contender: String,
-    /// Counts of all flights of the contender.
+    /// Numbers of all flights of the contender, and of those in which the vehicle was not lost.
     pub count: SurvivalCount,
     /// Number of flights in which the contender's monitor switched to the fallback law.
     pub tripped: u64,

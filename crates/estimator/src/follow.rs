@@ -24,7 +24,7 @@ const FAR_SIGMAS: f32 = 3.0;
 const FAR_RAD: f32 = 0.35;
 /// Time for which the bank must contradict the heading before a reset \[us\].
 const CONTRADICTED_US: u64 = 2_000_000;
-/// Error of the bank's heading by effects that it neglects: tilt error and sensor biases \[rad\].
+/// Error of the yaw bank's heading by effects that the bank neglects: tilt error and sensor biases \[rad\].
 const HEADED_RAD: f32 = 0.1;
 
 impl Estimator {

@@ -108,10 +108,10 @@ parameters! {
         /// Cutoff frequency of the low-pass filter on the body rates, of second order; 0 for none.
         #[parameter(RATE_CUTOFF, "Hz", 0.0..=400.0)]
         pub rates_cutoff_hz: f32 = 120.0,
-        /// Range of the gyroscope; a rate of 98 % of it is clipped.
+        /// Range of the gyroscope; a rate of at least 98 % of it counts as clipped.
         #[parameter(GYR_RANGE, "rad/s", 1.0..=100.0)]
         pub gyro_range_rad_s: f32 = 34.9,
-        /// Range of the accelerometer; a specific force of 98 % of it is clipped.
+        /// Range of the accelerometer; a specific force of at least 98 % of it counts as clipped.
         #[parameter(ACC_RANGE, "m/s2", 10.0..=1000.0)]
         pub accel_range_m_s2: f32 = 156.9,
         /// Time of identical samples after which the IMU counts as stuck; 0 for never.

@@ -51,7 +51,7 @@ impl BrakingLimits {
 pub struct StopPath {
     /// Start of the path \[m\].
     pub from_m: Vector2<f32>,
-    /// End of the first part \[m\].
+    /// End of the first straight part, where the braking begins \[m\].
     pub via_m: Vector2<f32>,
     /// Place of the stop \[m\].
     pub to_m: Vector2<f32>,

@@ -19,7 +19,7 @@ const REACHED_RAD_S: f32 = 5e-3;
 pub(crate) enum HeadingTarget {
     /// Heading that itself turns at a rate \[rad, rad/s\].
     To(f32, f32),
-    /// Yaw rate without a heading \[rad/s\].
+    /// Turn at this rate, without a target heading \[rad/s\].
     By(f32),
 }
 

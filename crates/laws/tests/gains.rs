@@ -1,4 +1,4 @@
-//! Gains are declared consistently in all laws, and refused by name.
+//! All laws declare their gains consistently, and the error for a bad gain names it.
 
 use crate::harness::{SETTINGS, vehicle};
 use afbc_laws::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};

@@ -19,7 +19,7 @@ parameters! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Contact {
-        /// Compression of the feet's springs by the vehicle at rest; determines k.
+        /// Compression of the feet's springs by the vehicle at rest; determines their stiffness k.
         #[parameter(SINK, "m", 1e-5..=0.5)]
         pub sink_m: f64 = 0.005,
         /// Damping ratio of the vehicle on its feet; with 1, the vehicle does not bounce. Determines c.

@@ -154,7 +154,7 @@ const POINTS_OF_MANY: usize = 300;
 
 /// Returns an interactive view in space, reduced for a page with many flights.
 pub(super) fn space_of_many(scene: Option<ExplorableScene>) -> Markup {
-    space(scene.map(|scene| scene.thinned(POINTS_OF_MANY)), "The flights in space.")
+    space(scene.map(|scene| scene.thinned(POINTS_OF_MANY)), "The flights' paths in three dimensions.")
 }
 
 /// Returns an interactive view in space without a still picture: it is only visible on a screen with JavaScript.

@@ -17,7 +17,7 @@ pub struct Pace {
     steps: u32,
 }
 
-/// Action before the next step.
+/// How long to wait before the next step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wait {
     /// Go on at once.

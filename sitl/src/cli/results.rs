@@ -14,7 +14,7 @@ use std::process::ExitCode;
 /// Fly the paper's experiment in every interpretation, and print the results as a Markdown table
 #[derive(Args, Debug)]
 pub(crate) struct ResultsArgs {
-    /// Write the table into this page instead, between the page's two markers
+    /// Write the table into this page instead, between its lines `results: begin` and `results: end`
     #[arg(long, value_name = "PAGE", conflicts_with = "json")]
     write: Option<PathBuf>,
 
