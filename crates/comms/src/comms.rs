@@ -89,6 +89,8 @@ pub struct Comms {
     /// Response curves of a station's joystick, and whether a joystick is accepted.
     pub(crate) curves: StickCurves,
     pub(crate) takes_joystick: bool,
+    /// True once the settings above have been taken over.
+    is_configured: bool,
     /// Channels of RC_CHANNELS_OVERRIDE, until radio control takes them.
     pub(crate) overrides: Option<ChannelsOverride>,
     fence_given: FenceStatus,
@@ -173,6 +175,7 @@ impl Comms {
             cylinder_m: [0.0; 2],
             curves: StickCurves::DEFAULT,
             takes_joystick: true,
+            is_configured: false,
             overrides: None,
             fence_given: FenceStatus::default(),
             safe_m: None,
@@ -299,20 +302,27 @@ impl Comms {
         [c.bad_checksum, c.unknown, c.malformed, c.implausible, c.unsupported].into_iter().fold(0, u32::saturating_add)
     }
 
+    /// Takes over the settings that this object needs.
+    fn configure(&mut self, configuration: &Configuration) {
+        // The parameter is COM_DL_LOSS_T. Its range is checked, so the conversion is safe.
+        self.control.set_silence((configuration.guidance.failsafe.station_lost_s * 1e6) as u64);
+        let afbc_guidance::Settings { limits, failsafe, .. } = &configuration.guidance;
+        self.braking = limits.braking();
+        self.cylinder_m = [failsafe.fence_radius_m, failsafe.fence_height_m];
+        let radio = &configuration.radio;
+        (self.curves, self.takes_joystick) = (radio.curves, radio.receiver.takes_joystick());
+        self.is_configured = true;
+    }
+
     /// Handles the stations' parameter requests. To be called after each [`report`](Self::report). Sends values by one
     /// call of `send` per frame; `report` and this function together send at most [`REPORT_MAX`] bytes. Returns the
     /// change of `table`, which is to be flown ([`Flight::adopt`](afbc_onboard::Flight::adopt)) and stored
     /// ([`Kept::keep`](afbc_onboard::parameters::Kept::keep)). Nothing changes while the vehicle is armed.
     pub fn parameters(&mut self, table: &mut ParameterTable, mut send: impl FnMut(&[u8])) -> Option<RecordChange> {
         let change = self.grant(table);
-        // The parameter is COM_DL_LOSS_T. Its range is checked, so the conversion is safe.
-        let silent_us = (table.configuration().guidance.failsafe.station_lost_s * 1e6) as u64;
-        self.control.set_silence(silent_us);
-        let afbc_guidance::Settings { limits, failsafe, .. } = &table.configuration().guidance;
-        self.braking = limits.braking();
-        self.cylinder_m = [failsafe.fence_radius_m, failsafe.fence_height_m];
-        let radio = &table.configuration().radio;
-        (self.curves, self.takes_joystick) = (radio.curves, radio.receiver.takes_joystick());
+        if change.is_some() || !self.is_configured {
+            self.configure(table.configuration());
+        }
         while self.left >= VALUE_BYTES as usize + SIGNATURE
             && let Comms { parameters, streams, now_us, .. } = &mut *self
             && let Some(value) = parameters.next_value(*now_us, streams.bytes_per_s(), table)
