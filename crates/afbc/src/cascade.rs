@@ -123,8 +123,6 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
         let dt_s = common.dt_s;
         let model = ModelConstants::new(&vehicle.parameters);
         let known = settings.feed_forward.then_some(&model);
-        let [roll_n, pitch_n] = mixer.tilt_authority_n(vehicle.parameters.weight_n());
-        let authority_rad_s2 = [roll_n * model.hover_gain(Axis::Roll), pitch_n * model.hover_gain(Axis::Pitch)];
         let approach = |axis, speed_max_m_s| ApproachLimit::new(speed_max_m_s, law.approach(axis, known));
         // Without feed-forward the observers would have no effect. The same holds for a law that does not use
         // feed-forward.
@@ -145,7 +143,7 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
                 .then(|| MomentObserver::new(disturbance, &vehicle.parameters, thrust_max_n, dt_s))
                 .flatten(),
             reference: ReferenceFilter::new(&settings.reference, limits, dt_s),
-            desired: DesiredAttitude::new(&settings, vehicle.parameters.gravity_m_s2, thrust_max_n, authority_rad_s2)?,
+            desired: DesiredAttitude::new(&settings, vehicle.parameters.gravity_m_s2, thrust_max_n)?,
             smoother: Smoother::new(&settings.smoothing, dt_s)?,
             delay_compensation: DelayCompensation::new(
                 disturbance.disturbance_lag_s,

@@ -10,8 +10,7 @@
 //! ```
 //!
 //! f_hat is f behind two poles at w. T is divided by the learnt hover thrust, as in (40), so weak rotors do not look
-//! like wind. The change of v - v_hat from one state to the next shows the noise of the velocity. Beyond
-//! [`QUIET_M_S`], w falls in proportion to it.
+//! like wind.
 //!
 //! This is the extended state observer of Han, *From PID to active disturbance rejection control*, IEEE TIE 56(3),
 //! 2009, with both poles at the same place as in Gao, *Scaling and bandwidth-parameterization based controller tuning*,
@@ -31,21 +30,9 @@ pub const ACCELERATION_MAX_M_S2: f32 = 10.0;
 pub const AGE_S: f32 = 0.01;
 /// Smallest bandwidth used in the jump limit of the rates \[rad/s\].
 const W_MIN_RAD_S: f32 = 1.0;
-/// Largest v - v_hat that f can cause, at most f/(e w) \[m/s\]. A larger difference is noise, or a jump of the state,
-/// as after an outage.
+/// Largest v - v_hat that f can cause, at most f/(e w) \[m/s\]. A larger difference is a jump of the state, as after an
+/// outage.
 pub const JUMP_M_S: f32 = 0.1;
-/// A larger difference is a jump if no velocity has agreed for this many steps.
-const JUMP_STEPS: u8 = 9;
-/// A velocity that is repeated for more than this many steps is constant.
-const REPEATS_MAX: u8 = 120;
-/// Standard deviation of the velocity's noise up to which the observer keeps its bandwidth \[m/s\]. Beyond it the
-/// bandwidth falls in proportion, so that the noise of f_hat does not grow.
-pub const QUIET_M_S: f32 = 0.01;
-/// Mean square of the change of v - v_hat, of x and y together, at that noise: the change of white noise has twice its
-/// variance \[m2/s2\].
-const QUIET: f32 = 4.0 * QUIET_M_S * QUIET_M_S;
-/// Share of the mean square that is replaced by each measured state.
-const NOISE_SHARE: f32 = 0.002;
 
 parameters! {
     /// Disturbance observer. By default there is none.
@@ -111,30 +98,11 @@ pub struct ObserverConditions {
     pub touches_ground: bool,
 }
 
-/// Observer of the force along one axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct AxisForce {
-    /// v_hat \[m/s\].
-    velocity_m_s: f32,
-    /// f_hat \[m/s2\].
-    acceleration_m_s2: f32,
-    /// v - v_hat of the last velocity that agreed with v_hat \[m/s\].
-    off_m_s: f32,
-}
-
-/// Memory of the force observer: the observers along x and y, and T.
+/// Memory of the force observer: v_hat, f_hat along x and y, and T.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceObserverMemory {
-    axes: [AxisForce; 2],
-    /// Last measured velocity along x and y \[m/s\], and the number of steps for which it has been repeated.
-    last_m_s: [f32; 2],
-    repeats: u8,
-    /// Mean square of the change of v - v_hat, of x and y together \[m2/s2\].
-    noise_m2_s2: f32,
-    /// True if the last step's velocity was measured.
-    measured: bool,
-    /// Steps since the last velocity that agreed with v_hat.
-    steps: u8,
+    velocity_m_s: [f32; 2],
+    acceleration_m_s2: [f32; 2],
     thrust_n: f32,
     /// Learnt relation between velocity and force.
     pub remembered: ForceMapWeights,
@@ -190,12 +158,8 @@ impl ForceObserver {
     ) -> Vector3<f32> {
         let measured = [state.velocity_m_s.x, state.velocity_m_s.y];
         let start = |thrust_n, remembered| ForceObserverMemory {
-            axes: measured.map(|velocity_m_s| AxisForce { velocity_m_s, ..AxisForce::default() }),
-            last_m_s: measured,
-            repeats: 0,
-            noise_m2_s2: 0.0,
-            measured: false,
-            steps: 0,
+            velocity_m_s: measured,
+            acceleration_m_s2: [0.0; 2],
             thrust_n,
             remembered,
             held: false,
@@ -209,70 +173,37 @@ impl ForceObserver {
         }
         let share = observed.thrust_n / hover_n;
         let mut drag = self.drag.acceleration(&state.velocity_m_s, up, share);
-        let ForceObserverMemory {
-            axes, last_m_s, repeats, noise_m2_s2, measured: before, steps, remembered, held, ..
-        } = observed;
+        let ForceObserverMemory { velocity_m_s, acceleration_m_s2, remembered, held, .. } = observed;
         if let Some(memory) = &self.memory {
             let weights = memory.weights(measured);
             if fresh && !*held {
-                memory.learn(remembered, &weights, axes.map(|axis| axis.acceleration_m_s2));
+                memory.learn(remembered, &weights, *acceleration_m_s2);
             }
             let [x, y] = remembered.recall(&weights);
             (drag.x, drag.y) = (drag.x + x, drag.y + y);
         }
         let known = [drag.x + up.x * share * self.gravity_m_s2, drag.y + up.y * share * self.gravity_m_s2];
-        // A velocity that is older than the rates is repeated until it is measured again.
-        *repeats = if measured == *last_m_s { repeats.saturating_add(1) } else { 0 };
-        let is_new = fresh && (*repeats == 0 || *repeats > REPEATS_MAX);
-        if *held || *repeats == REPEATS_MAX + 1 {
+        for (((v_hat, f_hat), v), a) in
+            velocity_m_s.iter_mut().zip(acceleration_m_s2.iter_mut()).zip(measured).zip(known)
+        {
             // A difference that arose while the velocity was not measured is no disturbance, so f_hat stays.
-            for (axis, v) in axes.iter_mut().zip(measured) {
-                (axis.velocity_m_s, axis.off_m_s) = (v, 0.0);
-            }
-        } else {
-            if is_new {
-                *last_m_s = measured;
-                let [x, y] = &mut *axes;
-                let off = [measured[0] - x.velocity_m_s, measured[1] - y.velocity_m_s];
-                // Motion since an older velocity is no noise, nor is a jump.
-                if *before {
-                    let change = [off[0] - x.off_m_s, off[1] - y.off_m_s];
-                    let square = math::min(change[0] * change[0] + change[1] * change[1], JUMP_M_S * JUMP_M_S);
-                    *noise_m2_s2 = math::settled(*noise_m2_s2 + (square - *noise_m2_s2) * NOISE_SHARE);
+            if *held {
+                *v_hat = v;
+            } else if fresh {
+                let off = v - *v_hat;
+                if off.abs() <= JUMP_M_S {
+                    let f = math::settled(*f_hat + self.acceleration * off);
+                    *f_hat = math::limited(f, ACCELERATION_MAX_M_S2);
+                    *v_hat += self.velocity * off;
+                } else {
+                    *v_hat = v;
                 }
-                let quiet = if *noise_m2_s2 > QUIET { math::sqrt(QUIET / *noise_m2_s2) } else { 1.0 };
-                let jumped = *steps >= JUMP_STEPS;
-                if self.correct(x, off[0], quiet, jumped) & self.correct(y, off[1], quiet, jumped) {
-                    *steps = 0;
-                }
-            }
-            *steps = steps.saturating_add(1);
-            for (axis, a) in axes.iter_mut().zip(known) {
-                let change = (a + axis.acceleration_m_s2) * self.dt_s;
-                axis.velocity_m_s = math::settled(axis.velocity_m_s + change);
+                *v_hat = math::settled(*v_hat + (a + *f_hat) * self.dt_s);
             }
         }
-        (*held, *before) = (false, is_new);
-        let [x, y] = axes.map(|axis| axis.acceleration_m_s2);
+        *held = false;
+        let [x, y] = *acceleration_m_s2;
         drag + Vector3::new(x, y, 0.0)
-    }
-
-    /// Corrects v_hat and f_hat of an axis by a measured velocity that differs by `off` from v_hat, or takes over the
-    /// velocity if it has `jumped`. `quiet` is the share of the bandwidth that the noise leaves. Returns true if v_hat
-    /// agrees with the velocity.
-    #[inline(always)]
-    fn correct(&self, axis: &mut AxisForce, off: f32, quiet: f32, jumped: bool) -> bool {
-        if off.abs() <= JUMP_M_S {
-            let f = math::settled(axis.acceleration_m_s2 + self.acceleration * (quiet * quiet) * off);
-            axis.acceleration_m_s2 = math::limited(f, ACCELERATION_MAX_M_S2);
-            axis.velocity_m_s += self.velocity * quiet * off;
-            axis.off_m_s = off;
-        } else if jumped {
-            (axis.velocity_m_s, axis.off_m_s) = (axis.velocity_m_s + off, 0.0);
-        } else {
-            return false;
-        }
-        true
     }
 
     /// Stores the total thrust commanded in this step \[N\].

@@ -187,12 +187,7 @@ fn compose<L: SubsystemLaw + Copy>(
             GRAVITY_M_S2
         };
         let tilt_max = f64::from(settings.limits.tilt_max_rad);
-        // Height comes first: at the largest tilt the rotors still give the vertical thrust that the law asks for, or
-        // leave a horizontal margin of three tenths.
-        let upward_n = (f64::from(seen.z) * eta.x.cos() * eta.y.cos()).max(0.3 * f64::from(hover_n));
-        let kept_n = upward_n.min(thrust_max_n * 0.91_f64.sqrt());
-        let room = if settings.tilt_by_thrust { (thrust_max_n.powi(2) - kept_n.powi(2)).sqrt() / kept_n } else { 1e9 };
-        let most = (vertical * tilt_max.tan().min(room)).min(f64::from(settings.limits.acceleration_max_m_s2));
+        let most = (vertical * tilt_max.tan()).min(f64::from(settings.limits.acceleration_max_m_s2));
         let asked = [f64::from(seen.x), f64::from(seen.y)];
         let scale = (most / asked[0].hypot(asked[1])).min(1.0);
         let ahead = asked.map(|u| u * scale);
@@ -224,10 +219,7 @@ fn compose<L: SubsystemLaw + Copy>(
         let forward = match settings.feed_forward {
             true => {
                 let (before, now, after) = (along(-STEP_S, gradual), along(0.0, gradual), along(STEP_S, gradual));
-                // No more than the rotors can give in hover.
-                let most_n = controller.mixer().tilt_authority_n(WEIGHT_N as f32);
-                let most = [0, 1].map(|i| f64::from(most_n[i] * model.hover_gain([Axis::Roll, Axis::Pitch][i])));
-                [0, 1].map(|i| ((after[i] - 2.0 * now[i] + before[i]) / (STEP_S * STEP_S)).clamp(-most[i], most[i]))
+                [0, 1].map(|i| (after[i] - 2.0 * now[i] + before[i]) / (STEP_S * STEP_S))
             }
             false => [0.0; 2],
         };

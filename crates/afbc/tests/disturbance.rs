@@ -114,46 +114,6 @@ fn a_jump_is_no_disturbance() {
     }
 }
 
-/// Up to a noise of 10 cm/s, f is found. Up to 6 cm/s the noise of f_hat is no larger than at 1 cm/s.
-#[test]
-fn noise_of_the_velocity_does_not_become_a_force() {
-    let observer = observer(28.7);
-    let rms = |noise_m_s: f32| {
-        let mut state = 54_u32;
-        // Twelve uniform numbers make a nearly normal one.
-        let mut white = || {
-            let uniform = |_| {
-                state ^= state << 13;
-                state ^= state >> 17;
-                state ^= state << 5;
-                state as f32 / 2.0_f32.powi(32) - 0.5
-            };
-            (0..12).map(uniform).sum::<f32>() * noise_m_s
-        };
-        let mut body = Body::new(Vector3::zeros(), weight_n());
-        let (mut squares, mut mean) = (0.0_f32, 0.0_f32);
-        for step in 0..20_000 {
-            let noise = Vector3::new(white(), white(), 0.0);
-            body.state.velocity_m_s += noise;
-            let seen = body.step(&observer, [1.0, -0.5]);
-            body.state.velocity_m_s -= noise;
-            if step >= 5_000 {
-                squares += (seen.x - 1.0).powi(2) / 15_000.0;
-                mean += seen.x / 15_000.0;
-            }
-        }
-        assert!((mean - 1.0).abs() < 0.05, "{noise_m_s} m/s: {mean} m/s2");
-        squares.sqrt()
-    };
-    let quiet = rms(0.01);
-    assert!((0.01..0.1).contains(&quiet), "{quiet}");
-    // Beyond that, velocities are left out, and some noise is taken for a jump.
-    for (noise_m_s, most) in [(0.02, 1.2), (0.04, 1.2), (0.06, 1.2), (0.1, 5.0)] {
-        let noisy = rms(noise_m_s);
-        assert!(noisy < most * quiet, "{noise_m_s} m/s: {noisy} m/s2, {quiet} m/s2 at 1 cm/s");
-    }
-}
-
 /// A repeated state changes nothing, and on the ground the disturbance is zero.
 #[test]
 fn it_waits_for_states_and_forgets_on_the_ground() {

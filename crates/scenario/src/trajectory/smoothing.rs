@@ -135,7 +135,7 @@ impl Observation {
 }
 
 /// Symmetric banded equations: row i holds the elements (i, i) to (i, i + 7).
-type Band = Vec<[f64; BAND]>;
+type BandedEquations = Vec<[f64; BAND]>;
 
 impl Knots {
     /// Returns the coefficients of the smoothest spline near the columns, or none if none is near enough.
@@ -222,7 +222,7 @@ fn mean_square(column: &[Observation], spline: &[f64]) -> Option<f64> {
 }
 
 /// Returns the equations with the penalty on the fourth differences.
-fn penalised(data: &Band, lambda: f64) -> Band {
+fn penalised(data: &BandedEquations, lambda: f64) -> BandedEquations {
     let mut equations = data.clone();
     for k in 0..equations.len().saturating_sub(DIFFERENCE.len() - 1) {
         for (i, own) in DIFFERENCE.iter().enumerate() {
@@ -236,7 +236,7 @@ fn penalised(data: &Band, lambda: f64) -> Band {
 }
 
 /// Solves symmetric positive banded equations by elimination, with one step of iterative refinement.
-fn solve(equations: &Band, known: &[f64]) -> Vec<f64> {
+fn solve(equations: &BandedEquations, known: &[f64]) -> Vec<f64> {
     let mut eliminated = equations.clone();
     for i in 0..eliminated.len() {
         let (before, after) = eliminated.split_at_mut(i + 1);
@@ -254,7 +254,7 @@ fn solve(equations: &Band, known: &[f64]) -> Vec<f64> {
 }
 
 /// Returns the solution of eliminated equations for this right side.
-fn substituted(eliminated: &Band, mut right: Vec<f64>) -> Vec<f64> {
+fn substituted(eliminated: &BandedEquations, mut right: Vec<f64>) -> Vec<f64> {
     for (i, row) in eliminated.iter().enumerate() {
         let (before, after) = right.split_at_mut(i + 1);
         let Some(own) = before.last() else { continue };
@@ -270,7 +270,7 @@ fn substituted(eliminated: &Band, mut right: Vec<f64>) -> Vec<f64> {
 }
 
 /// Returns the product of symmetric banded equations with a vector.
-fn times(equations: &Band, vector: &[f64]) -> Vec<f64> {
+fn times(equations: &BandedEquations, vector: &[f64]) -> Vec<f64> {
     let mut product = vec![0.0; vector.len()];
     for (i, row) in equations.iter().enumerate() {
         for (j, element) in row.iter().enumerate() {
