@@ -26,13 +26,21 @@ const fn texts(aid: AidSource) -> [&'static str; 2] {
 pub(crate) struct IgnoredAids {
     /// Number of the last tick in which each announced kind was ignored, in the order of [`AidSource::ALL`].
     last: [Option<u64>; AidSource::ALL.len()],
+    /// True if a kind may be announced as ignored.
+    any: bool,
 }
 
 impl IgnoredAids {
     /// Returns the notices about sensors that are ignored or used again from the tick numbered `tick` on. On the ground
     /// nothing is announced.
     pub(crate) fn watch(&mut self, ignored: AidSet, airborne: bool, tick: u64) -> impl Iterator<Item = Notice> {
-        self.last.iter_mut().zip(AidSource::ALL).filter_map(move |(last, aid)| {
+        // In most ticks there is nothing to do.
+        let is_busy = self.any || airborne && ignored != AidSet::default();
+        if is_busy {
+            self.any = airborne && (ignored != AidSet::default() || self.last.iter().any(Option::is_some));
+        }
+        let watched = if is_busy { self.last.as_mut_slice() } else { &mut [] };
+        watched.iter_mut().zip(AidSource::ALL).filter_map(move |(last, aid)| {
             let [contradicts, used] = texts(aid);
             match *last {
                 _ if !airborne => {

@@ -89,7 +89,13 @@ fn the_tick_keeps_its_time_on_any_processor() {
         let start = |elf: std::path::PathBuf| Emulator::start_slower(&elf, slower);
         let Some(mut emulator) = start_or_skip(FirmwareImage::Pil, start) else { return };
         let mut station = Station::default();
-        let ticks = (0..2_500).map(|tick| emulator.exchange(&bytes_of_tick(&mut station, tick)).unwrap());
+        // At a quarter of the speed, tick and link together need more than a period, and ticks would go unreported. So
+        // the link then has nothing to receive in every second tick.
+        let has_bytes = |tick: u64| slower < 2 || tick.is_multiple_of(2);
+        let ticks = (0..2_500).map(|tick| {
+            let bytes = bytes_of_tick(&mut station, tick);
+            emulator.exchange(if has_bytes(tick) { &bytes } else { &[] }).unwrap()
+        });
         let times: Vec<u64> = ticks.map(|reply| reply.time_us).collect();
         // The firmware needs some 300 instructions from the interrupt to the tick.
         let latest_us = 10 << slower;
