@@ -198,7 +198,7 @@ impl Line {
             let frame = self.vehicle.sender.send(&answer, &mut [0; FRAME_MAX]).to_vec();
             self.put(false, frame);
         }
-        if self.next() % 10 == 0 {
+        if self.next().is_multiple_of(10) {
             self.disturb();
         }
     }

@@ -31,7 +31,7 @@ pub(super) static COMMON: [KnownLateness; 1] = [LATE_LINKS];
 
 /// Known lateness of the Pixracer, which has two links and three parts on one SPI.
 pub(super) static PIXRACER: [KnownLateness; 4] = [
-    late("control tick, to the motors' DMA", None, FULL),
+    late("control tick, with the motors' frames", None, FULL),
     late("end of the motors' DMA", None, FULL),
     late("slow sensors, with their transfers", None, FULL),
     LATE_LINKS,
