@@ -48,7 +48,7 @@ const CHANGE_MAX_M_S: f32 = 0.5;
 /// Smallest cosine of the tilt at which the age is learnt: farther from level, an error of the tilt looks like age.
 const UPRIGHT: f32 = 0.9;
 /// Rate at which the hover thrust learns f_hat along z \[1/s\].
-const LIFT_1_S: f32 = 2.0;
+const LIFT_1_S: f32 = 5.0;
 /// Smallest and largest learnt hover thrust, as shares of the weight.
 const HOVER_SHARE_MIN: f32 = 0.3;
 const HOVER_SHARE_MAX: f32 = 3.0;
@@ -162,6 +162,36 @@ impl ForceObserverMemory {
         self.age.softness
     }
 
+    /// Returns the memory at the start of a flight with this velocity, thrust and hover thrust.
+    #[cold]
+    #[inline(never)]
+    fn begin(measured_m_s: &Vector3<f32>, [thrust_n, hover_n]: [f32; 2]) -> Self {
+        ForceObserverMemory {
+            velocity_m_s: *measured_m_s,
+            acceleration_m_s2: Vector3::zeros(),
+            off_m_s: Vector3::zeros(),
+            change_m_s: Vector3::zeros(),
+            noise_m2_s2: 0.0,
+            is_outlier: false,
+            last_m_s: *measured_m_s,
+            since_s: 0.0,
+            thrust_n,
+            hover_n,
+            age: AgeMemory::default(),
+            remembered: ForceMapWeights::default(),
+            held: false,
+        }
+    }
+
+    /// Forgets what was observed, but not what was learnt.
+    #[cold]
+    #[inline(never)]
+    fn forget(&mut self, measured_m_s: &Vector3<f32>) {
+        let remembered = self.remembered;
+        *self = Self::begin(measured_m_s, [self.thrust_n, self.hover_n]);
+        self.remembered = remembered;
+    }
+
     /// Takes over a measured velocity; f_hat stays.
     #[inline(always)]
     fn restart(&mut self, measured_m_s: &Vector3<f32>) {
@@ -217,7 +247,8 @@ impl ForceObserver {
     /// Returns f \[m/s2\] for this state with the thrust along `up`: known drag plus, along x and y, the remembered
     /// force and f_hat. Corrects f_hat if the state is `fresh` and its velocity new. Returns zero while the vehicle
     /// touches the ground.
-    #[inline]
+    // One copy for both laws and any number of rotors, which keeps the image small.
+    #[inline(never)]
     pub fn advance(
         &self,
         observed: &mut Option<ForceObserverMemory>,
@@ -227,26 +258,11 @@ impl ForceObserver {
         ObserverConditions { fresh, touches_ground }: ObserverConditions,
     ) -> Vector3<f32> {
         let measured = &state.velocity_m_s;
-        let start = |thrust_n, hover_n, remembered| ForceObserverMemory {
-            velocity_m_s: *measured,
-            acceleration_m_s2: Vector3::zeros(),
-            off_m_s: Vector3::zeros(),
-            change_m_s: Vector3::zeros(),
-            noise_m2_s2: 0.0,
-            is_outlier: false,
-            last_m_s: *measured,
-            since_s: 0.0,
-            thrust_n,
-            hover_n,
-            age: AgeMemory::default(),
-            remembered,
-            held: false,
-        };
         // A flight that begins in the air is assumed to hover, with a thrust equal to the weight.
-        let observed = observed.get_or_insert_with(|| start(self.weight_n, hover_n, ForceMapWeights::default()));
+        let observed = observed.get_or_insert_with(|| ForceObserverMemory::begin(measured, [self.weight_n, hover_n]));
         if touches_ground {
             // The thrust and what was learnt survive a touch of the ground.
-            *observed = start(observed.thrust_n, observed.hover_n, observed.remembered);
+            observed.forget(measured);
             return Vector3::zeros();
         }
         let share = observed.thrust_n / hover_n;
@@ -413,7 +429,8 @@ impl MomentObserver {
 
     /// Returns f_hat of roll, pitch and yaw \[rad/s2\] for these rates, in addition to `known` \[rad/s2\]. Advances
     /// f_hat by one step if the rates are `fresh`. Returns zero while the vehicle touches the ground.
-    #[inline]
+    // One copy for both laws and any number of rotors, which keeps the image small.
+    #[inline(never)]
     pub fn advance(
         &self,
         memory: &mut Option<MomentObserverMemory>,
