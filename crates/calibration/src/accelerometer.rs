@@ -80,7 +80,8 @@ impl AccelerometerCalibration {
             tell(CalibrationEvent::Pending(Sides::ALL));
             sample.at_us
         });
-        let rests = sample.is_finite() && self.rest.add(sample, &RestLimits::HELD);
+        // A sample that is no number is left out, as if it had not arrived.
+        let rests = !sample.is_finite() || self.rest.add(sample, &RestLimits::HELD);
         // Between two sides the vehicle is to be moved, so motion is reported only during a measurement.
         if !rests && matches!(self.detected.take(), Some((Some(_), false))) {
             tell(CalibrationEvent::Moved);

@@ -44,7 +44,8 @@ impl LevelCalibration {
         mut tell: impl FnMut(CalibrationEvent),
     ) -> Option<Result<Vector3<f32>, CalibrationFailure>> {
         let began_us = *self.began_us.get_or_insert(sample.at_us);
-        if !sample.is_finite() || !self.rest.add(sample, &RestLimits::STANDING) {
+        // A sample that is no number is left out, as if it had not arrived.
+        if sample.is_finite() && !self.rest.add(sample, &RestLimits::STANDING) {
             tell(CalibrationEvent::Moved);
         }
         if self.rest.elapsed_us() >= MEASURE_US {

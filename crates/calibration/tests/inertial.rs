@@ -228,22 +228,46 @@ fn a_moving_vehicle_has_no_level() {
     assert_eq!(found, Some(Err(CalibrationFailure::Moving)));
     assert!((19_900_000..20_200_000).contains(&at_us), "{at_us}");
     assert!(told.contains(&CalibrationEvent::Moved) && !told.contains(&CalibrationEvent::Progress(50)), "{told:?}");
+}
 
-    // The level calibration skips a NaN sample and reports a motion. Without a NaN sample it reports none.
-    for broken in [false, true] {
-        let mut hands = Hands::with_imu(ImuModel::DEFAULT, 5);
-        // The first sample is a mean of fewer readings, and differs.
-        hands.sample();
-        let (mut level, mut told) = (LevelCalibration::new(&Mounting::PLAIN, &SensorCalibration::DEFAULT), Vec::new());
-        let found = (0..115).find_map(|number| {
-            let mut sample = hands.sample();
-            if broken && number == 80 {
-                sample.specific_force_m_s2.z = f32::NAN;
-            }
-            level.step(&sample, keep(&mut told))
-        });
-        assert!(found.unwrap().is_ok());
-        assert_eq!(told.contains(&CalibrationEvent::Moved), broken, "{told:?}");
+/// A sample that is no number is left out of every calibration: it shows no motion, and the rest goes on.
+#[test]
+fn a_sample_that_is_no_number_shows_no_motion() {
+    type Events = Vec<CalibrationEvent>;
+    // Each returns whether the calibration has succeeded after these samples, and what it has told.
+    let calibrations: [fn(&[RawSample]) -> (bool, Events); 3] = [
+        |samples| {
+            let (mut calibration, mut told) = (GyroscopeCalibration::default(), Vec::new());
+            let found = samples.iter().find_map(|sample| calibration.step(sample, keep(&mut told)));
+            (found.is_some_and(|found| found.is_ok()), told)
+        },
+        |samples| {
+            let level = LevelCalibration::new(&Mounting::PLAIN, &SensorCalibration::DEFAULT);
+            let (mut calibration, mut told) = (level, Vec::new());
+            let found = samples.iter().find_map(|sample| calibration.step(sample, keep(&mut told)));
+            (found.is_some_and(|found| found.is_ok()), told)
+        },
+        |samples| {
+            let accelerometer = AccelerometerCalibration::new(&Mounting::PLAIN, GRAVITY as f32);
+            let (mut calibration, mut told) = (accelerometer, Vec::new());
+            assert!(samples.iter().all(|sample| calibration.step(sample, keep(&mut told)).is_none()));
+            (told.iter().any(|event| matches!(event, CalibrationEvent::Done(_))), told)
+        },
+    ];
+    let mut hands = Hands::with_imu(ImuModel::DEFAULT, 5);
+    // The first sample is a mean of fewer readings, and differs.
+    hands.sample();
+    let samples: Vec<_> = (0..200).map(|_| hands.sample()).collect();
+    for calibrate in calibrations {
+        let sound = calibrate(&samples);
+        assert!(sound.0 && !sound.1.contains(&CalibrationEvent::Moved), "{sound:?}");
+        for (number, axis) in [(0, 0), (1, 1), (50, 2), (80, 3), (99, 4)] {
+            let mut broken = samples.clone();
+            let RawSample { rates_rad_s, specific_force_m_s2, .. } = &mut broken[number];
+            let numbers = rates_rad_s.iter_mut().chain(specific_force_m_s2);
+            *numbers.into_iter().nth(axis).unwrap() = if axis % 2 == 0 { f32::NAN } else { f32::INFINITY };
+            assert_eq!(calibrate(&broken), sound, "sample {number}, number {axis}");
+        }
     }
 }
 

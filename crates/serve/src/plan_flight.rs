@@ -181,7 +181,8 @@ impl PlanStation<'_> {
             }
             Some(answer) => {
                 self.wait(TEXT_MS);
-                Err(format!("the vehicle does not fly: {answer:?}, {}", self.take_texts().join(", ")))
+                let reasons: String = self.take_texts().iter().map(|text| format!(", {text}")).collect();
+                Err(format!("the vehicle does not fly: {answer:?}{reasons}"))
             }
             None => Err("the vehicle does not answer".into()),
         }
