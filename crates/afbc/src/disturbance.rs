@@ -90,7 +90,7 @@ impl DisturbanceObserver {
     pub(crate) fn slowed(self, slowness: f32, lag_s: f32) -> Self {
         DisturbanceObserver {
             disturbance_rad_s: self.disturbance_rad_s / slowness,
-            disturbance_z_rad_s: self.disturbance_z_rad_s / slowness,
+            disturbance_z_rad_s: self.disturbance_z_rad_s,
             disturbance_tilt_rad_s: self.disturbance_tilt_rad_s / slowness,
             disturbance_yaw_rad_s: self.disturbance_yaw_rad_s / slowness,
             disturbance_lag_s: lag_s,

@@ -115,7 +115,7 @@ impl Profile {
                 by_rotation: true,
                 disturbance: DisturbanceObserver {
                     disturbance_rad_s: 39.49,
-                    disturbance_z_rad_s: 30.0,
+                    disturbance_z_rad_s: 40.0,
                     // This value is chosen by hand. The search finds 80, which tolerates fewer states per second.
                     disturbance_tilt_rad_s: 60.0,
                     disturbance_yaw_rad_s: 31.39,
