@@ -123,8 +123,6 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
         let dt_s = common.dt_s;
         let model = ModelConstants::new(&vehicle.parameters);
         let known = settings.feed_forward.then_some(&model);
-        let [roll_n, pitch_n] = mixer.tilt_authority_n(vehicle.parameters.weight_n());
-        let authority_rad_s2 = [roll_n * model.hover_gain(Axis::Roll), pitch_n * model.hover_gain(Axis::Pitch)];
         let approach = |axis, speed_max_m_s| ApproachLimit::new(speed_max_m_s, law.approach(axis, known));
         // Without feed-forward the observers would have no effect. The same holds for a law that does not use
         // feed-forward.
@@ -145,7 +143,7 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
                 .then(|| MomentObserver::new(disturbance, &vehicle.parameters, thrust_max_n, dt_s))
                 .flatten(),
             reference: ReferenceFilter::new(&settings.reference, limits, dt_s),
-            desired: DesiredAttitude::new(&settings, vehicle.parameters.gravity_m_s2, thrust_max_n, authority_rad_s2)?,
+            desired: DesiredAttitude::new(&settings, vehicle.parameters.gravity_m_s2, thrust_max_n)?,
             smoother: Smoother::new(&settings.smoothing, dt_s)?,
             delay_compensation: DelayCompensation::new(
                 disturbance.disturbance_lag_s,
@@ -174,9 +172,7 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
 
     /// Returns the estimated hover thrust U4 \[N\], limited to what the rotors can give.
     pub(crate) fn hover_thrust_n(&self, memory: &CascadeMemory<L::Estimate>) -> f32 {
-        let observed_n = self.forces.as_ref().and_then(|forces| forces.hover_thrust_n(&memory.filters.forces));
-        let hover_n = observed_n
-            .unwrap_or_else(|| self.law.hover_thrust_n(&memory.estimates.z, self.weight_n, self.known_weight_n()));
+        let hover_n = self.law.hover_thrust_n(&memory.estimates.z, self.weight_n, self.known_weight_n());
         // (40) divides the commanded thrust by the hover thrust, so both need the same limit.
         math::min(hover_n, self.thrust_max_n)
     }
@@ -232,7 +228,6 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
             adapt: fresh && !touches_ground,
             unallocated: &last.unallocated,
             observed_m_s2,
-            softness: filters.forces.map_or(1.0, |forces| forces.softness()),
             known: self.settings.feed_forward.then_some(&self.model),
         };
         let eta_dot = self.eta_dot(state, &attitude);

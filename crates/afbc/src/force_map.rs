@@ -37,9 +37,6 @@ pub struct ForceMapWeights {
     pub theta: [Matrix3<f32>; 2],
 }
 
-/// Smaller f_hat is not learnt \[m/s2\].
-const SETTLED_M_S2: f32 = 1e-9;
-
 impl ForceMap {
     /// Creates the memory with the rate `gamma_1_s` (valid), the step `dt_s` and outer rules at `speed_m_s` along each
     /// axis. `None` if gamma is 0.
@@ -62,8 +59,7 @@ impl ForceMap {
     #[inline]
     pub fn learn(&self, remembered: &mut ForceMapWeights, weights: &Matrix3<f32>, f_hat_m_s2: [f32; 2]) {
         for (theta, f_hat) in remembered.theta.iter_mut().zip(f_hat_m_s2) {
-            // Settled here, f_hat keeps subnormal numbers out of Theta in fewer instructions than Theta itself.
-            *theta += weights * (self.share * if f_hat.abs() < SETTLED_M_S2 { 0.0 } else { f_hat });
+            *theta = (*theta + weights * (self.share * f_hat)).map(math::settled);
             // If the norm is within the bound, so is every element: one comparison is enough.
             if theta.norm_squared() <= THETA_MAX_M_S2 * THETA_MAX_M_S2 {
                 continue;

@@ -1,7 +1,6 @@
 //! Safeguards that bound the estimates and keep the robust term smooth. Not in the paper's law (33), (34).
 //!
-//! With e = e_2 after the dead zone and s = tanh(e_2/epsilon), or e_2/(|e_2| + epsilon) with feed-forward, (33) and (34)
-//! become
+//! With e = e_2 after the dead zone and s = tanh(e_2/epsilon), (33) and (34) become
 //!
 //! ```text
 //! d Theta_hat/dt = gamma e w(x) - (sigma + kappa |e_2|) Theta_hat,   |Theta_hat| <= Theta_max

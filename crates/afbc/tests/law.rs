@@ -1,7 +1,7 @@
 //! Properties of the laws: backstepping (9)-(16), (21), and AFBC (20)-(22), (32)-(34).
 #![allow(clippy::unwrap_used, missing_docs)] // a law that cannot be built must stop the test
 
-use afbc::adaptive::{ControlTerms, Gains, Subsystem, SubsystemConditions};
+use afbc::adaptive::{Gains, Subsystem};
 use afbc::backstepping::{self, ideal, proportional};
 use afbc::fuzzy::{FuzzyBasis, Membership};
 use afbc::integral::IntegralBackstepping;
@@ -113,7 +113,6 @@ proptest! {
             adapt: true,
             unallocated: &PerAxis::default(),
             observed_m_s2: Vector3::zeros(),
-            softness: 1.0,
             known: None,
         };
         let approach = law.approach(Axis::X, None);
@@ -158,7 +157,6 @@ proptest! {
             adapt: false,
             unallocated: &PerAxis::default(),
             observed_m_s2,
-            softness: 1.0,
             known: None,
         };
         let adaptive = Adaptive::new(PerAxis::from_fn(|_| gains)).unwrap();
@@ -173,8 +171,7 @@ proptest! {
                 Axis::Roll | Axis::Pitch | Axis::Yaw => nominal.f,
             };
             let known = ideal(&backstepping, &errors, tracking.x1d_ddot, &Dynamics { f, ..nominal });
-            // The robust term is another with feed-forward.
-            let mut estimate = AdaptiveEstimate { delta: 0.0, ..before };
+            let mut estimate = before;
             let (alone, _) = adaptive.input(axis, &tracking, &context, &mut estimate);
             let with_model = StepContext { known: Some(&model), ..context };
             let (whole, seen) = adaptive.input(axis, &tracking, &with_model, &mut estimate);
@@ -212,7 +209,7 @@ proptest! {
         estimate in estimate(),
     ) {
         let errors = tracking.errors(gains.backstepping.alpha1);
-        let (terms, _) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, &SubsystemConditions::default());
+        let (terms, _) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, 0.0);
         prop_assert_eq!(terms.sum(), terms.fuzzy + terms.robust + terms.proportional);
         prop_assert_eq!(terms.proportional, gains.backstepping.alpha2 * errors.e2); // (21)
 
@@ -228,29 +225,6 @@ proptest! {
         let s = (f64::from(errors.e2) / f64::from(gains.epsilon)).tanh();
         let delta = f64::from(estimate.delta);
         prop_assert!((f64::from(terms.robust) - delta * s).abs() <= delta * (1.4e-7 + 2.0 * U));
-
-        // With feed-forward: a product, a quotient and a sum.
-        let conditions = SubsystemConditions { printed: false, ..SubsystemConditions::default() };
-        let (soft, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, &conditions);
-        let (e2, epsilon) = (f64::from(errors.e2), f64::from(gains.epsilon));
-        let s = e2 / (e2.abs() + epsilon);
-        prop_assert!((f64::from(soft.robust) - delta * s).abs() <= 4.0 * U * delta * s.abs() + 1e-44);
-        let wanted = f64::from(gains.eta) * e2 * s;
-        prop_assert!((f64::from(rate.delta()) - wanted).abs() <= 8.0 * U * wanted + 1e-44);
-        prop_assert_eq!(ControlTerms { robust: terms.robust, ..soft }, terms);
-    }
-
-    /// Old states slow down learning, and nothing else.
-    #[test]
-    fn learning_slows_down_alone(gains in gains(), tracking in tracking(), estimate in estimate(), learning in 0.0_f32..1.0) {
-        let (errors, subsystem) = (tracking.errors(gains.backstepping.alpha1), Subsystem::new(gains).unwrap());
-        let [(terms, rate), (same, slow)] = [1.0, learning].map(|learning| {
-            let conditions = SubsystemConditions { learning, ..SubsystemConditions::default() };
-            subsystem.law(&errors, [0.1, -0.2], &estimate, &conditions)
-        });
-        prop_assert_eq!((terms, rate.delta(), rate.leakage()), (same, slow.delta(), slow.leakage()));
-        let off = (slow.theta() - rate.theta() * learning).abs().max();
-        prop_assert!(off <= 1e-6 * rate.theta().abs().max() + 1e-30, "{off}");
     }
 
     /// (33), (34): Theta_hat changes with the sign of e_2, in proportion to the weights; delta_hat can only grow.
@@ -262,7 +236,7 @@ proptest! {
         estimate in estimate(),
     ) {
         let errors = tracking.errors(gains.backstepping.alpha1);
-        let (_, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, &SubsystemConditions::default());
+        let (_, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, 0.0);
         let w = FuzzyBasis::new(gains.membership).unwrap().weights(inputs);
         let e2 = f64::from(errors.e2);
         for (rate, w) in rate.theta().iter().zip(w.iter()) {
@@ -303,7 +277,7 @@ proptest! {
                 Axis::Roll | Axis::Pitch | Axis::Yaw => [tracking.x1, tracking.x2],
                 Axis::Z | Axis::X | Axis::Y => [errors.e1, errors.e1_dot],
             };
-            let (terms, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &before, &SubsystemConditions::default());
+            let (terms, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &before, 0.0);
 
             let mut frozen = before;
             let context = StepContext {
@@ -314,7 +288,6 @@ proptest! {
                 adapt: false,
                 unallocated: &PerAxis::default(),
                 observed_m_s2: Vector3::zeros(),
-                softness: 1.0,
                 known: None,
             };
             let (u, seen) = law.input(axis, &tracking, &context, &mut frozen);
@@ -356,12 +329,7 @@ fn the_hover_thrust_is_what_carries_the_vehicle() {
     adaptive.start(&mut started, weight_n);
     assert_eq!(adaptive.hover_thrust_n(&started.z, weight_n, 0.0), weight_n);
     for inputs in [[0.0, 0.0], [3.0, -20.0], [-9.0, 1.0]] {
-        let (terms, _) = Subsystem::new(gains.z).unwrap().law(
-            &Errors::default(),
-            inputs,
-            &started.z,
-            &SubsystemConditions::default(),
-        );
+        let (terms, _) = Subsystem::new(gains.z).unwrap().law(&Errors::default(), inputs, &started.z, 0.0);
         assert!((terms.sum() - weight_n).abs() < 1e-5, "{terms:?}");
     }
     assert_eq!(PerAxis { z: AdaptiveEstimate::default(), ..started }, PerAxis::default());

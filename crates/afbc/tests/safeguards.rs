@@ -30,7 +30,6 @@ fn step(gains: Gains, e2: f32, unallocated: f32, dt_s: f32, estimate: &mut Adapt
         adapt: true,
         unallocated: &PerAxis { x: unallocated, ..PerAxis::default() },
         observed_m_s2: Vector3::zeros(),
-        softness: 1.0,
         known: None,
     };
     law.input(Axis::X, &tracking(e2), &context, estimate).0
@@ -269,7 +268,6 @@ fn noise_drives_the_printed_delta_hat_and_not_the_hardened() {
                     adapt: true,
                     unallocated: &PerAxis::default(),
                     observed_m_s2: Vector3::zeros(),
-                    softness: 1.0,
                     known: None,
                 };
                 let (u, _) = law.input(Axis::X, &tracking, &context, &mut estimate);
