@@ -233,9 +233,9 @@ fn a_moving_vehicle_has_no_level() {
 /// A sample that is no number is left out of every calibration: it shows no motion, and the rest goes on.
 #[test]
 fn a_sample_that_is_no_number_shows_no_motion() {
-    type Events = Vec<CalibrationEvent>;
-    // Each returns whether the calibration has succeeded after these samples, and what it has told.
-    let calibrations: [fn(&[RawSample]) -> (bool, Events); 3] = [
+    // Returns whether the calibration has succeeded after these samples, and what it has told.
+    type Calibrate = fn(&[RawSample]) -> (bool, Vec<CalibrationEvent>);
+    let calibrations: [Calibrate; 3] = [
         |samples| {
             let (mut calibration, mut told) = (GyroscopeCalibration::default(), Vec::new());
             let found = samples.iter().find_map(|sample| calibration.step(sample, keep(&mut told)));
