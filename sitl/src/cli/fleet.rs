@@ -144,12 +144,39 @@ fn with_gains(folder: &Path, vehicle: &str, gains: &str) -> Result<(PathBuf, Str
     Ok((path, whole))
 }
 
-/// Returns `text` with `gains` between the marker lines.
+/// Returns the tables of `held` for laws without a table in `gains`, with the comments that precede them.
+fn kept(held: &str, gains: &str) -> String {
+    // A table is named [gains.PROFILE.LAW] or [gains.PROFILE.LAW.AXIS].
+    let law = |line: &str| line.strip_prefix("[gains.")?.split(['.', ']']).nth(1).map(str::to_owned);
+    let found: Vec<_> = gains.lines().filter_map(law).collect();
+    let (mut text, mut comments, mut keeps) = (String::new(), Vec::new(), false);
+    for line in held.lines() {
+        if let Some(law) = law(line) {
+            keeps = !found.contains(&law);
+            if keeps {
+                comments.drain(..).for_each(|comment| text = format!("{text}{comment}\n"));
+            }
+        } else if line.starts_with('#') {
+            // Several tables may share a comment, so it waits for the first of them that is kept.
+            if !comments.last().is_some_and(|last: &&str| last.starts_with('#')) {
+                comments.clear();
+            }
+            comments.push(line);
+            continue;
+        }
+        if keeps {
+            text = format!("{text}{line}\n");
+        }
+    }
+    text
+}
+
+/// Returns `text` with `gains` between the marker lines. The gains of other laws that stand there are kept.
 fn replaced(text: &str, gains: &str) -> Result<String, String> {
-    let (before, after) = match (text.split_once(BEGIN), text.contains(END)) {
-        (None, false) => (text, ""),
+    let (before, held, after) = match (text.split_once(BEGIN), text.contains(END)) {
+        (None, false) => (text, "", ""),
         (Some((before, rest)), true) => match rest.split_once(END) {
-            Some((_, after)) => (before, after.trim_start_matches('\n')),
+            Some((held, after)) => (before, held, after.trim_start_matches('\n')),
             None => {
                 return Err(
                     "the end line of the gains stands before their begin line; delete both lines and the gains".into(),
@@ -166,7 +193,9 @@ fn replaced(text: &str, gains: &str) -> Result<String, String> {
         return Err("the file has [gains] of its own beside those of `sitl tune --fleet`; delete its own".into());
     }
     let after = if after.is_empty() { String::new() } else { format!("\n{after}") };
-    Ok(format!("{}\n\n{BEGIN}\n{}\n{END}\n{after}", before.trim_end(), gains.trim_end()))
+    let kept = kept(held, gains);
+    let kept = if kept.is_empty() { kept } else { format!("\n\n{}", kept.trim_end()) };
+    Ok(format!("{}\n\n{BEGIN}\n{}{kept}\n{END}\n{after}", before.trim_end(), gains.trim_end()))
 }
 
 /// Returns a table with a line for each search.
@@ -202,5 +231,23 @@ mod tests {
         assert_eq!(replaced(&followed, "x").unwrap().matches("# more").count(), 1);
         assert!(replaced(&format!("{file}[gains.flight.pid]\n"), "x").is_err());
         assert!(replaced(&format!("{file}{BEGIN}\n"), "x").is_err());
+    }
+
+    /// A search of some laws leaves the gains of the others in the file, with the comment that says where they are from.
+    #[test]
+    fn other_laws_keep_their_gains() {
+        let first =
+            "# first\n[gains.flight.afbc.roll]\na = 1\n\n[gains.flight.cascade]\nb = 1\n\n[gains.flight.pid]\nc = 1\n";
+        let file = replaced("[vehicle]\n", first).unwrap();
+        let second = "# second\n[gains.flight.afbc.roll]\na = 2\n\n[gains.flight.cascade]\nb = 2\n";
+        let file = replaced(&file, second).unwrap();
+        let pid = "# first\n[gains.flight.pid]\nc = 1\n";
+        assert_eq!(file, format!("[vehicle]\n\n{BEGIN}\n{second}\n{pid}{END}\n"));
+        let third = "# third\n[gains.flight.indi]\nd = 3\n";
+        let file = replaced(&file, third).unwrap();
+        assert_eq!(file, format!("[vehicle]\n\n{BEGIN}\n{third}\n{second}\n{pid}{END}\n"));
+        // With every law searched again, nothing old is left.
+        let all = replaced(&file, &format!("{first}\n[gains.flight.indi]\nd = 4\n")).unwrap();
+        assert!(!all.contains("second") && !all.contains("= 2") && !all.contains("= 3"), "{all}");
     }
 }
