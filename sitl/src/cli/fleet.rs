@@ -233,7 +233,7 @@ mod tests {
         assert!(replaced(&format!("{file}{BEGIN}\n"), "x").is_err());
     }
 
-    /// A search of some laws leaves the gains of the others in the file, with the comment that says where they are from.
+    /// A search of some laws leaves the gains of the others in the file, with the comment that says their source.
     #[test]
     fn other_laws_keep_their_gains() {
         let first =
