@@ -57,7 +57,7 @@ pub struct RawSample {
 
 impl RawSample {
     /// Returns true if every number is finite.
-    fn is_finite(&self) -> bool {
+    pub fn is_finite(&self) -> bool {
         let numbers = self.rates_rad_s.iter().chain(&self.specific_force_m_s2);
         numbers.copied().all(f32::is_finite) && self.field_ut.is_none_or(|field| field.iter().all(|it| it.is_finite()))
     }

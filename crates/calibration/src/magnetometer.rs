@@ -80,8 +80,9 @@ impl MagnetometerCalibration {
             (self.read_us, self.last_us) = (at_us, at_us);
             at_us
         });
+        // A sample that is no number is left out, as if it had not arrived.
         if !sample.is_finite() {
-            return None;
+            return (at_us.saturating_sub(done_us) >= PATIENCE_US).then_some(Err(CalibrationFailure::TimedOut));
         }
         if sample.field_ut.is_some() {
             self.read_us = at_us;

@@ -208,3 +208,18 @@ fn what_is_left_out_is_told() {
     let found = (0..5000).find_map(|_| magnetometer.step(&askew.sample(), |_| ()));
     assert_eq!(found, Some(Err(CalibrationFailure::TimedOut)));
 }
+
+/// A sensor that gives no numbers does not keep a calibration going for ever.
+#[test]
+fn a_sensor_without_numbers_ends_the_calibration() {
+    let mut hands = hands(Part::QMC5883L, 5);
+    let mut calibration = MagnetometerCalibration::new(&Mounting::PLAIN, &SensorCalibration::DEFAULT);
+    let mut sample = hands.sample();
+    let began_us = sample.at_us;
+    sample.specific_force_m_s2.x = f32::NAN;
+    let found = (0..1_000_u64).find_map(|tenth| {
+        sample.at_us = began_us + 100_000 * tenth;
+        calibration.step(&sample, |_| ())
+    });
+    assert_eq!(found.map(Result::err), Some(Some(CalibrationFailure::TimedOut)));
+}

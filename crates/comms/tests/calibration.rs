@@ -227,13 +227,14 @@ fn a_failure_is_told_with_its_reason() {
     let texts = vehicle.pass(4.0, Some(RawSample { rates_rad_s: Vector3::repeat(0.9), ..level() }));
     assert_eq!(texts.last().map(String::as_str), Some("[cal] calibration failed: sensor errors too large"));
 
-    // The sensors may be silent for up to a second, at the beginning and later.
-    for before in [0.0, 1.0] {
+    // The sensors may be silent, or give what is no number, for up to a second, at the beginning and later.
+    let broken = RawSample { specific_force_m_s2: Vector3::repeat(f32::NAN), ..level() };
+    for (before, silence) in [(0.0, None), (1.0, None), (0.0, Some(broken)), (1.0, Some(broken))] {
         vehicle.ask(CalibrationRequest::Gyroscope);
         vehicle.pass(before, Some(level()));
-        vehicle.pass(0.96, None);
+        vehicle.pass(0.96, silence);
         assert!(vehicle.bench.comms.takes_samples());
-        let texts = vehicle.pass(0.1, None);
+        let texts = vehicle.pass(0.1, silence);
         assert_eq!(texts, ["[cal] calibration failed: no sensor readings"], "after {before} s");
         assert!(vehicle.pass(2.0, None).is_empty(), "once");
     }

@@ -144,26 +144,36 @@ fn with_gains(folder: &Path, vehicle: &str, gains: &str) -> Result<(PathBuf, Str
     Ok((path, whole))
 }
 
-/// Returns the tables of `held` for laws without a table in `gains`, with the comments that precede them.
+/// Returns the tables of `held` for laws without a table in `gains`. Comments belong to the tables that follow them.
 fn kept(held: &str, gains: &str) -> String {
     // A table is named [gains.PROFILE.LAW] or [gains.PROFILE.LAW.AXIS].
-    let law = |line: &str| line.strip_prefix("[gains.")?.split(['.', ']']).nth(1).map(str::to_owned);
+    let law = |line: &str| {
+        let mut names = line.strip_prefix("[gains.")?.split(['.', ']']).map(str::to_owned);
+        Some([names.next()?, names.next()?])
+    };
     let found: Vec<_> = gains.lines().filter_map(law).collect();
-    let (mut text, mut comments, mut keeps) = (String::new(), Vec::new(), false);
+    let (mut text, mut comments, mut keeps) = (String::new(), String::new(), false);
+    // True while a comment goes on, and while a kept table goes on, whose own comments stay in it.
+    let (mut comment_goes_on, mut table_goes_on) = (false, false);
     for line in held.lines() {
         if let Some(law) = law(line) {
             keeps = !found.contains(&law);
+            table_goes_on = true;
+            // Several tables may share a comment: it goes to the first of them that is kept.
             if keeps {
-                comments.drain(..).for_each(|comment| text = format!("{text}{comment}\n"));
+                text += &std::mem::take(&mut comments);
             }
-        } else if line.starts_with('#') {
-            // Several tables may share a comment, so it waits for the first of them that is kept.
-            if !comments.last().is_some_and(|last: &&str| last.starts_with('#')) {
+        } else if line.starts_with('#') && !table_goes_on {
+            if !comment_goes_on {
                 comments.clear();
             }
-            comments.push(line);
+            comments = format!("{comments}{line}\n");
+            comment_goes_on = true;
             continue;
+        } else if line.trim().is_empty() {
+            table_goes_on = false;
         }
+        comment_goes_on = false;
         if keeps {
             text = format!("{text}{line}\n");
         }
@@ -246,6 +256,16 @@ mod tests {
         let third = "# third\n[gains.flight.indi]\nd = 3\n";
         let file = replaced(&file, third).unwrap();
         assert_eq!(file, format!("[vehicle]\n\n{BEGIN}\n{third}\n{second}\n{pid}{END}\n"));
+        // A law that is searched again takes its comment with it, and a comment within a table stays there.
+        let again =
+            replaced(&file, "# fourth\n[gains.flight.afbc.roll]\na = 4\n\n[gains.flight.cascade]\nb = 4\n").unwrap();
+        assert!(!again.contains("# second") && again.contains(&third.to_owned()) && again.contains(pid), "{again}");
+        let by_hand = format!("{BEGIN}\n[gains.flight.indi]\n# why\nd = 1\n\n[gains.paper.pid]\ne = 1\n{END}\n");
+        let file_by_hand = replaced(&by_hand, "[gains.flight.pid]\nc = 5\n").unwrap();
+        assert!(
+            file_by_hand.contains("[gains.flight.indi]\n# why\nd = 1\n\n[gains.paper.pid]\ne = 1\n"),
+            "{file_by_hand}"
+        );
         // With every law searched again, nothing old is left.
         let all = replaced(&file, &format!("{first}\n[gains.flight.indi]\nd = 4\n")).unwrap();
         assert!(!all.contains("second") && !all.contains("= 2") && !all.contains("= 3"), "{all}");

@@ -104,7 +104,8 @@ impl Calibrator {
             self.number = number;
             self.begin(what, configuration, now_us);
         }
-        let Some(sample) = sample else {
+        // A sample that is no number is none.
+        let Some(sample) = sample.filter(RawSample::is_finite) else {
             let silent_us = now_us.saturating_sub(self.heard_us);
             return if silent_us >= SILENT_US { Step::Failed("no sensor readings") } else { Step::Continue };
         };
