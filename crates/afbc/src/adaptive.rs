@@ -234,18 +234,21 @@ impl Subsystem {
         (terms, AdaptationRate { first, second, theta, delta })
     }
 
-    /// Returns u_a + u_r, and advances the estimate if the context allows it.
-    // One copy for all six subsystems, not inlined, so that it can use all registers.
+    /// Returns u_a + u_r, and advances the estimate if the context allows it. The part of the input that the last step
+    /// could not allocate and the factor on gamma are those of [`SubsystemConditions`].
+    // One copy for all six subsystems, not inlined, so that it can use all registers. Numbers are passed in registers,
+    // structs in memory.
     #[inline(never)]
     fn step(
         &self,
-        errors: &Errors,
-        [x1, x2]: [f32; 2],
-        conditions: &SubsystemConditions,
+        e2: f32,
+        inputs: [f32; 2],
+        [unallocated, learning]: [f32; 2],
         context: &StepContext,
         estimate: &mut AdaptiveEstimate,
     ) -> f32 {
-        let (terms, rate) = self.law(errors, [x1, x2], estimate, conditions);
+        let conditions = SubsystemConditions { unallocated, learning, printed: context.known.is_none() };
+        let (terms, rate) = self.law(&Errors { e2, ..Errors::default() }, inputs, estimate, &conditions);
         if context.adapt {
             advance(estimate, &rate, &self.gains.safeguards, context.dt_s);
         }
@@ -329,11 +332,6 @@ impl SubsystemLaw for Adaptive {
     ) -> (f32, Errors) {
         let subsystem = &self.subsystems[axis];
         let softness = if matches!(axis, Axis::Z) { context.softness } else { 1.0 };
-        let conditions = SubsystemConditions {
-            unallocated: context.unallocated[axis],
-            learning: softness * softness,
-            printed: context.known.is_none(),
-        };
         let gains = subsystem.gains.backstepping.slowed(softness);
         let errors = tracking.errors(gains.alpha1);
         let inputs = fuzzy_inputs(axis, [tracking.x1, tracking.x2], &errors);
@@ -344,7 +342,8 @@ impl SubsystemLaw for Adaptive {
             }
             None => 0.0,
         };
-        let learnt = subsystem.step(&errors, inputs, &conditions, context, estimate);
+        let conditions = [context.unallocated[axis], softness * softness];
+        let learnt = subsystem.step(errors.e2, inputs, conditions, context, estimate);
         (known + (learnt + proportional(gains.alpha2, &errors)), errors)
     }
 

@@ -189,8 +189,10 @@ fn compose<L: SubsystemLaw + Copy>(
         };
         let tilt_max = f64::from(settings.limits.tilt_max_rad);
         // Height comes first: at the largest tilt the rotors still give the vertical thrust that the law asks for, up to
-        // 1.1 times the hover thrust, or leave a horizontal margin of three tenths.
-        let upward_n = (f64::from(seen.z) * eta.x.cos() * eta.y.cos()).min(1.1 * f64::from(hover_n));
+        // 1.1 times the hover thrust and half of it more per m/s of a descent, or leave a horizontal margin of three
+        // tenths.
+        let enough = 1.1 + 0.5 * f64::from(-state.velocity_m_s.z).max(0.0);
+        let upward_n = (f64::from(seen.z) * eta.x.cos() * eta.y.cos()).min(enough * f64::from(hover_n));
         let most_n = 0.95 * thrust_max_n;
         let kept_n = upward_n.min(most_n * 0.91_f64.sqrt());
         let room = (most_n.powi(2) - kept_n.powi(2)).sqrt() / kept_n;

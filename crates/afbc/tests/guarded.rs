@@ -5,6 +5,7 @@
 use crate::common::{Stepped, U, check_step, gains, measured, plausible, setpoint, settings, state, step, value};
 use afbc::adaptive::Gains;
 use afbc::disturbance::DisturbanceObserver;
+use afbc::limits::PositionControlLimits;
 use afbc::monitor::MonitorBounds;
 use afbc::reference::ReferenceModel;
 use afbc::standstill::LIFT_SHARE;
@@ -525,6 +526,28 @@ fn tripped(steps: usize, aside_m: f32) -> (Stepped, Flight) {
         last = step(&touchy, &mut memory, &State::default(), &aside);
     }
     (last, memory)
+}
+
+/// AFBC tilts up to the limit of its settings, the fallback law up to 45 degrees or that limit.
+#[test]
+fn the_fallback_tilts_by_45_degrees_at_most() {
+    let far = Setpoint { position_m: Vector3::new(50.0, 0.0, 0.0), ..Setpoint::default() };
+    for (tilt_max_rad, fallback_rad) in [(1.0, core::f32::consts::FRAC_PI_4), (0.5, 0.5)] {
+        let limits = PositionControlLimits { tilt_max_rad, ..direct().limits };
+        let settings = Settings { limits, ..direct() };
+        for (bounds, expected_rad) in [(lax(), tilt_max_rad), (hair_trigger(), fallback_rad)] {
+            let paper = Parameters::PAPER.to_f32();
+            let controller = Guarded::new(paper, settings, Profile::Flight.gains(), bounds).unwrap();
+            let (mut memory, mut last_rad) = (Flight::default(), 0.0_f32);
+            let rolled = State { attitude_rad: Vector3::new(0.01, 0.0, 0.0), ..State::default() };
+            for _ in 0..200 {
+                let [_, pitch_rad] = step(&controller, &mut memory, &rolled, &far).trace.desired_rad;
+                last_rad = pitch_rad;
+            }
+            assert_eq!(memory.control.trip().is_some(), bounds == hair_trigger());
+            assert!((last_rad - expected_rad).abs() < 0.01, "{last_rad} rad, not {expected_rad}");
+        }
+    }
 }
 
 /// The next law keeps compensating an observed moment: no input jumps when the monitor trips or AFBC is engaged again.
