@@ -23,8 +23,8 @@ pub const THRUST_SHARE: f32 = 0.95;
 /// Vertical thrust that the largest tilt leaves, if the law asks for it, as a share of the hover thrust: a climb has to
 /// wait. Not in the paper.
 pub const HOLDS_HEIGHT: f32 = 1.1;
-/// Share of the hover thrust that the largest tilt leaves in addition per speed of a descent, enough to stop it in 0.2 s
-/// \[s/m\]. Not in the paper.
+/// Share of the hover thrust that the largest tilt leaves in addition per speed of a descent, enough to stop it in 0.2
+/// seconds \[s/m\]. Not in the paper.
 pub const STOPS_DESCENT_S_M: f32 = 0.5;
 /// Share of the largest thrust that is kept for horizontal motion while the height needs all of it, as PX4's
 /// MPC_THR_XY_MARG. Not in the paper.

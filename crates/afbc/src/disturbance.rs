@@ -1,18 +1,21 @@
-//! Observers of unmodelled disturbances: the horizontal acceleration, mostly wind, and moments, from weak rotors or a
-//! payload off the centre. Not in the paper.
+//! Observers of unmodelled disturbances: accelerations, from wind or rotors that are weaker than told, and moments, from
+//! weak rotors or a payload off the centre. Not in the paper.
 //!
-//! (16) needs f of x and y, which the model takes as zero. Without an observer all of f must be learnt from the error
-//! that it causes. But the vehicle measures its velocity v and knows its thrust:
+//! (16) needs f, which the model takes as zero along x and y, and as gravity along z. Without an observer the rest must
+//! be learnt from the error that it causes. But the vehicle measures its velocity v and knows its thrust:
 //!
 //! ```text
-//! dv_hat/dt = T/T_h g (R e_z) + a + f_hat + 2w (v - v_hat)  a: known drag; T: thrust behind the rotors' lag
-//! df_hat/dt = w^2 (v - v_hat)                               T_h: learnt hover thrust
+//! dv_hat/dt = T/T_h g (R e_z) - g e_z + a + f_hat + 2w (v - v_hat)
+//! df_hat/dt = w^2 (v - v_hat)
+//!
+//! a: known drag     T: thrust behind the rotors' lag     T_h: learnt hover thrust, which follows f_hat along z
 //! ```
 //!
 //! f_hat is f behind two poles at w. T is divided by the learnt hover thrust, as in (40), so weak rotors do not look
 //! like wind. v_hat is corrected whenever the velocity has been measured, by the gains for the time since the last
-//! correction. Beyond [`QUIET_M_S`], w falls in proportion to the noise of the velocity. White noise shows itself in the
-//! product of successive changes of v - v_hat, whose mean is minus its variance; forces and motion make no such product.
+//! correction. Beyond [`QUIET_M_S`], w falls in proportion to the noise of the velocity. White noise shows itself in
+//! the product of successive changes of v - v_hat, whose mean is minus its variance; forces and motion make no such
+//! product.
 //!
 //! This is the extended state observer of Han, *From PID to active disturbance rejection control*, IEEE TIE 56(3),
 //! 2009, with both poles at the same place as in Gao, *Scaling and bandwidth-parameterization based controller tuning*,
@@ -347,8 +350,8 @@ impl ForceObserver {
         observed.off_m_s = off - correction;
     }
 
-    /// Returns the learnt hover thrust beyond the weight \[N\], `None` if it is not learnt here, without an observer along
-    /// z.
+    /// Returns the learnt hover thrust beyond the weight \[N\], `None` if it is not learnt here, without an observer
+    /// along z.
     #[inline(always)]
     fn more_hover_thrust_n(&self, observed: &ForceObserverMemory) -> Option<f32> {
         let [_, rate_z_1_s] = self.rates_1_s;

@@ -188,8 +188,8 @@ fn compose<L: SubsystemLaw + Copy>(
             GRAVITY_M_S2
         };
         let tilt_max = f64::from(settings.limits.tilt_max_rad);
-        // Height comes first: at the largest tilt the rotors still give the vertical thrust that the law asks for, up to
-        // 1.1 times the hover thrust and half of it more per m/s of a descent, or leave a horizontal margin of three
+        // Height comes first: at the largest tilt the rotors still give the vertical thrust that the law asks for, up
+        // to 1.1 times the hover thrust and half of it more per m/s of a descent, or leave a horizontal margin of three
         // tenths.
         let enough = 1.1 + 0.5 * f64::from(-state.velocity_m_s.z).max(0.0);
         let upward_n = (f64::from(seen.z) * eta.x.cos() * eta.y.cos()).min(enough * f64::from(hover_n));

@@ -212,7 +212,8 @@ proptest! {
         estimate in estimate(),
     ) {
         let errors = tracking.errors(gains.backstepping.alpha1);
-        let (terms, _) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, &SubsystemConditions::default());
+        let subsystem = Subsystem::new(gains).unwrap();
+        let (terms, _) = subsystem.law(&errors, inputs, &estimate, &SubsystemConditions::default());
         prop_assert_eq!(terms.sum(), terms.fuzzy + terms.robust + terms.proportional);
         prop_assert_eq!(terms.proportional, gains.backstepping.alpha2 * errors.e2); // (21)
 
@@ -242,7 +243,12 @@ proptest! {
 
     /// Old states slow down learning, and nothing else.
     #[test]
-    fn learning_slows_down_alone(gains in gains(), tracking in tracking(), estimate in estimate(), learning in 0.0_f32..1.0) {
+    fn learning_slows_down_alone(
+        gains in gains(),
+        tracking in tracking(),
+        estimate in estimate(),
+        learning in 0.0_f32..1.0,
+    ) {
         let (errors, subsystem) = (tracking.errors(gains.backstepping.alpha1), Subsystem::new(gains).unwrap());
         let [(terms, rate), (same, slow)] = [1.0, learning].map(|learning| {
             let conditions = SubsystemConditions { learning, ..SubsystemConditions::default() };
@@ -302,7 +308,8 @@ proptest! {
                 Axis::Roll | Axis::Pitch | Axis::Yaw => [tracking.x1, tracking.x2],
                 Axis::Z | Axis::X | Axis::Y => [errors.e1, errors.e1_dot],
             };
-            let (terms, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &before, &SubsystemConditions::default());
+            let subsystem = Subsystem::new(gains).unwrap();
+            let (terms, rate) = subsystem.law(&errors, inputs, &before, &SubsystemConditions::default());
 
             let mut frozen = before;
             let context = StepContext {

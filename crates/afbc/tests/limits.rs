@@ -91,8 +91,8 @@ proptest! {
         let thrust = command.trace.inputs.thrust_n.min(4.0 * settings.common.rotor_force_max_n);
         let upward = f64::from(thrust) * cosine / f64::from(WEIGHT_N);
         let vertical = if by_thrust { GRAVITY_M_S2 * upward.max(0.3) } else { GRAVITY_M_S2 };
-        // Height comes first: at the largest tilt the rotors still give the vertical thrust that the law asks for, up to
-        // 1.1 times the hover thrust and half of it more per m/s of a descent, or leave a horizontal margin of three
+        // Height comes first: at the largest tilt the rotors still give the vertical thrust that the law asks for, up
+        // to 1.1 times the hover thrust and half of it more per m/s of a descent, or leave a horizontal margin of three
         // tenths.
         let enough = 1.1 + 0.5 * f64::from(-state.velocity_m_s.z).max(0.0);
         let most_n = 0.95 * 4.0 * f64::from(settings.common.rotor_force_max_n);
