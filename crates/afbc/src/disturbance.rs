@@ -1,5 +1,5 @@
-//! Observers of unmodelled disturbances: accelerations, from wind or rotors that are weaker than told, and moments, from
-//! weak rotors or a payload off the centre. Not in the paper.
+//! Observers of unmodelled disturbances: accelerations, from wind or rotors that are weaker than told, and moments,
+//! from weak rotors or a payload off the centre. Not in the paper.
 //!
 //! (16) needs f, which the model takes as zero along x and y, and as gravity along z. Without an observer the rest must
 //! be learnt from the error that it causes. But the vehicle measures its velocity v and knows its thrust:
