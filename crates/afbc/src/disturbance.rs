@@ -31,6 +31,8 @@ use nalgebra::Vector3;
 
 /// Largest |f_hat| \[m/s2\], that of a wind of some 20 m/s.
 pub const ACCELERATION_MAX_M_S2: f32 = 10.0;
+/// Largest f_hat upwards \[m/s2\]. The feet of a vehicle that lands push it up by more, which is no disturbance.
+const UPWARD_MAX_M_S2: f32 = 0.5;
 /// Age of the rates that the moment observer assumes, in addition to the rotor lag \[s\]: rates may be new or 20 ms
 /// old.
 pub const AGE_S: f32 = 0.01;
@@ -55,7 +57,7 @@ const UPRIGHT: f32 = 0.9;
 /// Rate at which the hover thrust learns f_hat along z \[1/s\].
 const LIFT_1_S: f32 = 5.0;
 /// Smallest and largest learnt hover thrust, as shares of the weight.
-const HOVER_SHARE_MIN: f32 = 0.3;
+const HOVER_SHARE_MIN: f32 = 0.95;
 const HOVER_SHARE_MAX: f32 = 3.0;
 /// Share of the noise's mean square that is replaced by each measured velocity.
 const NOISE_SHARE: f32 = 0.004;
@@ -345,6 +347,7 @@ impl ForceObserver {
             1.0
         };
         observed.acceleration_m_s2 = (f_hat * share).map(math::settled);
+        observed.acceleration_m_s2.z = math::min(observed.acceleration_m_s2.z, UPWARD_MAX_M_S2);
         let correction = scaled(&off, corrects);
         observed.velocity_m_s += correction;
         observed.off_m_s = off - correction;
