@@ -11,7 +11,6 @@ use crate::supervisor::{ArmingLimits, COAST_US, Mode, REST_US};
 use crate::tumble::Tumble;
 use afbc_control::{FlightController, Trace};
 use afbc_types::{Pose, Stamped, State};
-use nalgebra::Vector3;
 
 /// Memory of the flight core between ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -101,15 +100,6 @@ pub(crate) fn extrapolated(state: &State, age_us: u32) -> State {
     }
 }
 
-/// Returns true if the states are equal. Unlike nalgebra's comparison, this one ends at the first difference.
-fn is_repeated(held: &State, state: &State) -> bool {
-    let same = |held: &Vector3<f32>, next: &Vector3<f32>| held.x == next.x && held.y == next.y && held.z == next.z;
-    same(&held.rates_rad_s, &state.rates_rad_s)
-        && same(&held.velocity_m_s, &state.velocity_m_s)
-        && same(&held.position_m, &state.position_m)
-        && same(&held.attitude_rad, &state.attitude_rad)
-}
-
 impl<M> FlightCoreMemory<M> {
     /// Stores the inbox's state. Ignores the state if it is not newer than the present state, or from a frozen tracker.
     /// Also ignores a stale state, where a delay that all states have does not count as age. Returns true if it was
@@ -126,7 +116,7 @@ impl<M> FlightCoreMemory<M> {
         // its velocity.
         let watched = armed && !inbox.is_own();
         if let Some(flight) = self.flight.as_mut().filter(|flight| watched && flight.landing.airborne()) {
-            let repeated = self.state.is_some_and(|held| is_repeated(&held.value, &state.value));
+            let repeated = self.state.is_some_and(|held| held.value == state.value);
             flight.distrusts |= flight.witness.contradicts(&state.value, state.at_us);
             if repeated || flight.distrusts {
                 self.frozen_states = self.frozen_states.saturating_add(1);

@@ -247,30 +247,13 @@ impl Limiter {
         {
             return;
         }
-        let one = |vector: Vector3<f32>| Vector1::new(vector.z);
-        let (goal, climb) = match target {
-            Some(CompleteTarget { position_m: p, velocity_m_s: v, acceleration_m_s2 }) => {
-                // An acceleration that fits no flight would only drive the vehicle away from the target.
-                let a = if fits { acceleration_m_s2 } else { Vector3::zeros() };
-                let goal = MotionGoal {
-                    position: Some(p.xy()),
-                    velocity: Some(v.xy()),
-                    acceleration: a.xy(),
-                    jerk: jerk_m_s3.xy(),
-                };
-                let climb = MotionGoal {
-                    position: Some(one(p)),
-                    velocity: Some(one(v)),
-                    acceleration: one(a),
-                    jerk: one(jerk_m_s3),
-                };
-                (goal, climb)
-            }
-            None => {
-                let LimiterTarget { position_m: p, velocity_m_s: v, acceleration_m_s2: a, .. } = *aim;
-                (goal(p.xy(), v.xy(), a.xy()), goal(one(p), one(v), one(a)))
-            }
+        let (p, v, a) = match target {
+            // An acceleration that fits no flight would only drive the vehicle away from the target.
+            Some(target) if !fits => (target.position_m, target.velocity_m_s, Vector3::zeros()),
+            Some(target) => (target.position_m, target.velocity_m_s, target.acceleration_m_s2),
+            None => (aim.position_m, aim.velocity_m_s, aim.acceleration_m_s2),
         };
+        let goal = goal(p.xy(), v.xy(), a.xy(), jerk_m_s3.xy());
         let (speed_m_s, approach_m_s) = (limits.speed_m_s, min(aim.speed_m_s, limits.speed_m_s));
         let reach = MotionBounds {
             approach: (approach_m_s, approach_m_s),
@@ -279,13 +262,15 @@ impl Limiter {
             jerk: limits.jerk_max_m_s3,
         };
         self.horizontal.advance(&mut now.horizontal, &goal, &reach, dt_s);
+        let one = |vector: Vector3<f32>| Vector1::new(vector.z);
+        let goal = self::goal(one(p), one(v), one(a), one(jerk_m_s3));
         let reach = MotionBounds {
             approach: (min(aim.up_m_s, limits.up_m_s), min(aim.down_m_s, limits.down_m_s)),
             speed: (limits.up_m_s, limits.down_m_s),
             acceleration: limits.vertical_acceleration_m_s2,
             jerk: limits.jerk_max_m_s3,
         };
-        self.vertical.advance(&mut now.vertical, &climb, &reach, dt_s);
+        self.vertical.advance(&mut now.vertical, &goal, &reach, dt_s);
     }
 }
 
@@ -302,11 +287,12 @@ fn complete(aim: &LimiterTarget) -> Option<CompleteTarget> {
     })
 }
 
-/// Returns the goal of one or two coordinates, without jerk. A vector with any NaN counts as not given.
+/// Returns the goal of one or two coordinates. A vector with any NaN counts as not given.
 fn goal<const D: usize>(
     position: nalgebra::SVector<f32, D>,
     velocity: nalgebra::SVector<f32, D>,
     acceleration: nalgebra::SVector<f32, D>,
+    jerk: nalgebra::SVector<f32, D>,
 ) -> MotionGoal<D> {
     let given = |vector: nalgebra::SVector<f32, D>| (!vector.iter().any(|value| value.is_nan())).then_some(vector);
     let zero = nalgebra::SVector::zeros();
@@ -317,7 +303,7 @@ fn goal<const D: usize>(
             position,
             velocity: Some(velocity.unwrap_or(zero)),
             acceleration: acceleration.unwrap_or(zero),
-            jerk: zero,
+            jerk,
         },
     }
 }

@@ -33,8 +33,9 @@ const SNAP_MAX_M_S4: f32 = 1e7;
 const ANGLE_MAX_RAD: f32 = 1e3;
 /// Largest angular rate, per coordinate \[rad/s\].
 const RATE_MAX_RAD_S: f32 = 1e3;
-/// Smallest of the largest velocity, angle and rate.
+/// Number that is within the bounds of a velocity, of an angle and of a rate.
 const REST_MAX: f32 = 1e3;
+const _: () = assert!(REST_MAX <= VELOCITY_MAX_M_S && REST_MAX <= ANGLE_MAX_RAD && REST_MAX <= RATE_MAX_RAD_S);
 /// Largest heading and derivatives of the heading \[rad, rad/s, rad/s2\].
 const HEADING_MAX: f32 = 1e3;
 
@@ -56,8 +57,8 @@ impl State {
     /// True if every value is finite and physically possible: at most 1e5 m, 1e3 m/s, 1e3 rad and 1e3 rad/s in size.
     /// Controllers must reject other states.
     pub fn is_plausible(&self) -> bool {
-        // Nearly every state passes by its squares, in half the instructions. Their sum with a number that is not
-        // finite is not within any bound.
+        // Nearly every state passes by its sums of squares, which takes fewer instructions than the exact check. A sum
+        // with a number that is not finite is not within any bound.
         let State { position_m, velocity_m_s, attitude_rad, rates_rad_s } = self;
         let rest = velocity_m_s.norm_squared() + attitude_rad.norm_squared() + rates_rad_s.norm_squared();
         let is_small = position_m.norm_squared() <= POSITION_MAX_M * POSITION_MAX_M && rest <= REST_MAX * REST_MAX;
