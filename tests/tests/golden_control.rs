@@ -1,7 +1,7 @@
 //! Compares every row of the control crate's golden data in `f32`. Each tolerance is a bound on the rounding error of
 //! its row, so it is also tight for small numbers.
 
-use afbc::adaptive::{Gains, Subsystem};
+use afbc::adaptive::{Gains, Subsystem, SubsystemConditions};
 use afbc::backstepping::{self, ideal, proportional};
 use afbc::desired::desired_attitude;
 use afbc::fuzzy::{FuzzyBasis, Membership};
@@ -88,7 +88,8 @@ fn afbc_subsystem_agrees_in_every_row() {
         let inputs = if inputs_are_state { [tracking.x1, tracking.x2] } else { [errors.e1, errors.e1_dot] };
         let estimate =
             AdaptiveEstimate { theta: Matrix3::from_row_slice(&theta.map(|t| t as f32)), delta: delta as f32 };
-        let (terms, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, 0.0);
+        let (terms, rate) =
+            Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, &SubsystemConditions::default());
 
         // Each input is rounded once, each difference and product once more.
         let [e1, e2] = row.all(["e1", "e2"]);

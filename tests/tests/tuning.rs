@@ -49,7 +49,7 @@ fn the_gains_that_fly_cost_what_is_documented() {
 }
 
 /// Backstepping alone does not meet the conditions, since it does not adapt, and a Crazyflie's thrust falls with its
-/// battery. The starting gains of AFBC's search do not meet them either.
+/// battery. The starting gains of AFBC's search do not meet them either: they are too noisy.
 #[test]
 fn the_gains_that_fly_meet_every_condition() {
     let conditions = conditions().unwrap();
@@ -61,7 +61,7 @@ fn the_gains_that_fly_meet_every_condition() {
         assert_eq!(unmet(&found(kind)), [""; 0], "{}", kind.name());
     }
     let by_hand = unmet(&by_hand(ControllerKind::Afbc));
-    assert!(by_hand.iter().any(|name| name.starts_with("robustness")), "{by_hand:?}");
+    assert!(by_hand.iter().any(|name| name == "hardware"), "{by_hand:?}");
 }
 
 /// The gains in the vehicle files, found by `sitl tune --fleet`, survive every flight and meet every condition, at the

@@ -103,7 +103,6 @@ pub struct AdaptationRate {
     /// gamma e_2 divided by the sum of the firing strengths.
     theta: f32,
     delta: f32,
-    leakage: f32,
 }
 
 impl AdaptationRate {
@@ -112,14 +111,9 @@ impl AdaptationRate {
         self.first * self.second.transpose() * self.theta
     }
 
-    /// Returns (33): eta e_2 tanh(e_2/epsilon).
+    /// Returns (33): eta e_2 s, with s = tanh(e_2/epsilon) as printed.
     pub fn delta(&self) -> f32 {
         self.delta
-    }
-
-    /// Returns the leakage rate of both estimates ([`Safeguards`]) \[1/s\].
-    pub fn leakage(&self) -> f32 {
-        self.leakage
     }
 }
 
@@ -145,13 +139,13 @@ fn spread(input: f32, weights: &Matrix3<f32>, norm_max: f32) -> AdaptiveEstimate
 /// Advances the estimate by one explicit Euler step, with projection onto its bounds.
 #[inline]
 fn advance(estimate: &mut AdaptiveEstimate, rate: &AdaptationRate, safeguards: &Safeguards, dt_s: f32) {
-    let Safeguards { theta_max, delta_max, .. } = *safeguards;
+    let Safeguards { sigma, theta_max, delta_max } = *safeguards;
     // If the leakage is faster than the step, the estimate becomes zero and does not change sign.
-    let keep = math::max(1.0 - rate.leakage * dt_s, 0.0);
+    let keep = math::max(1.0 - sigma * dt_s, 0.0);
     let theta = estimate.theta * keep + rate.first * (rate.theta * dt_s) * rate.second.transpose();
     let square = theta.norm_squared();
     estimate.theta = if square > theta_max * theta_max { theta * (theta_max / math::sqrt(square)) } else { theta };
-    // delta_hat never falls below zero: it grows by the product of e and tanh(e_2/epsilon), which have the same sign.
+    // delta_hat never falls below zero: it grows by the product of e and s, which have the same sign.
     estimate.delta = math::min(estimate.delta * keep + rate.delta * dt_s, delta_max);
 }
 
@@ -174,6 +168,24 @@ impl ControlTerms {
     }
 }
 
+/// What the cascade tells a subsystem in one step, besides its errors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SubsystemConditions {
+    /// Part of the input that the last step could not allocate.
+    pub unallocated: f32,
+    /// Factor on gamma, below 1 for old states.
+    pub learning: f32,
+    /// True for the law as printed, whose robust term has tanh(e_2/epsilon). With feed-forward it is e_2/(|e_2| +
+    /// epsilon), which has the same slope at zero and takes a fifth of the instructions.
+    pub printed: bool,
+}
+
+impl Default for SubsystemConditions {
+    fn default() -> Self {
+        SubsystemConditions { unallocated: 0.0, learning: 1.0, printed: true }
+    }
+}
+
 /// One AFBC subsystem.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Subsystem {
@@ -193,44 +205,54 @@ impl Subsystem {
     }
 
     /// Returns the terms of (20) and the derivatives of the estimate by (33), (34) with the [`Safeguards`], both from
-    /// the present estimate. `unallocated` is the part of the input that the last step could not allocate.
+    /// the present estimate.
     #[inline]
     pub fn law(
         &self,
         errors: &Errors,
         inputs: [f32; 2],
         estimate: &AdaptiveEstimate,
-        unallocated: f32,
+        conditions: &SubsystemConditions,
     ) -> (ControlTerms, AdaptationRate) {
-        let Gains { gamma, eta, safeguards, .. } = &self.gains;
+        let Gains { gamma, eta, .. } = &self.gains;
+        let SubsystemConditions { unallocated, learning, printed } = *conditions;
         let e2 = errors.e2;
         let FiringStrengths { first, second, share } = self.basis.fire(inputs);
-        let s = math::tanh(e2 * self.inverse_epsilon);
+        let s = if printed {
+            math::tanh(e2 * self.inverse_epsilon)
+        } else {
+            // epsilon is positive by its range.
+            e2 / (e2.abs() + self.gains.epsilon)
+        };
         let terms = ControlTerms {
             fuzzy: first.dot(&(estimate.theta * second)) * share,
             robust: estimate.delta * s,
             proportional: proportional(self.gains.backstepping.alpha2, errors),
         };
-        let (error, leakage) = (safeguards.adaptation_error(e2, unallocated), safeguards.leakage(e2));
-        (terms, AdaptationRate { first, second, theta: gamma * error * share, delta: eta * error * s, leakage })
+        let error = Safeguards::adaptation_error(e2, unallocated);
+        let (theta, delta) = (gamma * learning * error * share, eta * error * s);
+        (terms, AdaptationRate { first, second, theta, delta })
     }
 
-    /// Returns u, and advances the estimate if the context allows it.
-    // One copy for all six subsystems, not inlined, so that it can use all registers.
+    /// Returns u_a + u_r, and advances the estimate if the context allows it. The part of the input that the last step
+    /// could not allocate and the factor on gamma are those of [`SubsystemConditions`].
+    // One copy for all six subsystems, not inlined, so that it can use all registers. Numbers are passed in registers,
+    // structs in memory.
     #[inline(never)]
     fn step(
         &self,
-        errors: &Errors,
-        [x1, x2]: [f32; 2],
-        unallocated: f32,
+        e2: f32,
+        inputs: [f32; 2],
+        [unallocated, learning]: [f32; 2],
         context: &StepContext,
         estimate: &mut AdaptiveEstimate,
     ) -> f32 {
-        let (terms, rate) = self.law(errors, [x1, x2], estimate, unallocated);
+        let conditions = SubsystemConditions { unallocated, learning, printed: context.known.is_none() };
+        let (terms, rate) = self.law(&Errors { e2, ..Errors::default() }, inputs, estimate, &conditions);
         if context.adapt {
             advance(estimate, &rate, &self.gains.safeguards, context.dt_s);
         }
-        terms.sum()
+        terms.fuzzy + terms.robust
     }
 }
 
@@ -309,16 +331,20 @@ impl SubsystemLaw for Adaptive {
         estimate: &mut AdaptiveEstimate,
     ) -> (f32, Errors) {
         let subsystem = &self.subsystems[axis];
-        let errors = tracking.errors(subsystem.gains.backstepping.alpha1);
+        let softness = if matches!(axis, Axis::Z) { context.softness } else { 1.0 };
+        let gains = subsystem.gains.backstepping.slowed(softness);
+        let errors = tracking.errors(gains.alpha1);
         let inputs = fuzzy_inputs(axis, [tracking.x1, tracking.x2], &errors);
         let known = match context.known {
             Some(model) => {
                 let dynamics = context.observed(model, axis);
-                backstepping::known(&subsystem.gains.backstepping, tracking, &errors, &dynamics)
+                backstepping::known(&gains, tracking, &errors, &dynamics)
             }
             None => 0.0,
         };
-        (known + subsystem.step(&errors, inputs, context.unallocated[axis], context, estimate), errors)
+        let conditions = [context.unallocated[axis], softness * softness];
+        let learnt = subsystem.step(errors.e2, inputs, conditions, context, estimate);
+        (known + (learnt + proportional(gains.alpha2, &errors)), errors)
     }
 
     fn approach(&self, axis: Axis, known: Option<&ModelConstants>) -> f32 {

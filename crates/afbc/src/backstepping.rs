@@ -63,6 +63,17 @@ parameters! {
 }
 
 impl Gains {
+    /// Returns the gains of a loop that is `softness` times as fast.
+    #[inline(always)]
+    #[must_use]
+    pub(crate) fn slowed(&self, softness: f32) -> Self {
+        Gains {
+            alpha1: self.alpha1 * softness,
+            alpha2: self.alpha2 * softness,
+            stiffness: self.stiffness * (softness * softness),
+        }
+    }
+
     /// Returns the approach speed per error \[1/s\] at which the sum of [`known`] and u_pd is zero, for an input with
     /// gain g: the position gain divided by the rate gain.
     pub(crate) fn approach(&self, g: f32) -> f32 {

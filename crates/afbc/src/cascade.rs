@@ -14,6 +14,7 @@ use crate::reference::{ReferenceFilter, ReferenceMemory};
 use crate::rotation::AttitudeTracking;
 pub use crate::settings::Settings;
 use crate::standstill::StandstillDetector;
+use afbc_control::drag::KnownDrag;
 use afbc_control::mixer::Mixer;
 use afbc_control::{Action, Errors, FlightController, Smoothed, Smoother, Trace, math};
 use afbc_types::{Airframe, Axis, Declared, Inputs, OutOfRange, PerAxis, Setpoint, State};
@@ -35,11 +36,36 @@ pub struct Controller<L, const N: usize = 4> {
     delay_compensation: DelayCompensation,
     effort: Effort,
     mixer: Mixer<N>,
-    settings: Settings,
+    settings: StepSettings,
     weight_n: f32,
     mass_kg: f32,
     /// Largest total thrust of all rotors \[N\].
     thrust_max_n: f32,
+}
+
+/// Settings that every step reads: the rest is in the parts of the [`Controller`], and would take memory twice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct StepSettings {
+    dt_s: f32,
+    drag: KnownDrag,
+    /// Rotor lag \[s\].
+    lag_s: f32,
+    anti_windup: bool,
+    freeze_on_ground: bool,
+    bumpless: bool,
+    feed_forward: bool,
+    by_rotation: bool,
+}
+
+impl From<&Settings> for StepSettings {
+    fn from(settings: &Settings) -> Self {
+        let Settings {
+            common, disturbance, anti_windup, freeze_on_ground, bumpless, feed_forward, by_rotation, ..
+        } = *settings;
+        let afbc_control::Settings { dt_s, drag, .. } = common;
+        let lag_s = disturbance.disturbance_lag_s;
+        StepSettings { dt_s, drag, lag_s, anti_windup, freeze_on_ground, bumpless, feed_forward, by_rotation }
+    }
 }
 
 /// Memory of the cascade.
@@ -123,6 +149,8 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
         let dt_s = common.dt_s;
         let model = ModelConstants::new(&vehicle.parameters);
         let known = settings.feed_forward.then_some(&model);
+        let [roll_n, pitch_n] = mixer.tilt_authority_n(vehicle.parameters.weight_n());
+        let authority_rad_s2 = [roll_n * model.hover_gain(Axis::Roll), pitch_n * model.hover_gain(Axis::Pitch)];
         let approach = |axis, speed_max_m_s| ApproachLimit::new(speed_max_m_s, law.approach(axis, known));
         // Without feed-forward the observers would have no effect. The same holds for a law that does not use
         // feed-forward.
@@ -143,7 +171,7 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
                 .then(|| MomentObserver::new(disturbance, &vehicle.parameters, thrust_max_n, dt_s))
                 .flatten(),
             reference: ReferenceFilter::new(&settings.reference, limits, dt_s),
-            desired: DesiredAttitude::new(&settings, vehicle.parameters.gravity_m_s2, thrust_max_n)?,
+            desired: DesiredAttitude::new(&settings, vehicle.parameters.gravity_m_s2, thrust_max_n, authority_rad_s2)?,
             smoother: Smoother::new(&settings.smoothing, dt_s)?,
             delay_compensation: DelayCompensation::new(
                 disturbance.disturbance_lag_s,
@@ -152,7 +180,7 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
                 dt_s,
             ),
             effort: Effort::new(vehicle.parameters.weight_n(), dt_s),
-            settings,
+            settings: (&settings).into(),
             weight_n: vehicle.parameters.weight_n(),
             mass_kg: vehicle.parameters.mass_kg,
             thrust_max_n,
@@ -172,7 +200,9 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
 
     /// Returns the estimated hover thrust U4 \[N\], limited to what the rotors can give.
     pub(crate) fn hover_thrust_n(&self, memory: &CascadeMemory<L::Estimate>) -> f32 {
-        let hover_n = self.law.hover_thrust_n(&memory.estimates.z, self.weight_n, self.known_weight_n());
+        let observed_n = self.forces.as_ref().and_then(|forces| forces.hover_thrust_n(&memory.filters.forces));
+        let hover_n = observed_n
+            .unwrap_or_else(|| self.law.hover_thrust_n(&memory.estimates.z, self.weight_n, self.known_weight_n()));
         // (40) divides the commanded thrust by the hover thrust, so both need the same limit.
         math::min(hover_n, self.thrust_max_n)
     }
@@ -222,12 +252,13 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
             state,
             roll_pitch: attitude.roll_pitch,
             rotor_residual_rad_s: *rotor_residual_rad_s,
-            dt_s: self.settings.common.dt_s,
+            dt_s: self.settings.dt_s,
             // On the ground the feet hold the vehicle against everything but the thrust, so only the thrust is learnt
             // (`lift`).
             adapt: fresh && !touches_ground,
             unallocated: &last.unallocated,
             observed_m_s2,
+            softness: filters.forces.map_or(1.0, |forces| forces.softness()),
             known: self.settings.feed_forward.then_some(&self.model),
         };
         let eta_dot = self.eta_dot(state, &attitude);
@@ -237,7 +268,13 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
         let [u4, u5, u6] = self.position(&reference, [&lift, &context], estimates, &mut last.errors);
         // Desired roll and pitch (40), with the derivatives for (12) and (16).
         let followed = [&reference, setpoint];
-        let desired = self.desired.advance(&mut filters.desired, [u5, u6, u4], [hover_n, low_tan], &attitude, followed);
+        let desired = self.desired.advance(
+            &mut filters.desired,
+            [u5, u6, u4],
+            [hover_n, low_tan, state.velocity_m_s.z],
+            &attitude,
+            followed,
+        );
         // Attitude: subsystems 1, 2, 3.
         let mut tracking = self.attitude_tracking(&desired, &reference, &attitude, state);
         if self.settings.feed_forward {
@@ -252,7 +289,7 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
         // Rotors. Moments are compensated at their predicted value after the rotor lag. In rotating axes (R' v)' = R'
         // dv/dt - Omega x R' v, because the drag's moment turns with the body.
         let change = attitude.in_body(&reference.acceleration_m_s2) - state.rates_rad_s.cross(&velocity_body_m_s);
-        let ahead_m_s = velocity_body_m_s + change * self.settings.disturbance.disturbance_lag_s;
+        let ahead_m_s = velocity_body_m_s + change * self.settings.lag_s;
         let compensation_n = self.moment_compensation_n(&observed_rad_s2, &ahead_m_s, share, touches_ground);
         let ahead_n = self.mass_kg * self.delay_compensation.thrust_s * desired.thrust_m_s3;
         let (commanded, effort) =
@@ -269,7 +306,8 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
         if let Some(moments) = &self.moments {
             moments.record_inputs(&mut filters.moments, &action.given, effort);
         }
-        filters.standstill.advance(u4, self.weight_n, state, self.settings.common.dt_s);
+        let along_z = [reference.velocity_m_s.z, observed_m_s2.z];
+        filters.standstill.advance([u4, self.weight_n], state, along_z, self.settings.dt_s);
         let leaves_ground = touches_ground && !filters.standstill.is_touching_ground();
         // The way back after sliding on the ground must not be learnt as a disturbance.
         if let (true, Some(reference), Some(memory)) = (leaves_ground, &self.reference, &mut filters.reference) {
@@ -329,9 +367,7 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
     #[inline(always)]
     fn drag_acceleration_rad_s2(&self, velocity_body_m_s: &Vector3<f32>, share: f32) -> Vector3<f32> {
         match &self.moments {
-            Some(moments) => {
-                moments.angular_acceleration_rad_s2(&self.settings.common.drag.moment(velocity_body_m_s, share))
-            }
+            Some(moments) => moments.angular_acceleration_rad_s2(&self.settings.drag.moment(velocity_body_m_s, share)),
             None => Vector3::zeros(),
         }
     }
@@ -499,7 +535,7 @@ impl<L: SubsystemLaw, const N: usize> FlightController<N> for Controller<L, N> {
     type Memory = CascadeMemory<L::Estimate>;
 
     fn dt_s(&self) -> f32 {
-        self.settings.common.dt_s
+        self.settings.dt_s
     }
 
     fn mixer(&self) -> &Mixer<N> {

@@ -18,6 +18,18 @@ use nalgebra::Vector3;
 /// further. Not in the paper.
 pub const VERTICAL_MIN: f32 = 0.3;
 
+/// Share of the rotors' largest thrust that the largest tilt counts on. The rest is left for moments. Not in the paper.
+pub const THRUST_SHARE: f32 = 0.95;
+/// Vertical thrust that the largest tilt leaves, if the law asks for it, as a share of the hover thrust: a climb has to
+/// wait. Not in the paper.
+pub const HOLDS_HEIGHT: f32 = 1.1;
+/// Share of the hover thrust that the largest tilt leaves in addition per speed of a descent, enough to stop it in 0.2
+/// seconds \[s/m\]. Not in the paper.
+pub const STOPS_DESCENT_S_M: f32 = 0.5;
+/// Share of the largest thrust that is kept for horizontal motion while the height needs all of it, as PX4's
+/// MPC_THR_XY_MARG. Not in the paper.
+pub const HORIZONTAL_MARGIN: f32 = 0.3;
+
 /// The computation with its constants. Everything that changes in flight is in [`DesiredMemory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DesiredAttitude {
@@ -34,6 +46,9 @@ pub struct DesiredAttitude {
     tilt_max_rad: f32,
     tilt_max_tan: f32,
     acceleration_max_m_s2: f32,
+    /// Largest angular accelerations of roll and pitch that are fed forward: those that the rotors can give in hover
+    /// \[rad/s2\].
+    authority_rad_s2: [f32; 2],
     tilt_by_thrust: bool,
     by_rotation: bool,
     feed_forward: bool,
@@ -103,11 +118,17 @@ fn within([x, y]: [f32; 2], max: f32) -> [f32; 2] {
 }
 
 impl DesiredAttitude {
-    /// Creates the computation from valid settings, for rotors that give at most `thrust_max_n` together.
+    /// Creates the computation from valid settings, for rotors that give at most `thrust_max_n` together, and in hover
+    /// at most these angular accelerations of roll and pitch.
     ///
     /// # Errors
     /// Returns the first bandwidth or rate that is out of range.
-    pub fn new(settings: &Settings, gravity_m_s2: f32, thrust_max_n: f32) -> Result<Self, OutOfRange> {
+    pub fn new(
+        settings: &Settings,
+        gravity_m_s2: f32,
+        thrust_max_n: f32,
+        authority_rad_s2: [f32; 2],
+    ) -> Result<Self, OutOfRange> {
         let Settings { command_filter_rad_s, limits, tilt_by_thrust, by_rotation, feed_forward, bumpless, .. } =
             *settings;
         let dt_s = settings.common.dt_s;
@@ -123,6 +144,7 @@ impl DesiredAttitude {
             tilt_max_rad: limits.tilt_max_rad,
             tilt_max_tan: math::tan(limits.tilt_max_rad),
             acceleration_max_m_s2: limits.acceleration_max_m_s2,
+            authority_rad_s2,
             tilt_by_thrust,
             by_rotation,
             feed_forward,
@@ -131,20 +153,25 @@ impl DesiredAttitude {
     }
 
     /// Returns roll and pitch for u5, u6 \[m/s2\] and U4 \[N\], and advances the memory by one step. `low_tan` is the
-    /// tangent of the largest tilt allowed near the ground.
+    /// tangent of the largest tilt allowed near the ground; the vehicle climbs with `climb_m_s`.
     #[inline(always)]
     pub fn advance(
         &self,
         memory: &mut DesiredMemory,
         [u5, u6, u4]: [f32; 3],
-        [hover_n, low_tan]: [f32; 2],
+        [hover_n, low_tan, climb_m_s]: [f32; 3],
         attitude: &Attitude,
         [reference, setpoint]: [&Setpoint; 2],
     ) -> DesiredRollPitch {
         // (40) must not count on more thrust than the rotors can give.
         let thrust_n = math::min(u4, self.thrust_max_n);
-        let (vertical, inverse_vertical) = self.vertical(thrust_n * attitude.roll_pitch.tilt_cosine(), hover_n);
-        let tilt_max_tan = math::min(self.tilt_max_tan, low_tan);
+        let tilt_cosine = attitude.roll_pitch.tilt_cosine();
+        let (vertical, inverse_vertical) = self.vertical(thrust_n * tilt_cosine, hover_n);
+        let tilt_max_tan = self.room_tan(
+            math::min(self.tilt_max_tan, low_tan),
+            u4 * tilt_cosine,
+            hover_n * (HOLDS_HEIGHT + STOPS_DESCENT_S_M * math::max(-climb_m_s, 0.0)),
+        );
         // The direction is kept.
         let [a5, a6] = within([u5, u6], math::min(vertical * tilt_max_tan, self.acceleration_max_m_s2));
         // With the reference's yaw, the desired attitude does not depend on the measured yaw.
@@ -192,6 +219,24 @@ impl DesiredAttitude {
         }
     }
 
+    /// Returns the tangent of the largest tilt, `tilt_max_tan` or the smaller one at which the rotors still give the
+    /// vertical thrust `upward_n` that the law asks for, up to `enough_n`: height comes before horizontal motion.
+    #[inline(always)]
+    fn room_tan(&self, tilt_max_tan: f32, upward_n: f32, enough_n: f32) -> f32 {
+        if !self.tilt_by_thrust {
+            return tilt_max_tan;
+        }
+        let upward_n = math::max(math::min(upward_n, enough_n), 0.0);
+        let most_n = THRUST_SHARE * self.thrust_max_n;
+        let most = most_n * most_n;
+        if upward_n * upward_n * (1.0 + tilt_max_tan * tilt_max_tan) <= most {
+            return tilt_max_tan;
+        }
+        // Positive, since so is `most`.
+        let upward = math::min(upward_n * upward_n, most * (1.0 - HORIZONTAL_MARGIN * HORIZONTAL_MARGIN));
+        math::min(tilt_max_tan, math::sqrt((most - upward) / upward))
+    }
+
     /// Returns the vertical part of the thrust per mass \[m/s2\], g in hover as in (39), and its inverse.
     #[inline(always)]
     fn vertical(&self, upward_n: f32, hover_n: f32) -> (f32, f32) {
@@ -228,7 +273,10 @@ impl DesiredAttitude {
         let thrust_m_s3 = up.dot(&(turning - offset));
         let turning = turning - Vector3::z() * offset.z;
         let [rates, _] = tilt.turned(&turning, &snap, turn);
-        let [_, accelerations] = tilt.turned(&(turning + (gradual - jerk)), &snap, turn);
+        let [_, mut accelerations] = tilt.turned(&(turning + (gradual - jerk)), &snap, turn);
+        for (acceleration, most) in accelerations.iter_mut().zip(self.authority_rad_s2) {
+            *acceleration = math::limited(*acceleration, most);
+        }
         ([rates, accelerations], thrust_m_s3)
     }
 

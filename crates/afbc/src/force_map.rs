@@ -2,7 +2,7 @@
 //! same velocity. Not in the paper, whose fuzzy systems over errors forget when the error vanishes.
 //!
 //! ```text
-//! f = Theta' w(v_x, v_y) + f_hat        dTheta/dt = gamma f_hat w(v_x, v_y),  |Theta_j| <= Theta_max
+//! f = Theta' w(v_x, v_y) + f_hat        dTheta/dt = gamma f_hat w(v_x, v_y),  |Theta| <= Theta_max
 //! ```
 //!
 //! x and y have nine rules each, as in (22) and (34) with the prediction error in place of e_2: f_hat is what the
@@ -17,8 +17,8 @@ use afbc_control::math;
 use afbc_types::OutOfRange;
 use nalgebra::Matrix3;
 
-/// Largest |Theta_j| \[m/s2\].
-pub const THETA_MAX_M_S2: f32 = 10.0;
+/// Largest |Theta| of x and of y \[m/s2\]: 10 m/s2, a wind of some 20 m/s, at each of the nine rules.
+pub const THETA_MAX_M_S2: f32 = 30.0;
 /// Width of the Gaussians divided by their distance.
 const WIDTH: f32 = 0.6;
 
@@ -26,7 +26,7 @@ const WIDTH: f32 = 0.6;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceMap {
     basis: FuzzyBasis,
-    /// gamma times the time step.
+    /// gamma times two time steps, since x and y learn in turn.
     share: f32,
 }
 
@@ -35,7 +35,12 @@ pub struct ForceMap {
 pub struct ForceMapWeights {
     /// Theta.
     pub theta: [Matrix3<f32>; 2],
+    /// True if y learns in the next step, not x.
+    y_learns: bool,
 }
+
+/// Smaller f_hat is not learnt \[m/s2\].
+const SETTLED_M_S2: f32 = 1e-9;
 
 impl ForceMap {
     /// Creates the memory with the rate `gamma_1_s` (valid), the step `dt_s` and outer rules at `speed_m_s` along each
@@ -45,7 +50,7 @@ impl ForceMap {
     /// Returns an error if the speed is out of range.
     pub fn new(gamma_1_s: f32, speed_m_s: f32, dt_s: f32) -> Result<Option<Self>, OutOfRange> {
         let basis = FuzzyBasis::new(Membership { centre: speed_m_s, width: WIDTH * speed_m_s })?;
-        Ok((gamma_1_s > 0.0).then_some(ForceMap { basis, share: gamma_1_s * dt_s }))
+        Ok((gamma_1_s > 0.0).then_some(ForceMap { basis, share: 2.0 * gamma_1_s * dt_s }))
     }
 
     /// Returns the weights of the rules at a velocity \[m/s\].
@@ -55,16 +60,17 @@ impl ForceMap {
         first * (second * share).transpose()
     }
 
-    /// Learns f_hat \[m/s2\] at these weights.
+    /// Learns f_hat \[m/s2\] at these weights: x and y in turn, which takes half the time.
     #[inline]
-    pub fn learn(&self, remembered: &mut ForceMapWeights, weights: &Matrix3<f32>, f_hat_m_s2: [f32; 2]) {
-        for (theta, f_hat) in remembered.theta.iter_mut().zip(f_hat_m_s2) {
-            *theta = (*theta + weights * (self.share * f_hat)).map(math::settled);
-            // If the norm is within the bound, so is every element: one comparison is enough.
-            if theta.norm_squared() <= THETA_MAX_M_S2 * THETA_MAX_M_S2 {
-                continue;
-            }
-            *theta = theta.map(|theta| math::limited(theta, THETA_MAX_M_S2));
+    pub fn learn(&self, remembered: &mut ForceMapWeights, weights: &Matrix3<f32>, [x, y]: [f32; 2]) {
+        let ForceMapWeights { theta: [theta_x, theta_y], y_learns } = remembered;
+        let (theta, f_hat) = if *y_learns { (theta_y, y) } else { (theta_x, x) };
+        *y_learns = !*y_learns;
+        // Settled here, f_hat keeps subnormal numbers out of Theta in fewer instructions than Theta itself.
+        *theta += weights * (self.share * if f_hat.abs() < SETTLED_M_S2 { 0.0 } else { f_hat });
+        let square = theta.norm_squared();
+        if square > THETA_MAX_M_S2 * THETA_MAX_M_S2 {
+            *theta *= THETA_MAX_M_S2 / math::sqrt(square);
         }
     }
 }

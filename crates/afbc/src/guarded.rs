@@ -4,11 +4,12 @@
 use crate::adaptive::{self, Adaptive, AdaptiveEstimate};
 use crate::cascade::{CascadeMemory, Controller, LastStep, Settings};
 use crate::integral::{IntegralBackstepping, IntegralMemory};
+use crate::limits::PositionControlLimits;
 use crate::model::ModelConstants;
 use crate::monitor::{Monitor, MonitorBounds, MonitorFigures};
 use crate::safeguards::Safeguards;
 use crate::trip::Trip;
-use afbc_control::{Action, Errors, FlightController, Mixer, Trace};
+use afbc_control::{Action, Errors, FlightController, Mixer, Trace, math};
 use afbc_types::{Airframe, Axis, OutOfRange, PerAxis, Range, Setpoint, State};
 
 /// Smallest accepted Theta_max of z, in weights. With feed-forward, rotors that give 45 % of their thrust need 1.2
@@ -21,6 +22,10 @@ const fn hover_theta(feed_forward: bool) -> f32 {
 /// Accepted angular acceleration about body x and y near hover. The gains of the profile `flight` need half the value
 /// of the paper's vehicle, and fail below 60 rad/s2 (`tests/tests/vehicles.rs`).
 pub const HOVER_AUTHORITY: Range = Range::new("hover_authority_rad_s2", 80.0, 1e9);
+
+/// Largest tilt of the fallback law \[rad\]: 45 degrees, as PX4's MPC_TILTMAX_AIR. A vehicle that swings with saturated
+/// rotors calms down with it, and not with larger ones.
+const FALLBACK_TILT_MAX_RAD: f32 = core::f32::consts::FRAC_PI_4;
 
 /// AFBC with a monitor and a fallback law.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,9 +110,11 @@ impl<const N: usize> Guarded<N> {
         HOVER_AUTHORITY.check(roll_n * model.hover_gain(Axis::Roll))?;
         HOVER_AUTHORITY.check(pitch_n * model.hover_gain(Axis::Pitch))?;
         let fixed = gains.map(|gains| gains.into());
+        let tilt_max_rad = math::min(settings.limits.tilt_max_rad, FALLBACK_TILT_MAX_RAD);
+        let careful = Settings { limits: PositionControlLimits { tilt_max_rad, ..settings.limits }, ..settings };
         Ok(Guarded {
             adaptive: Controller::new(vehicle, settings, Adaptive::new(gains)?)?,
-            fallback: Controller::new(vehicle, settings, IntegralBackstepping::new(&parameters, fixed)?)?,
+            fallback: Controller::new(vehicle, careful, IntegralBackstepping::new(&parameters, fixed)?)?,
             monitor: Monitor::new(bounds, settings.common.dt_s)?,
         })
     }

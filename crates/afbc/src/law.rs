@@ -53,9 +53,10 @@ pub struct StepContext<'a> {
     pub adapt: bool,
     /// Part of each subsystem's input that the last step could not allocate; zero without anti-windup.
     pub unallocated: &'a PerAxis<f32>,
-    /// f of x, y and z \[m/s2\]: drag, plus for x and y the observed part ([`crate::disturbance`]). Zero without an
-    /// observer.
+    /// f of x, y and z \[m/s2\]: drag, plus the observed part ([`crate::disturbance`]). Zero without an observer.
     pub observed_m_s2: Vector3<f32>,
+    /// Factor on the speed of z, below 1 for old states.
+    pub softness: f32,
     /// Nominal model for feed-forward, `None` for the law as printed.
     pub known: Option<&'a ModelConstants>,
 }

@@ -37,6 +37,7 @@
 #![no_std]
 
 pub mod adaptive;
+pub mod age;
 pub mod backstepping;
 pub mod cascade;
 pub mod delay_compensation;

@@ -48,8 +48,7 @@ parameters! {
         /// the body rates. Otherwise, errors are differences of Euler angles and rates their derivatives.
         #[switch(ROTATION)]
         pub by_rotation: bool = false,
-        /// Observer of the horizontal acceleration that the nominal model does not explain; needs the known part of
-        /// (16).
+        /// Observer of the acceleration that the nominal model does not explain; needs the known part of (16).
         #[group("")]
         pub disturbance: DisturbanceObserver = DisturbanceObserver::DEFAULT,
         /// Reference model between the setpoint and the law.

@@ -26,6 +26,12 @@ pub const MOVING_M_S: f32 = 0.5;
 pub const STILL_S: f32 = 0.2;
 /// Change of height at which the vehicle has left the ground \[m\].
 pub const LEFT_M: f32 = 0.05;
+/// Downward speed of the reference above which it descends \[m/s\].
+pub const SINKS_M_S: f32 = 0.2;
+/// Share of the reference's speed below which the vehicle does not follow its descent.
+pub const STOPPED_SHARE: f32 = 0.5;
+/// Observed acceleration upwards from which something holds a vehicle that does not follow its descent \[m/s2\].
+pub const PUSHED_M_S2: f32 = 3.0;
 /// Tangent of the largest tilt on the ground: 12 degrees, as in other autopilots.
 const TOUCHING_TAN: f32 = 0.21;
 /// Growth of that tangent with the height above the ground \[1/m\], and height from which the tilt is free \[m\].
@@ -60,14 +66,24 @@ impl StandstillDetector {
         self.ground_contact = Some(GroundContact { height_m: None, since_s: 0.0, risen_m: -1.0 });
     }
 
-    /// Processes one step with the demanded U4 \[N\].
+    /// Processes one step with the demanded U4 and the weight \[N\], the reference's velocity \[m/s\] and the observed
+    /// acceleration \[m/s2\], both along z.
     #[inline]
-    pub fn advance(&mut self, thrust_n: f32, weight_n: f32, state: &State, dt_s: f32) {
+    pub fn advance(
+        &mut self,
+        [thrust_n, weight_n]: [f32; 2],
+        state: &State,
+        [reference_m_s, observed_m_s2]: [f32; 2],
+        dt_s: f32,
+    ) {
         let slower = |speed_max| state.velocity_m_s.iter().all(|v| v.abs() < speed_max);
         let speed_max = if self.is_standing() { MOVING_M_S } else { STILL_M_S };
-        self.still_s = if thrust_n < LIFT_SHARE * weight_n && slower(speed_max) { self.still_s + dt_s } else { 0.0 };
+        let lacks_lift = thrust_n < LIFT_SHARE * weight_n;
+        self.still_s = if lacks_lift && slower(speed_max) { self.still_s + dt_s } else { 0.0 };
+        let is_stopped = || reference_m_s < -SINKS_M_S && state.velocity_m_s.z > STOPPED_SHARE * reference_m_s;
+        let has_touched = observed_m_s2 > PUSHED_M_S2 && lacks_lift && is_stopped();
         // A standing vehicle is landed anew in every step, so that its height counts from where it stood last.
-        if self.is_standing() {
+        if self.is_standing() || has_touched {
             self.land();
         }
         if let Some(GroundContact { height_m, since_s, risen_m }) = &mut self.ground_contact {

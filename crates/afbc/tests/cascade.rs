@@ -133,6 +133,7 @@ fn compose<L: SubsystemLaw + Copy>(
             adapt: true,
             unallocated: &carried.unallocated,
             observed_m_s2: Vector3::zeros(),
+            softness: 1.0,
             known: settings.feed_forward.then_some(&model),
         };
         // The thrust leads by the rotor lag, because there are no filters, and follows the reference.
@@ -187,7 +188,16 @@ fn compose<L: SubsystemLaw + Copy>(
             GRAVITY_M_S2
         };
         let tilt_max = f64::from(settings.limits.tilt_max_rad);
-        let most = (vertical * tilt_max.tan()).min(f64::from(settings.limits.acceleration_max_m_s2));
+        // Height comes first: at the largest tilt the rotors still give the vertical thrust that the law asks for, up
+        // to 1.1 times the hover thrust and half of it more per m/s of a descent, or leave a horizontal margin of three
+        // tenths.
+        let enough = 1.1 + 0.5 * f64::from(-state.velocity_m_s.z).max(0.0);
+        let upward_n = (f64::from(seen.z) * eta.x.cos() * eta.y.cos()).min(enough * f64::from(hover_n));
+        let most_n = 0.95 * thrust_max_n;
+        let kept_n = upward_n.min(most_n * 0.91_f64.sqrt());
+        let room = (most_n.powi(2) - kept_n.powi(2)).sqrt() / kept_n;
+        let room = if settings.tilt_by_thrust && kept_n > 0.0 { room } else { f64::INFINITY };
+        let most = (vertical * tilt_max.tan().min(room)).min(f64::from(settings.limits.acceleration_max_m_s2));
         let asked = [f64::from(seen.x), f64::from(seen.y)];
         let scale = (most / asked[0].hypot(asked[1])).min(1.0);
         let ahead = asked.map(|u| u * scale);
@@ -219,7 +229,10 @@ fn compose<L: SubsystemLaw + Copy>(
         let forward = match settings.feed_forward {
             true => {
                 let (before, now, after) = (along(-STEP_S, gradual), along(0.0, gradual), along(STEP_S, gradual));
-                [0, 1].map(|i| (after[i] - 2.0 * now[i] + before[i]) / (STEP_S * STEP_S))
+                // No more than the rotors can give in hover.
+                let most_n = controller.mixer().tilt_authority_n(WEIGHT_N as f32);
+                let most = [0, 1].map(|i| f64::from(most_n[i] * model.hover_gain([Axis::Roll, Axis::Pitch][i])));
+                [0, 1].map(|i| ((after[i] - 2.0 * now[i] + before[i]) / (STEP_S * STEP_S)).clamp(-most[i], most[i]))
             }
             false => [0.0; 2],
         };

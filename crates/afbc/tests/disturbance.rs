@@ -1,9 +1,10 @@
 //! Compares the disturbance observer with its closed solution, and checks which effects it must not see as a
 //! disturbance.
 
+use crate::common::measured;
 use afbc::Settings;
 use afbc::disturbance::{
-    ACCELERATION_MAX_M_S2, DisturbanceObserver, ForceObserver, ForceObserverMemory, JUMP_M_S, ObserverConditions,
+    ACCELERATION_MAX_M_S2, DisturbanceObserver, ForceObserver, ForceObserverMemory, ObserverConditions, UNSEEN_S,
 };
 use afbc_control::Settings as Common;
 use afbc_control::drag::KnownDrag;
@@ -12,6 +13,8 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 
 const DT_S: f32 = 0.001;
+/// Largest difference of the velocity that is no jump \[m/s\].
+const JUMP_M_S: f32 = ACCELERATION_MAX_M_S2 * UNSEEN_S;
 
 fn observer(disturbance_rad_s: f32) -> ForceObserver {
     let settings = DisturbanceObserver { disturbance_rad_s, ..DisturbanceObserver::DEFAULT };
@@ -114,6 +117,153 @@ fn a_jump_is_no_disturbance() {
     }
 }
 
+/// Up to a noise of 10 cm/s, f is found. Up to 6 cm/s the noise of f_hat is no larger than at 1 cm/s.
+#[test]
+fn noise_of_the_velocity_does_not_become_a_force() {
+    let observer = observer(28.7);
+    let rms = |noise_m_s: f32| {
+        let mut state = 54_u32;
+        // Twelve uniform numbers make a nearly normal one.
+        let mut white = || {
+            let uniform = |_| {
+                state ^= state << 13;
+                state ^= state >> 17;
+                state ^= state << 5;
+                state as f32 / 2.0_f32.powi(32) - 0.5
+            };
+            (0..12).map(uniform).sum::<f32>() * noise_m_s
+        };
+        let mut body = Body::new(Vector3::zeros(), weight_n());
+        let (mut squares, mut mean) = (0.0_f32, 0.0_f32);
+        for step in 0..20_000 {
+            let noise = Vector3::new(white(), white(), 0.0);
+            body.state.velocity_m_s += noise;
+            let seen = body.step(&observer, [1.0, -0.5]);
+            body.state.velocity_m_s -= noise;
+            if step >= 5_000 {
+                squares += (seen.x - 1.0).powi(2) / 15_000.0;
+                mean += seen.x / 15_000.0;
+            }
+        }
+        assert!((mean - 1.0).abs() < 0.05, "{noise_m_s} m/s: {mean} m/s2");
+        squares.sqrt()
+    };
+    let quiet = rms(0.01);
+    assert!((0.01..0.1).contains(&quiet), "{quiet}");
+    for (noise_m_s, most) in [(0.02, 1.2), (0.04, 1.2), (0.06, 1.2), (0.1, 1.2)] {
+        let noisy = rms(noise_m_s);
+        assert!(noisy < most * quiet, "{noise_m_s} m/s: {noisy} m/s2, {quiet} m/s2 at 1 cm/s");
+    }
+}
+
+/// A vehicle that moves along z, with the observer along z alone.
+struct Lift {
+    observer: ForceObserver,
+    memory: Option<ForceObserverMemory>,
+    /// True velocities along z, newest last \[m/s\].
+    velocities: Vec<f32>,
+}
+
+impl Lift {
+    fn new() -> Self {
+        let settings =
+            DisturbanceObserver { disturbance_z_rad_s: 30.0, disturbance_lag_s: 0.0, ..DisturbanceObserver::DEFAULT };
+        let observer = ForceObserver::new(&settings, &Common::DEFAULT, &Parameters::PAPER.to_f32()).unwrap().unwrap();
+        Lift { observer, memory: None, velocities: vec![0.0] }
+    }
+
+    /// Flies one step with `share` of the weight as thrust, from rotors that give `strength` of it, in an upward force.
+    /// The measured velocity is `late` steps old. Returns f along z.
+    fn step(&mut self, [share, strength, f_m_s2]: [f32; 3], late: usize) -> f32 {
+        let now = self.velocities.len() - 1;
+        let velocity_m_s = Vector3::new(0.0, 0.0, self.velocities[now.saturating_sub(late)]);
+        let (state, up) = (State { velocity_m_s, ..State::default() }, Vector3::z());
+        let hover_n = self.observer.hover_thrust_n(&self.memory).unwrap_or(weight_n());
+        let seen = self.observer.advance(&mut self.memory, &state, &up, hover_n, conditions(true, false));
+        self.observer.record_thrust(&mut self.memory, share * weight_n());
+        self.velocities.push(self.velocities[now] + DT_S * (9.81 * (share * strength - 1.0) + f_m_s2));
+        seen.z
+    }
+
+    fn softness(&self) -> f32 {
+        self.memory.unwrap().softness()
+    }
+}
+
+/// Along z, f counteracts weak rotors at once, and the hover thrust takes the weakness over. Their sum is what a hover
+/// needs.
+#[test]
+fn the_hover_thrust_is_learnt_from_the_observed_force() {
+    for strength in [0.6_f32, 0.9, 1.2] {
+        let mut flight = Lift::new();
+        let (mut share, mut f) = (1.0, 0.0);
+        for step in 0..5_000 {
+            // A small motion keeps the velocity from repeating itself.
+            let motion = 0.01 * (0.02 * step as f32).sin();
+            f = flight.step([share + motion, strength, 0.0], 0);
+            // The thrust that compensates f.
+            share = 1.0 - f / 9.81;
+            if step == 300 {
+                assert!((share * strength - 1.0).abs() < 0.05, "{strength}: {share} after 0.3 s");
+            }
+        }
+        let hover_n = flight.observer.hover_thrust_n(&flight.memory).unwrap();
+        assert!((hover_n / weight_n() * strength - 1.0).abs() < 0.02, "{strength}: {hover_n} N");
+        assert!((share * strength - 1.0).abs() < 0.02, "{strength}: {share}, {f} m/s2");
+    }
+}
+
+/// The age of the velocity shows in the motion that the thrust causes, whatever force acts beside it. New states show
+/// none, and old ones soften z. An age that ends is forgotten.
+#[test]
+fn old_states_are_told_by_the_thrust() {
+    for f_m_s2 in [0.0, 0.8] {
+        for (late, range) in [(0, 0.95..=1.0), (5, 0.9..=1.0), (30, 0.45..=0.7), (40, 0.35..=0.6)] {
+            let mut flight = Lift::new();
+            let mut fly = |late, seconds: u32| {
+                for step in 0..seconds * 1000 {
+                    let t = step as f32 * DT_S;
+                    let thrust = 1.0 + 0.08 * (12.0 * t).sin() + 0.05 * (19.0 * t).cos();
+                    flight.step([thrust, 1.0, f_m_s2 * (1.3 * t).sin()], late);
+                }
+                flight.softness()
+            };
+            let soft = fly(late, 8);
+            assert!(range.contains(&soft), "{late} ms, {f_m_s2} m/s2: {soft}");
+            assert!(fly(0, 8) > 0.95, "{late} ms, {f_m_s2} m/s2");
+        }
+    }
+}
+
+/// A velocity that is measured every 5 to 20 ms shows the same force as one of every step.
+#[test]
+fn slow_velocities_show_the_same_force() {
+    for period in [5_u16, 10, 20] {
+        let observer = observer(20.0);
+        let mut body = Body::new(Vector3::zeros(), weight_n());
+        let mut measured = body.state;
+        for step in 0..1_000_u16 {
+            if step % period == 0 {
+                measured = body.state;
+            }
+            let up = body.up();
+            let seen = observer.advance(&mut body.memory, &measured, &up, weight_n(), conditions(true, false));
+            observer.record_thrust(&mut body.memory, weight_n());
+            body.state.velocity_m_s.x += 3.0 * DT_S;
+            let wt = 20.0 * f32::from(step) * DT_S;
+            let [early, late] = [1.35 * wt, 0.65 * wt - 20.0 * DT_S * f32::from(period)].map(|wt| {
+                let wt = wt.max(0.0);
+                3.0 * (1.0 - (1.0 + wt) * (-wt).exp())
+            });
+            assert!(
+                (late - 0.1..=early + 0.1).contains(&seen.x),
+                "{period} ms, step {step}: {late} {} {early}",
+                seen.x
+            );
+        }
+    }
+}
+
 /// A repeated state changes nothing, and on the ground the disturbance is zero.
 #[test]
 fn it_waits_for_states_and_forgets_on_the_ground() {
@@ -186,7 +336,7 @@ fn a_slower_observer_is_the_same_on_a_slower_clock() {
         let (mut memory, state, up) = (None, State::default(), Vector3::new(0.05_f32.sin(), 0.0, 0.05_f32.cos()));
         (0..100_u16)
             .map(|_| {
-                let seen = observer.advance(&mut memory, &state, &up, weight_n(), conditions(true, false));
+                let seen = observer.advance(&mut memory, &measured(&state), &up, weight_n(), conditions(true, false));
                 // Half of the thrust is given, but the vehicle does not move, so the rotor lag matters.
                 observer.record_thrust(&mut memory, 0.5 * weight_n());
                 seen.x

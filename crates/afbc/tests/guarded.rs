@@ -2,9 +2,10 @@
 //! engages AFBC again. `tests/tests/guarded.rs` has closed loops.
 #![allow(clippy::unwrap_used, missing_docs)] // a failed construction must stop the test
 
-use crate::common::{Stepped, U, check_step, gains, plausible, setpoint, settings, state, step, value};
+use crate::common::{Stepped, U, check_step, gains, measured, plausible, setpoint, settings, state, step, value};
 use afbc::adaptive::Gains;
 use afbc::disturbance::DisturbanceObserver;
+use afbc::limits::PositionControlLimits;
 use afbc::monitor::MonitorBounds;
 use afbc::reference::ReferenceModel;
 use afbc::standstill::LIFT_SHARE;
@@ -28,6 +29,8 @@ fn direct() -> Settings {
         reference: ReferenceModel::DEFAULT,
         smoothing: Smoothing::DEFAULT,
         disturbance: DisturbanceObserver {
+            // The vehicle of these tests does not fall, however small its thrust.
+            disturbance_z_rad_s: 0.0,
             disturbance_tilt_rad_s: 0.0,
             disturbance_yaw_rad_s: 0.0,
             ..settings.disturbance
@@ -68,13 +71,16 @@ fn near() -> impl Strategy<Value = State> {
 /// Checks that there is no jump, apart from rounding of a few operations and one step of learning.
 fn same(before: &Stepped, after: &Stepped) -> Result<(), TestCaseError> {
     let (errors, gains) = (before.trace.errors, Profile::Flight.gains());
+    // A vehicle that does not move although it is tilted by 0.05 rad about both axes shows this force.
+    let force_m_s2 = 0.7 * f64::from(before.trace.inputs.thrust_n / WEIGHT_N);
     let (before, after) = (before.per_axis(), after.per_axis());
     for axis in Axis::ALL {
         let (before, after) = (f64::from(before[axis]), f64::from(after[axis]));
         let learnt = 1e-3 * f64::from(gains[axis].gamma * errors[axis].e2).abs();
-        // The observed value of 1 m/s2 changes by at most w/e per second.
+        // The observed value of a force of 1 m/s2 changes by at most w/e per second.
         let w = f64::from(direct().disturbance.disturbance_rad_s);
-        let observed = if matches!(axis, Axis::X | Axis::Y) { 1e-3 * w / core::f64::consts::E } else { 0.0 };
+        let observed =
+            if matches!(axis, Axis::X | Axis::Y) { 1e-3 * w / core::f64::consts::E * force_m_s2.max(1.0) } else { 0.0 };
         let allowed = 16.0 * U * (before.abs() + 20.0) + 1.001 * learnt + observed;
         prop_assert!((before - after).abs() <= allowed, "{axis:?}: {before}, then {after}");
     }
@@ -155,7 +161,7 @@ proptest! {
             Setpoint { position_m: setpoint.position_m, velocity_m_s: setpoint.velocity_m_s, ..Setpoint::default() };
         let controller = guarded(hair_trigger());
         let mut memory = Flight::default();
-        let last_of_afbc = step(&controller, &mut memory, &state, &setpoint);
+        let last_of_afbc = step(&controller, &mut memory, &measured(&state), &setpoint);
         prop_assert_eq!(
             (last_of_afbc.action.health.fallback, memory.control.trip()),
             (None, Some(Trip::Theta(Axis::Roll)))
@@ -164,20 +170,20 @@ proptest! {
         // AFBC is engaged at once, before the first step of the fallback law.
         let mut at_once = memory;
         controller.engage(&mut at_once.control);
-        let first_of_afbc = step(&controller, &mut at_once, &state, &setpoint);
+        let first_of_afbc = step(&controller, &mut at_once, &measured(&state), &setpoint);
         prop_assert_eq!(first_of_afbc.action.health.fallback, None);
         position_is_the_same(&last_of_afbc, &first_of_afbc)?;
 
-        let mut last_of_fallback = step(&controller, &mut memory, &state, &setpoint);
+        let mut last_of_fallback = step(&controller, &mut memory, &measured(&state), &setpoint);
         prop_assert_eq!(last_of_fallback.action.health.fallback, memory.control.trip().map(Trip::reason));
         position_is_the_same(&last_of_afbc, &last_of_fallback)?;
         for _ in 0..lasting {
-            last_of_fallback = step(&controller, &mut memory, &state, &setpoint);
+            last_of_fallback = step(&controller, &mut memory, &measured(&state), &setpoint);
         }
         // With less thrust, the vehicle might stand on the ground by then, and the monitor does not trip on the ground.
         prop_assume!(last_of_fallback.trace.inputs.thrust_n >= LIFT_SHARE * WEIGHT_N);
         controller.engage(&mut memory.control);
-        let first_of_afbc = step(&controller, &mut memory, &state, &setpoint);
+        let first_of_afbc = step(&controller, &mut memory, &measured(&state), &setpoint);
         prop_assert_eq!((first_of_afbc.action.health.fallback, memory.control.trip().is_some()), (None, true));
         position_is_the_same(&last_of_fallback, &first_of_afbc)?;
     }
@@ -401,7 +407,7 @@ fn a_reckoned_motion_shows_no_disturbance() {
                 }
                 let (position_m, velocity_m_s) = (state.position_m, state.velocity_m_s);
                 let setpoint = Setpoint { position_m, velocity_m_s, ..Setpoint::default() };
-                [asked, _] = step(controller, &mut memory, &state, &setpoint).trace.virtual_m_s2;
+                [asked, _] = step(controller, &mut memory, &measured(&state), &setpoint).trace.virtual_m_s2;
                 state.velocity_m_s.x += 1e-3 * accelerates_m_s2;
             }
             asked
@@ -436,7 +442,7 @@ fn a_reckoned_motion_shows_the_fallback_law_no_disturbance() {
                 }
                 let (position_m, velocity_m_s) = (state.position_m, state.velocity_m_s);
                 let setpoint = Setpoint { position_m, velocity_m_s, ..Setpoint::default() };
-                let stepped = step(&controller, &mut memory, &state, &setpoint);
+                let stepped = step(&controller, &mut memory, &measured(&state), &setpoint);
                 assert!(stepped.action.health.fallback.is_some());
                 [asked, _] = stepped.trace.virtual_m_s2;
                 state.velocity_m_s.x += 1e-3 * accelerates_m_s2;
@@ -467,7 +473,7 @@ fn engaging_is_bumpless_where_no_even_estimate_fits() {
     let setpoint = Setpoint { yaw_rad: 0.9, jerk_m_s3, ..Setpoint::default() };
     let mut before = Stepped::default();
     for _ in 0..100_000 {
-        before = step(&controller, &mut memory, &state, &setpoint);
+        before = step(&controller, &mut memory, &measured(&state), &setpoint);
         let Inputs { roll_n, pitch_n, .. } = before.trace.inputs;
         if roll_n.abs().min(pitch_n.abs()) > 1.4 {
             break;
@@ -475,7 +481,7 @@ fn engaging_is_bumpless_where_no_even_estimate_fits() {
     }
     assert!(before.action.health.fallback.is_some() && !before.action.health.saturated, "{before:?}");
     assert!(controller.engage(&mut memory.control));
-    let after = step(&controller, &mut memory, &state, &setpoint);
+    let after = step(&controller, &mut memory, &measured(&state), &setpoint);
     same(&before, &after).unwrap();
     let learnt = memory.control.estimates();
     for axis in [Axis::Roll, Axis::Pitch] {
@@ -520,6 +526,28 @@ fn tripped(steps: usize, aside_m: f32) -> (Stepped, Flight) {
         last = step(&touchy, &mut memory, &State::default(), &aside);
     }
     (last, memory)
+}
+
+/// AFBC tilts up to the limit of its settings, the fallback law up to 45 degrees or that limit.
+#[test]
+fn the_fallback_tilts_by_45_degrees_at_most() {
+    let far = Setpoint { position_m: Vector3::new(50.0, 0.0, 0.0), ..Setpoint::default() };
+    for (tilt_max_rad, fallback_rad) in [(1.0, core::f32::consts::FRAC_PI_4), (0.5, 0.5)] {
+        let limits = PositionControlLimits { tilt_max_rad, ..direct().limits };
+        let settings = Settings { limits, ..direct() };
+        for (bounds, expected_rad) in [(lax(), tilt_max_rad), (hair_trigger(), fallback_rad)] {
+            let paper = Parameters::PAPER.to_f32();
+            let controller = Guarded::new(paper, settings, Profile::Flight.gains(), bounds).unwrap();
+            let (mut memory, mut last_rad) = (Flight::default(), 0.0_f32);
+            let rolled = State { attitude_rad: Vector3::new(0.01, 0.0, 0.0), ..State::default() };
+            for _ in 0..200 {
+                let [_, pitch_rad] = step(&controller, &mut memory, &rolled, &far).trace.desired_rad;
+                last_rad = pitch_rad;
+            }
+            assert_eq!(memory.control.trip().is_some(), bounds == hair_trigger());
+            assert!((last_rad - expected_rad).abs() < 0.01, "{last_rad} rad, not {expected_rad}");
+        }
+    }
 }
 
 /// The next law keeps compensating an observed moment: no input jumps when the monitor trips or AFBC is engaged again.

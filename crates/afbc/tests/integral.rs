@@ -53,6 +53,7 @@ fn step(
         adapt,
         unallocated: &PerAxis { x: unallocated, ..PerAxis::default() },
         observed_m_s2: Vector3::zeros(),
+        softness: 1.0,
         known: None,
     };
     let (u, errors) = law.input(Axis::X, tracking, &context, integral);

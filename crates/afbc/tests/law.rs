@@ -1,7 +1,7 @@
 //! Properties of the laws: backstepping (9)-(16), (21), and AFBC (20)-(22), (32)-(34).
 #![allow(clippy::unwrap_used, missing_docs)] // a law that cannot be built must stop the test
 
-use afbc::adaptive::{Gains, Subsystem};
+use afbc::adaptive::{ControlTerms, Gains, Subsystem, SubsystemConditions};
 use afbc::backstepping::{self, ideal, proportional};
 use afbc::fuzzy::{FuzzyBasis, Membership};
 use afbc::integral::IntegralBackstepping;
@@ -113,6 +113,7 @@ proptest! {
             adapt: true,
             unallocated: &PerAxis::default(),
             observed_m_s2: Vector3::zeros(),
+            softness: 1.0,
             known: None,
         };
         let approach = law.approach(Axis::X, None);
@@ -157,6 +158,7 @@ proptest! {
             adapt: false,
             unallocated: &PerAxis::default(),
             observed_m_s2,
+            softness: 1.0,
             known: None,
         };
         let adaptive = Adaptive::new(PerAxis::from_fn(|_| gains)).unwrap();
@@ -171,7 +173,8 @@ proptest! {
                 Axis::Roll | Axis::Pitch | Axis::Yaw => nominal.f,
             };
             let known = ideal(&backstepping, &errors, tracking.x1d_ddot, &Dynamics { f, ..nominal });
-            let mut estimate = before;
+            // The robust term is another with feed-forward.
+            let mut estimate = AdaptiveEstimate { delta: 0.0, ..before };
             let (alone, _) = adaptive.input(axis, &tracking, &context, &mut estimate);
             let with_model = StepContext { known: Some(&model), ..context };
             let (whole, seen) = adaptive.input(axis, &tracking, &with_model, &mut estimate);
@@ -209,7 +212,8 @@ proptest! {
         estimate in estimate(),
     ) {
         let errors = tracking.errors(gains.backstepping.alpha1);
-        let (terms, _) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, 0.0);
+        let subsystem = Subsystem::new(gains).unwrap();
+        let (terms, _) = subsystem.law(&errors, inputs, &estimate, &SubsystemConditions::default());
         prop_assert_eq!(terms.sum(), terms.fuzzy + terms.robust + terms.proportional);
         prop_assert_eq!(terms.proportional, gains.backstepping.alpha2 * errors.e2); // (21)
 
@@ -225,6 +229,34 @@ proptest! {
         let s = (f64::from(errors.e2) / f64::from(gains.epsilon)).tanh();
         let delta = f64::from(estimate.delta);
         prop_assert!((f64::from(terms.robust) - delta * s).abs() <= delta * (1.4e-7 + 2.0 * U));
+
+        // With feed-forward: a product, a quotient and a sum.
+        let conditions = SubsystemConditions { printed: false, ..SubsystemConditions::default() };
+        let (soft, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, &conditions);
+        let (e2, epsilon) = (f64::from(errors.e2), f64::from(gains.epsilon));
+        let s = e2 / (e2.abs() + epsilon);
+        prop_assert!((f64::from(soft.robust) - delta * s).abs() <= 4.0 * U * delta * s.abs() + 1e-44);
+        let wanted = f64::from(gains.eta) * e2 * s;
+        prop_assert!((f64::from(rate.delta()) - wanted).abs() <= 8.0 * U * wanted + 1e-44);
+        prop_assert_eq!(ControlTerms { robust: terms.robust, ..soft }, terms);
+    }
+
+    /// Old states slow down learning, and nothing else.
+    #[test]
+    fn learning_slows_down_alone(
+        gains in gains(),
+        tracking in tracking(),
+        estimate in estimate(),
+        learning in 0.0_f32..1.0,
+    ) {
+        let (errors, subsystem) = (tracking.errors(gains.backstepping.alpha1), Subsystem::new(gains).unwrap());
+        let [(terms, rate), (same, slow)] = [1.0, learning].map(|learning| {
+            let conditions = SubsystemConditions { learning, ..SubsystemConditions::default() };
+            subsystem.law(&errors, [0.1, -0.2], &estimate, &conditions)
+        });
+        prop_assert_eq!((terms, rate.delta()), (same, slow.delta()));
+        let off = (slow.theta() - rate.theta() * learning).abs().max();
+        prop_assert!(off <= 1e-6 * rate.theta().abs().max() + 1e-30, "{off}");
     }
 
     /// (33), (34): Theta_hat changes with the sign of e_2, in proportion to the weights; delta_hat can only grow.
@@ -236,7 +268,7 @@ proptest! {
         estimate in estimate(),
     ) {
         let errors = tracking.errors(gains.backstepping.alpha1);
-        let (_, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, 0.0);
+        let (_, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &estimate, &SubsystemConditions::default());
         let w = FuzzyBasis::new(gains.membership).unwrap().weights(inputs);
         let e2 = f64::from(errors.e2);
         for (rate, w) in rate.theta().iter().zip(w.iter()) {
@@ -254,7 +286,6 @@ proptest! {
         let total: f64 = rate.theta().iter().copied().map(f64::from).sum();
         prop_assert!((total - f64::from(gains.gamma) * e2).abs() <= 20.0 * U * f64::from(gains.gamma) * e2.abs());
 
-        prop_assert_eq!(rate.leakage(), 0.0);
         prop_assert!(rate.delta() >= 0.0);
         let wanted = f64::from(gains.eta) * e2 * (e2 / f64::from(gains.epsilon)).tanh();
         prop_assert!((f64::from(rate.delta()) - wanted).abs() <= f64::from(gains.eta) * e2.abs() * (1.4e-7 + 5.0 * U));
@@ -277,7 +308,8 @@ proptest! {
                 Axis::Roll | Axis::Pitch | Axis::Yaw => [tracking.x1, tracking.x2],
                 Axis::Z | Axis::X | Axis::Y => [errors.e1, errors.e1_dot],
             };
-            let (terms, rate) = Subsystem::new(gains).unwrap().law(&errors, inputs, &before, 0.0);
+            let subsystem = Subsystem::new(gains).unwrap();
+            let (terms, rate) = subsystem.law(&errors, inputs, &before, &SubsystemConditions::default());
 
             let mut frozen = before;
             let context = StepContext {
@@ -288,6 +320,7 @@ proptest! {
                 adapt: false,
                 unallocated: &PerAxis::default(),
                 observed_m_s2: Vector3::zeros(),
+                softness: 1.0,
                 known: None,
             };
             let (u, seen) = law.input(axis, &tracking, &context, &mut frozen);
@@ -329,7 +362,12 @@ fn the_hover_thrust_is_what_carries_the_vehicle() {
     adaptive.start(&mut started, weight_n);
     assert_eq!(adaptive.hover_thrust_n(&started.z, weight_n, 0.0), weight_n);
     for inputs in [[0.0, 0.0], [3.0, -20.0], [-9.0, 1.0]] {
-        let (terms, _) = Subsystem::new(gains.z).unwrap().law(&Errors::default(), inputs, &started.z, 0.0);
+        let (terms, _) = Subsystem::new(gains.z).unwrap().law(
+            &Errors::default(),
+            inputs,
+            &started.z,
+            &SubsystemConditions::default(),
+        );
         assert!((terms.sum() - weight_n).abs() < 1e-5, "{terms:?}");
     }
     assert_eq!(PerAxis { z: AdaptiveEstimate::default(), ..started }, PerAxis::default());
@@ -364,17 +402,15 @@ fn an_error_is_approached_at_the_speed_that_the_law_holds() {
 #[test]
 fn a_gain_out_of_range_is_refused_by_name() {
     type Set = fn(&mut Gains, f32);
-    let cases: [(Declaration, Set); 11] = [
+    let cases: [(Declaration, Set); 9] = [
         (backstepping::Gains::ALPHA1, |g, v| g.backstepping.alpha1 = v),
         (backstepping::Gains::ALPHA2, |g, v| g.backstepping.alpha2 = v),
         (Gains::GAMMA, |g, v| g.gamma = v),
         (Gains::ETA, |g, v| g.eta = v),
         (Gains::EPSILON, |g, v| g.epsilon = v),
         (Safeguards::SIGMA, |g, v| g.safeguards.sigma = v),
-        (Safeguards::KAPPA, |g, v| g.safeguards.kappa = v),
         (Safeguards::THETAMAX, |g, v| g.safeguards.theta_max = v),
         (Safeguards::DELTAMAX, |g, v| g.safeguards.delta_max = v),
-        (Safeguards::DEADZONE, |g, v| g.safeguards.dead_zone = v),
         (Membership::WIDTH, |g, v| g.membership = Membership { centre: 2.0 * v, width: v }),
     ];
     for axis in Axis::ALL {

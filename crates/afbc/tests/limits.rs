@@ -91,7 +91,17 @@ proptest! {
         let thrust = command.trace.inputs.thrust_n.min(4.0 * settings.common.rotor_force_max_n);
         let upward = f64::from(thrust) * cosine / f64::from(WEIGHT_N);
         let vertical = if by_thrust { GRAVITY_M_S2 * upward.max(0.3) } else { GRAVITY_M_S2 };
-        let max = (vertical * f64::from(limits.tilt_max_rad).tan()).min(f64::from(limits.acceleration_max_m_s2));
+        // Height comes first: at the largest tilt the rotors still give the vertical thrust that the law asks for, up
+        // to 1.1 times the hover thrust and half of it more per m/s of a descent, or leave a horizontal margin of three
+        // tenths.
+        let enough = 1.1 + 0.5 * f64::from(-state.velocity_m_s.z).max(0.0);
+        let most_n = 0.95 * 4.0 * f64::from(settings.common.rotor_force_max_n);
+        let asked_n = (f64::from(command.trace.inputs.thrust_n) * cosine).min(enough * f64::from(WEIGHT_N));
+        let kept_n = asked_n.min(most_n * 0.91_f64.sqrt());
+        let room = (most_n * most_n - kept_n * kept_n).sqrt() / kept_n;
+        let room = if by_thrust && kept_n > 0.0 { room } else { f64::INFINITY };
+        let tilt = f64::from(limits.tilt_max_rad).tan().min(room);
+        let max = (vertical * tilt).min(f64::from(limits.acceleration_max_m_s2));
         let size = u5.hypot(u6);
         let scale = if size > max { max / size } else { 1.0 };
 

@@ -107,7 +107,6 @@ proptest! {
                 prop_assert!(bound(own.safeguards.delta_max, of.safeguards.delta_max), "{axis:?}");
                 prop_assert!(near(own.epsilon, of.epsilon * k) && near(own.safeguards.sigma * k, of.safeguards.sigma));
                 prop_assert_eq!(own.membership, of.membership);
-                prop_assert_eq!(own.safeguards.kappa, of.safeguards.kappa);
             }
         }
     }

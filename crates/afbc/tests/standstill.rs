@@ -2,7 +2,9 @@
 #![allow(clippy::unwrap_used, missing_docs)] // a controller that cannot be built must stop the test
 
 use afbc::reference::ReferenceModel;
-use afbc::standstill::{IN_AIR_S, LEFT_M, LIFT_SHARE, STILL_M_S, STILL_S, StandstillDetector};
+use afbc::standstill::{
+    IN_AIR_S, LEFT_M, LIFT_SHARE, PUSHED_M_S2, SINKS_M_S, STILL_M_S, STILL_S, STOPPED_SHARE, StandstillDetector,
+};
 use afbc::{Adaptive, Controller, Profile, Settings};
 use afbc_control::Smoothing;
 use afbc_control::{FlightController, Validated};
@@ -12,6 +14,8 @@ use proptest::prelude::*;
 
 const DT_S: f32 = 0.001;
 const WEIGHT_N: f32 = 4.77;
+/// Velocity of a reference at rest and observed acceleration along z of a vehicle that nothing holds.
+const STILL: [f32; 2] = [0.0, 0.0];
 
 fn moving(velocity_m_s: Vector3<f32>) -> State {
     State { velocity_m_s, ..State::default() }
@@ -21,7 +25,7 @@ fn moving(velocity_m_s: Vector3<f32>) -> State {
 fn stands(thrust_n: f32, velocity_m_s: Vector3<f32>, steps: usize) -> bool {
     let mut standstill = StandstillDetector::default();
     for _ in 0..steps {
-        standstill.advance(thrust_n, WEIGHT_N, &moving(velocity_m_s), DT_S);
+        standstill.advance([thrust_n, WEIGHT_N], &moving(velocity_m_s), STILL, DT_S);
     }
     standstill.is_standing()
 }
@@ -48,14 +52,14 @@ fn a_light_vehicle_that_hovers_does_not_stand_and_one_that_lifts_off_no_longer()
     assert!(!stands(0.6 * WEIGHT_N, Vector3::zeros(), 10_000));
     let mut standstill = StandstillDetector::default();
     for _ in 0..1000 {
-        standstill.advance(0.0, WEIGHT_N, &State::default(), DT_S);
+        standstill.advance([0.0, WEIGHT_N], &State::default(), STILL, DT_S);
     }
     assert!(standstill.is_standing());
     let mut rocking = standstill;
-    rocking.advance(0.0, WEIGHT_N, &moving(Vector3::new(0.0, -0.49, 0.0)), DT_S);
+    rocking.advance([0.0, WEIGHT_N], &moving(Vector3::new(0.0, -0.49, 0.0)), STILL, DT_S);
     assert!(rocking.is_standing(), "it rocks");
-    rocking.advance(0.0, WEIGHT_N, &moving(Vector3::new(0.0, 0.0, -0.51)), DT_S);
-    standstill.advance(0.5 * WEIGHT_N, WEIGHT_N, &State::default(), DT_S);
+    rocking.advance([0.0, WEIGHT_N], &moving(Vector3::new(0.0, 0.0, -0.51)), STILL, DT_S);
+    standstill.advance([0.5 * WEIGHT_N, WEIGHT_N], &State::default(), STILL, DT_S);
     assert!(!standstill.is_standing() && !rocking.is_standing());
 }
 
@@ -118,9 +122,9 @@ fn a_vehicle_touches_the_ground_until_it_leaves_it() {
         let mut standstill = StandstillDetector::default();
         assert!(!standstill.is_touching_ground(), "a law begins in the air");
         standstill.land();
-        standstill.advance(WEIGHT_N, WEIGHT_N, &State::default(), DT_S);
+        standstill.advance([WEIGHT_N, WEIGHT_N], &State::default(), STILL, DT_S);
         for _ in 0..steps {
-            standstill.advance(WEIGHT_N, WEIGHT_N, &state, DT_S);
+            standstill.advance([WEIGHT_N, WEIGHT_N], &state, STILL, DT_S);
         }
         standstill.is_touching_ground()
     };
@@ -141,10 +145,10 @@ fn a_vehicle_that_has_just_risen_tilts_little() {
         let mut standstill = StandstillDetector::default();
         assert_eq!(standstill.tilt_max_tan(), f32::INFINITY, "a law begins in the air");
         standstill.land();
-        standstill.advance(WEIGHT_N, WEIGHT_N, &State::default(), DT_S);
+        standstill.advance([WEIGHT_N, WEIGHT_N], &State::default(), STILL, DT_S);
         let (position_m, velocity_m_s) = (Vector3::z() * z_m, Vector3::z() * climb_m_s);
         let state = State { position_m, velocity_m_s, ..State::default() };
-        (0..steps).for_each(|_| standstill.advance(WEIGHT_N, WEIGHT_N, &state, DT_S));
+        (0..steps).for_each(|_| standstill.advance([WEIGHT_N, WEIGHT_N], &state, STILL, DT_S));
         standstill.tilt_max_tan()
     };
     let standing = after(0.0, 0.0, 1);
@@ -160,5 +164,25 @@ fn a_vehicle_that_has_just_risen_tilts_little() {
     assert!(after(0.02, 0.6, 1) > standing, "it rises fast");
     for (z_m, climb_m_s, steps) in [(1.1, 0.0, 1), (0.3, -0.6, 1), (0.3, 0.0, (IN_AIR_S / DT_S) as u32 + 100)] {
         assert_eq!(after(z_m, climb_m_s, steps), f32::INFINITY, "{z_m} m, {climb_m_s} m/s");
+    }
+}
+
+proptest! {
+    /// A vehicle has met the ground if it stays behind its descent, needs little thrust, and something holds it.
+    #[test]
+    fn a_descent_that_something_stops_has_met_the_ground(
+        share in -3.0_f32..2.0,
+        sinks_m_s in -2.0_f32..1.0,
+        followed in -1.0_f32..2.0,
+        pushed_m_s2 in -10.0_f32..10.0,
+    ) {
+        let mut standstill = StandstillDetector::default();
+        let state = moving(Vector3::z() * (followed * sinks_m_s));
+        standstill.advance([share * WEIGHT_N, WEIGHT_N], &state, [sinks_m_s, pushed_m_s2], DT_S);
+        let behind = state.velocity_m_s.z > STOPPED_SHARE * sinks_m_s;
+        // A vehicle that climbs or falls this fast leaves the ground in the same step.
+        let leaves = state.velocity_m_s.z.abs() > 0.5;
+        let expected = share < LIFT_SHARE && sinks_m_s < -SINKS_M_S && behind && pushed_m_s2 > PUSHED_M_S2 && !leaves;
+        prop_assert_eq!(standstill.is_touching_ground(), expected);
     }
 }

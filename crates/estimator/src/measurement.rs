@@ -94,8 +94,8 @@ const FORCE_MAX_M_S2: f32 = 2000.0;
 
 /// Returns true if every coordinate is finite and at most `max` in absolute value.
 fn within(vector: &Vector3<f32>, max: f32) -> bool {
-    // NaN returns false.
-    vector.x.abs() <= max && vector.y.abs() <= max && vector.z.abs() <= max
+    // Nearly every vector passes by its length, in a third of the instructions. NaN returns false.
+    vector.norm_squared() <= max * max || (vector.x.abs() <= max && vector.y.abs() <= max && vector.z.abs() <= max)
 }
 
 /// Returns true for a usable standard deviation.

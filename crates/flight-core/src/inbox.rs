@@ -102,6 +102,12 @@ impl Inbox {
         }
     }
 
+    /// Stores a setpoint of the vehicle's own guidance, which has checked that it is
+    /// [plausible](Setpoint::is_plausible).
+    pub fn put_own_setpoint(&mut self, setpoint: Stamped<Setpoint>) {
+        replace(&mut self.setpoint, &setpoint);
+    }
+
     /// Sets whether an armed vehicle idles on the ground: its motors idle and the law does not run until the mark is
     /// cleared. A vehicle that still counts as airborne, because it has just touched down, keeps the law's memory.
     pub fn set_idle_on_ground(&mut self, idle_on_ground: bool) {

@@ -116,7 +116,10 @@ impl<M> FlightCoreMemory<M> {
         // its velocity.
         let watched = armed && !inbox.is_own();
         if let Some(flight) = self.flight.as_mut().filter(|flight| watched && flight.landing.airborne()) {
-            let repeated = self.state.is_some_and(|held| held.value == state.value);
+            // Two states nearly always differ in the first number compared, which is cheaper than comparing them all.
+            let repeated = self
+                .state
+                .is_some_and(|held| held.value.rates_rad_s.x == state.value.rates_rad_s.x && held.value == state.value);
             flight.distrusts |= flight.witness.contradicts(&state.value, state.at_us);
             if repeated || flight.distrusts {
                 self.frozen_states = self.frozen_states.saturating_add(1);

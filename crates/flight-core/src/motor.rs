@@ -85,7 +85,7 @@ impl Motor {
     /// Returns the throttles of all motors: 0 if disarmed, 48 to 2047 if armed.
     pub fn throttles<const N: usize>(&self, armed: bool, speeds: &RotorSpeeds<N>) -> [u16; N] {
         let speeds: [f32; N] = speeds.0.into();
-        speeds.map(|speed| if armed { self.throttle(speed) } else { 0 })
+        if armed { speeds.map(|speed| self.throttle(speed)) } else { [0; N] }
     }
 
     /// Returns the throttle \[48 to 2047\] of an armed motor for `speed_rad_s`. It never decreases with the speed.

@@ -185,11 +185,11 @@ const CASES: &[Case] = &[
     ("100 ms are coasted through", |f| drop_states(f, 0..100), &[(0, Flying), (20, Coasting), (199, Flying)], |_| true),
     ("250 ms are coasted through", |f| drop_states(f, 0..250), &[(0, Flying), (20, Coasting), (349, Flying)], |_| true),
     ("251 ms end in a descent, on the ground a second later", |f| drop_states(f, 0..251),
-        &[(0, Flying), (20, Coasting), (250, Descending), (1273, Disarmed)], |_| true),
+        &[(0, Flying), (20, Coasting), (250, Descending), (1277, Disarmed)], |_| true),
     ("a state that never returns ends the flight", |f| drop_states(f, FOREVER),
         &[(0, Flying), (20, Coasting), (250, Descending), (2250, Disarmed)], |_| true),
     ("a state that returns late still lands the vehicle", |f| drop_states(f, 0..1500),
-        &[(0, Flying), (20, Coasting), (250, Descending), (2522, Disarmed)], |_| true),
+        &[(0, Flying), (20, Coasting), (250, Descending), (2526, Disarmed)], |_| true),
     ("every second state missing is nothing",
         |f| states(f, FOREVER, |frame| (frame.at_ms % 2 == 0).then_some(())),
         &[(0, Flying)], |s| s.counters.lost > 1000),
@@ -208,7 +208,7 @@ const CASES: &[Case] = &[
     // After a second, the delay looks like a clock that was set back, so the states count again, and the vehicle is
     // found at rest.
     ("30 ms late are as good as none at first", |f| delay_states(f, FOREVER, |_| 30),
-        &[(0, Flying), (20, Coasting), (250, Descending), (1727, Disarmed)], |_| true),
+        &[(0, Flying), (20, Coasting), (250, Descending), (1731, Disarmed)], |_| true),
     ("a queue that builds up and empties", |f| delay_states(f, 0..100, |at| at.min(100 - at)),
         &[(0, Flying), (41, Coasting), (199, Flying)], |_| true),
     ("a burst after a pause of 100 ms", |f| delay_states(f, 0..100, |at| 100 - at),
@@ -244,7 +244,7 @@ const CASES: &[Case] = &[
         }),
         &[(0, Flying), (20, Coasting), (149, Flying)], |s| s.counters.implausible == 50),
     ("no rotation for 300 ms", |f| states(f, 0..300, |frame| { rewrite(frame, |p| p[20..36].fill(0)); Some(()) }),
-        &[(0, Flying), (20, Coasting), (250, Descending), (1322, Disarmed)], |s| s.counters.implausible == 300),
+        &[(0, Flying), (20, Coasting), (250, Descending), (1326, Disarmed)], |s| s.counters.implausible == 300),
     ("states of another frame for 50 ms",
         |f| states(f, 0..50, |frame| { rewrite(frame, |p| p[228] = 4); Some(()) }),
         &[(0, Flying), (20, Coasting), (149, Flying)], |s| s.counters.unsupported == 50),
@@ -294,7 +294,7 @@ const CASES: &[Case] = &[
     ("armed again while descending: refused", |f| {
         drop_states(f, 0..300);
         f.push(frame(400, Uplink::Command(VehicleCommand::Arm)));
-    }, &[(0, Flying), (20, Coasting), (250, Descending), (1322, Disarmed)],
+    }, &[(0, Flying), (20, Coasting), (250, Descending), (1326, Disarmed)],
         |s| s.answers == [Err(Refusal::AlreadyArmed)]),
     ("armed on the ground without a state: refused", |f| {
         drop_states(f, FOREVER);

@@ -247,13 +247,19 @@ impl Limiter {
         {
             return;
         }
-        let (p, v, a) = match target {
-            // An acceleration that fits no flight would only drive the vehicle away from the target.
-            Some(target) if !fits => (target.position_m, target.velocity_m_s, Vector3::zeros()),
-            Some(target) => (target.position_m, target.velocity_m_s, target.acceleration_m_s2),
-            None => (aim.position_m, aim.velocity_m_s, aim.acceleration_m_s2),
+        let one = |vector: Vector3<f32>| Vector1::new(vector.z);
+        let (goal, climb) = match target {
+            Some(CompleteTarget { position_m: p, velocity_m_s: v, acceleration_m_s2 }) => {
+                // An acceleration that fits no flight would only drive the vehicle away from the target.
+                let a = if fits { acceleration_m_s2 } else { Vector3::zeros() };
+                let j = jerk_m_s3;
+                (MotionGoal::of(p.xy(), v.xy(), a.xy(), j.xy()), MotionGoal::of(one(p), one(v), one(a), one(j)))
+            }
+            None => {
+                let LimiterTarget { position_m: p, velocity_m_s: v, acceleration_m_s2: a, .. } = *aim;
+                (goal(p.xy(), v.xy(), a.xy()), goal(one(p), one(v), one(a)))
+            }
         };
-        let goal = goal(p.xy(), v.xy(), a.xy(), jerk_m_s3.xy());
         let (speed_m_s, approach_m_s) = (limits.speed_m_s, min(aim.speed_m_s, limits.speed_m_s));
         let reach = MotionBounds {
             approach: (approach_m_s, approach_m_s),
@@ -262,15 +268,13 @@ impl Limiter {
             jerk: limits.jerk_max_m_s3,
         };
         self.horizontal.advance(&mut now.horizontal, &goal, &reach, dt_s);
-        let one = |vector: Vector3<f32>| Vector1::new(vector.z);
-        let goal = self::goal(one(p), one(v), one(a), one(jerk_m_s3));
         let reach = MotionBounds {
             approach: (min(aim.up_m_s, limits.up_m_s), min(aim.down_m_s, limits.down_m_s)),
             speed: (limits.up_m_s, limits.down_m_s),
             acceleration: limits.vertical_acceleration_m_s2,
             jerk: limits.jerk_max_m_s3,
         };
-        self.vertical.advance(&mut now.vertical, &goal, &reach, dt_s);
+        self.vertical.advance(&mut now.vertical, &climb, &reach, dt_s);
     }
 }
 
@@ -279,22 +283,21 @@ impl Limiter {
 fn complete(aim: &LimiterTarget) -> Option<CompleteTarget> {
     let or_zero = |vector: Vector3<f32>| vector.map(|value| if value.is_nan() { 0.0 } else { value });
     let LimiterTarget { position_m, velocity_m_s, acceleration_m_s2, .. } = *aim;
-    let given = !position_m.iter().any(|value| value.is_nan());
-    given.then(|| CompleteTarget {
+    // Given values are finite, so their sum is a number.
+    (!position_m.sum().is_nan()).then(|| CompleteTarget {
         position_m,
         velocity_m_s: or_zero(velocity_m_s),
         acceleration_m_s2: or_zero(acceleration_m_s2),
     })
 }
 
-/// Returns the goal of one or two coordinates. A vector with any NaN counts as not given.
+/// Returns the goal of one or two coordinates, without jerk. A vector with any NaN counts as not given.
 fn goal<const D: usize>(
     position: nalgebra::SVector<f32, D>,
     velocity: nalgebra::SVector<f32, D>,
     acceleration: nalgebra::SVector<f32, D>,
-    jerk: nalgebra::SVector<f32, D>,
 ) -> MotionGoal<D> {
-    let given = |vector: nalgebra::SVector<f32, D>| (!vector.iter().any(|value| value.is_nan())).then_some(vector);
+    let given = |vector: nalgebra::SVector<f32, D>| (!vector.sum().is_nan()).then_some(vector);
     let zero = nalgebra::SVector::zeros();
     let (position, velocity, acceleration) = (given(position), given(velocity), given(acceleration));
     match (position, velocity, acceleration) {
@@ -303,7 +306,7 @@ fn goal<const D: usize>(
             position,
             velocity: Some(velocity.unwrap_or(zero)),
             acceleration: acceleration.unwrap_or(zero),
-            jerk,
+            jerk: zero,
         },
     }
 }
@@ -387,7 +390,6 @@ impl LimitedMotion {
         // A change of acceleration that the largest jerk can cause between two messages, with a reserve of 25 %, is no
         // misfit.
         let jerk_m_s2 = 1.25 * limits.jerk_max_m_s3 * max(interval_s, dt_s);
-        let stands = target.velocity_m_s == Vector3::zeros() && target.acceleration_m_s2 == Vector3::zeros();
         let misfit = match self.misfit {
             Some(Misfit { position_m, velocity_m_s }) => {
                 let left = 1.0 - dt_s / MISFIT_S;
@@ -400,6 +402,7 @@ impl LimitedMotion {
                 fits.then_some(misfit)
             }
             None => {
+                let stands = target.velocity_m_s == Vector3::zeros() && target.acceleration_m_s2 == Vector3::zeros();
                 let caught = if stands {
                     within(&off_m, STANDS_M) && within(&off_m_s, STANDS_M_S) && within(&off_m_s2, STANDS_M_S2)
                 } else {

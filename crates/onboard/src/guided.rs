@@ -84,7 +84,7 @@ impl GuidanceStage {
         };
         let guided = self.guidance.tick(&guidance_inputs, orders);
         if let Some(value) = guided.setpoint {
-            inbox.put_setpoint(Stamped { value, at_us: now_us });
+            inbox.put_own_setpoint(Stamped { value, at_us: now_us });
         }
         inbox.set_idle_on_ground(guided.idle_on_ground);
         inbox.command_rates(self.guidance.rates());

@@ -273,17 +273,11 @@ fn a_goal_is_what_is_given() {
     let (nan, one, two) = (Vector2::new(1.0, f32::NAN), Vector2::new(1.0, 2.0), Vector2::new(3.0, 4.0));
     let zero = Vector2::zeros();
     let goals = [
-        (goal(nan, nan, two, one), MotionGoal { position: None, velocity: None, acceleration: two, jerk: zero }),
-        (goal(nan, nan, nan, one), MotionGoal { position: None, velocity: Some(zero), acceleration: zero, jerk: one }),
-        (
-            goal(one, nan, two, one),
-            MotionGoal { position: Some(one), velocity: Some(zero), acceleration: two, jerk: one },
-        ),
-        (goal(nan, two, nan, zero), MotionGoal { position: None, velocity: Some(two), acceleration: zero, jerk: zero }),
-        (
-            goal(one, two, two, zero),
-            MotionGoal { position: Some(one), velocity: Some(two), acceleration: two, jerk: zero },
-        ),
+        (goal(nan, nan, two), MotionGoal { position: None, velocity: None, acceleration: two, jerk: zero }),
+        (goal(nan, nan, nan), MotionGoal { position: None, velocity: Some(zero), acceleration: zero, jerk: zero }),
+        (goal(one, nan, two), MotionGoal { position: Some(one), velocity: Some(zero), acceleration: two, jerk: zero }),
+        (goal(nan, two, nan), MotionGoal { position: None, velocity: Some(two), acceleration: zero, jerk: zero }),
+        (goal(one, two, two), MotionGoal { position: Some(one), velocity: Some(two), acceleration: two, jerk: zero }),
     ];
     for (found, expected) in goals {
         assert_eq!(found, expected);
