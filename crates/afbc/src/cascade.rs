@@ -521,8 +521,10 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
             effort = self.effort.advance(&mut filters.effort_excess, hover_n);
             // The compensation of roll and pitch is added after the filters: it is smooth already, and the observer
             // would feed back the filters' lead.
-            inputs.roll_n = (inputs.roll_n + roll_n) * effort;
-            inputs.pitch_n = (inputs.pitch_n + pitch_n) * effort;
+            let share = filters.moments.as_ref().map_or(1.0, MomentObserverMemory::effectiveness_share);
+            let tilt_effort = effort / share;
+            inputs.roll_n = (inputs.roll_n + roll_n) * tilt_effort;
+            inputs.pitch_n = (inputs.pitch_n + pitch_n) * tilt_effort;
             inputs.yaw_n *= effort;
         }
         // On the ground, moments would increase the thrust and tip over the vehicle.

@@ -22,6 +22,7 @@
 //! ACC 2003, in exact discrete form.
 
 use crate::age::AgeMemory;
+use crate::effectiveness::{Effectiveness, EffectivenessMemory};
 use crate::force_map::{ForceMap, ForceMapWeights};
 use afbc_control::Settings;
 use afbc_control::drag::KnownDrag;
@@ -380,6 +381,8 @@ impl ForceObserver {
 /// df_hat/dt     = w^2 (Omega - Omega_hat)
 /// ```
 ///
+/// g of roll and pitch is the model's times the [learnt share](crate::effectiveness).
+///
 /// With f_hat in place of f, (16) commands what INDI does: the given input plus the missing acceleration, each behind
 /// the same two poles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -400,6 +403,8 @@ pub struct MomentObserver {
     /// Largest f_hat \[rad/s2\], and largest Omega - Omega_hat that f_hat can cause \[rad/s\].
     acceleration_max: Vector3<f32>,
     jump: Vector3<f32>,
+    /// `None` without an observer of roll and pitch.
+    learner: Option<Effectiveness>,
 }
 
 /// Memory of the moment observer.
@@ -411,6 +416,15 @@ pub struct MomentObserverMemory {
     given_rad_s2: Vector3<f32>,
     /// Known angular acceleration, delayed to the age of the rates \[rad/s2\].
     known_rad_s2: Vector3<f32>,
+    effectiveness: EffectivenessMemory,
+}
+
+impl MomentObserverMemory {
+    /// Returns the learnt effectiveness of roll and pitch as a share of the model's.
+    #[inline]
+    pub fn effectiveness_share(&self) -> f32 {
+        self.effectiveness.share
+    }
 }
 
 impl MomentObserver {
@@ -424,9 +438,13 @@ impl MomentObserver {
         let effectiveness = vehicle.effectiveness();
         // The observed acceleration is limited to what the rotors can compensate.
         let acceleration_max = effectiveness * (0.5 * thrust_max_n);
+        let (rate, acceleration) = (rest * 2.0, rest.map(|rest| rest * rest / dt_s));
+        // A step of f moves Omega - Omega_hat by f t exp(-w t), which is at most f/(e w).
+        let jump = acceleration_max
+            .zip_map(&bandwidth, |most, w| max(most / (core::f32::consts::E * max(w, W_MIN_RAD_S)), 1.0));
         (tilt + yaw > 0.0).then(|| MomentObserver {
-            rate: rest * 2.0,
-            acceleration: rest.map(|rest| rest * rest / dt_s),
+            rate,
+            acceleration,
             lag: 1.0 - math::exp(-dt_s / lag_s),
             age: 1.0 - math::exp(-dt_s / AGE_S),
             dt_s,
@@ -434,9 +452,8 @@ impl MomentObserver {
             per_moment: vehicle.inertia_kg_m2.map(|inertia| vehicle.mass_kg / inertia),
             ineffectiveness: effectiveness.map(|g| -1.0 / g),
             acceleration_max,
-            // A step of f moves Omega - Omega_hat by f t exp(-w t), which is at most f/(e w).
-            jump: acceleration_max
-                .zip_map(&bandwidth, |most, w| max(most / (core::f32::consts::E * max(w, W_MIN_RAD_S)), 1.0)),
+            jump,
+            learner: (tilt > 0.0).then(|| Effectiveness::new([rate.x, acceleration.x], jump.x, dt_s)),
         })
     }
 
@@ -457,10 +474,11 @@ impl MomentObserver {
             acceleration_rad_s2: zero,
             given_rad_s2: zero,
             known_rad_s2: *known,
+            effectiveness: EffectivenessMemory::default(),
         };
         let memory = memory.get_or_insert(start);
         if touches_ground {
-            *memory = start;
+            *memory = MomentObserverMemory { effectiveness: memory.effectiveness.restarted(), ..start };
             return zero;
         }
         if !fresh {
@@ -471,11 +489,15 @@ impl MomentObserver {
             acceleration_rad_s2: f_hat,
             given_rad_s2: given,
             known_rad_s2,
+            effectiveness,
         } = memory;
         // The known moments are delayed to the assumed age of the rates. Otherwise every change of them would be
         // observed as a disturbance.
         *known_rad_s2 = (*known_rad_s2 + (known - *known_rad_s2) * self.age).map(math::settled);
         let off = rates_rad_s - *omega_hat;
+        if let Some(learner) = &self.learner {
+            learner.learn(effectiveness, [off.x, off.y], [given.x, given.y]);
+        }
         let found =
             f_hat.zip_zip_map(&self.acceleration.component_mul(&off), &self.acceleration_max, |f, more, most| {
                 math::settled(math::limited(f + more, most))
@@ -506,7 +528,9 @@ impl MomentObserver {
         if let Some(memory) = memory {
             let given = Vector3::new(given.roll_n, given.pitch_n, given.yaw_n);
             // Known weakness of the rotors is no moment. `effort` is bounded away from zero.
-            let given = given.component_mul(&self.effectiveness) * (1.0 / effort);
+            let mut given = given.component_mul(&self.effectiveness) * (1.0 / effort);
+            let share = memory.effectiveness.share;
+            (given.x, given.y) = (given.x * share, given.y * share);
             memory.given_rad_s2 = (memory.given_rad_s2 + (given - memory.given_rad_s2) * self.lag).map(math::settled);
         }
     }

@@ -43,6 +43,7 @@ pub mod cascade;
 pub mod delay_compensation;
 pub mod desired;
 pub mod disturbance;
+pub mod effectiveness;
 pub mod effort;
 pub mod force_map;
 pub mod fuzzy;

@@ -11,6 +11,11 @@
 //! vehicle counts as touching the ground until it has risen from where it stood, and only a small tilt is allowed until
 //! then. Nor may it use its full tilt at once to stop a drift that the wind caused, because that costs height that it
 //! does not have. The allowed tilt grows with the height.
+//!
+//! A landing is the same in reverse. The force of the feet, observed as any other, would take the thrust away while the
+//! feet's moments are observed, too, and the vehicle would tip over before it counts as standing. So a vehicle touches
+//! the ground as soon as it does not follow its descent, although its law demands little thrust, because something
+//! pushes it up. PX4's land detector has ground contact in the same case, by descent and motion.
 
 use afbc_control::math;
 use afbc_types::State;

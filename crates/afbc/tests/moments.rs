@@ -1,6 +1,7 @@
 //! Compares the moment observer with its closed solution, and checks which effects it must not see as a moment.
 
 use afbc::disturbance::{AGE_S, DisturbanceObserver, MomentObserver, MomentObserverMemory, ObserverConditions};
+use afbc::effectiveness::{AGED_S, SHARE_MAX, SHARE_MIN};
 use afbc_types::{Inputs, Parameters};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -165,4 +166,78 @@ fn what_is_known_is_not_observed() {
     let found = Vector3::new(1.0, 2.0, -3.0);
     let against = Vector3::from(observer.compensating_inputs_n(&found)).component_mul(&effectiveness());
     assert!((against + found).norm() < 1e-4, "{against}");
+}
+
+/// Swings a body about roll and pitch with large moments for 5 s, at this angular frequency; the observer sees rates
+/// that are older by `late_s`. Returns the learnt share of the effectiveness.
+fn swung(share: f32, rad_s: f32, late_s: f32, f: &Vector3<f32>) -> f32 {
+    let (observer, mut body) = (observer(60.0, 0.02), Body::new(0.02, share));
+    let mut wire = std::collections::VecDeque::from(vec![Vector3::zeros(); (late_s / DT_S) as usize]);
+    for step in 0..5000_u16 {
+        let t = f32::from(step) * DT_S;
+        let u = Vector3::new((rad_s * t).sin(), (rad_s * t).cos(), 0.0) * 2.0;
+        wire.push_back(body.rates);
+        let rates = std::mem::replace(&mut body.rates, wire.pop_front().unwrap());
+        // The learnt share is the observer's known weakness, as in the cascade.
+        body.step(&observer, &u, &Vector3::zeros(), 1.0);
+        let turned = (body.input.component_mul(&effectiveness()) * share + f) * DT_S;
+        body.rates = rates + turned;
+    }
+    body.memory.unwrap().effectiveness_share()
+}
+
+/// A vehicle that turns less by its moments than the model is known by it, whatever constant moment acts beside.
+#[test]
+fn the_effectiveness_is_learnt_from_large_moments() {
+    for share in [0.3, 0.4, 0.6, 1.0] {
+        for rad_s in [10.0, 20.0, 30.0] {
+            for f in [Vector3::zeros(), Vector3::new(20.0, -10.0, 0.0)] {
+                let learnt = swung(share, rad_s, 0.0, &f);
+                // What old rates may explain does not count.
+                let aged = 0.5 * (AGED_S * rad_s) * (AGED_S * rad_s);
+                let (least, most) = (share - 0.05, share + aged.min(1.0 - share) + 0.05);
+                assert!((least..most).contains(&learnt), "{share} at {rad_s} rad/s, {f:?}: {learnt}");
+            }
+        }
+    }
+}
+
+/// Old rates are not taken for a vehicle that turns less.
+#[test]
+fn old_rates_are_no_missing_effectiveness() {
+    for late_s in [0.005, 0.01, AGED_S] {
+        for rad_s in [10.0, 20.0, 40.0, 60.0] {
+            let learnt = swung(1.0, rad_s, late_s, &Vector3::zeros());
+            assert!(learnt > 0.9, "{late_s} s late at {rad_s} rad/s: {learnt}");
+        }
+    }
+}
+
+/// Small moments, as in a hover, teach nothing.
+#[test]
+fn small_moments_teach_nothing() {
+    let (observer, mut body) = (observer(60.0, 0.02), Body::new(0.02, 0.5));
+    for step in 0..5000_u16 {
+        let t = f32::from(step) * DT_S;
+        body.step(&observer, &(Vector3::new((20.0 * t).sin(), (20.0 * t).cos(), 0.0) * 0.02), &Vector3::zeros(), 1.0);
+    }
+    let learnt = body.memory.unwrap().effectiveness_share();
+    assert!((learnt - 1.0).abs() < 0.05, "{learnt}");
+}
+
+proptest! {
+    /// The share stays within its bounds for any rates and inputs, and on the ground.
+    #[test]
+    fn the_effectiveness_stays_within_bounds(
+        numbers in prop::collection::vec((-1e3_f32..1e3, -1e3_f32..1e3, -50.0_f32..50.0, any::<[bool; 2]>()), 1..300),
+    ) {
+        let (observer, mut memory) = (observer(60.0, 0.02), None);
+        for (roll, pitch, u, [fresh, touches_ground]) in numbers {
+            let rates = Vector3::new(roll, pitch, 0.0);
+            observer.advance(&mut memory, &rates, &Vector3::zeros(), conditions(fresh, touches_ground));
+            observer.record_inputs(&mut memory, &Inputs { roll_n: u, pitch_n: -u, ..Inputs::default() }, 1.0);
+            let share = memory.as_ref().unwrap().effectiveness_share();
+            prop_assert!((SHARE_MIN..=SHARE_MAX).contains(&share), "{}", share);
+        }
+    }
 }

@@ -48,10 +48,11 @@ impl Subject for Vehicle {
             );
         }
         let force_max_n = format!("{:?}", self.force_max_n);
-        let stronger = format!("{:?}", self.force_max_n * 1.01);
+        // On rotors this weak, a flight meets their limit.
+        let weaker = format!("{:?}", self.force_max_n * 0.9);
         let document = document
             .group("[rotors]", &self.realism.rotors, "", &["max_rad_s"])
-            .plain("[rotors]", &[("force_max_n", force_max_n, &[&stronger])])
+            .plain("[rotors]", &[("force_max_n", force_max_n, &[&weaker])])
             .group("[motor]", &self.curve, "", &[])
             .group("[battery]", &self.realism.rotors.battery.unwrap(), "", &[])
             .group("[drag]", &drag, "", &["rotor_height_m"])
