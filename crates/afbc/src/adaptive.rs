@@ -331,14 +331,14 @@ impl SubsystemLaw for Adaptive {
         estimate: &mut AdaptiveEstimate,
     ) -> (f32, Errors) {
         let subsystem = &self.subsystems[axis];
-        let softness = if matches!(axis, Axis::Z) { context.softness } else { 1.0 };
+        let (softness, tracking) = context.softened(axis, tracking);
         let gains = subsystem.gains.backstepping.slowed(softness);
         let errors = tracking.errors(gains.alpha1);
         let inputs = fuzzy_inputs(axis, [tracking.x1, tracking.x2], &errors);
         let known = match context.known {
             Some(model) => {
                 let dynamics = context.observed(model, axis);
-                backstepping::known(&gains, tracking, &errors, &dynamics)
+                backstepping::known(&gains, &tracking, &errors, &dynamics)
             }
             None => 0.0,
         };

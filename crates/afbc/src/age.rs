@@ -32,6 +32,9 @@ const EXCITED_M_S2: f32 = 0.02;
 /// Variance of p_0 per variance of the velocity's noise \[1/s2\].
 const PER_NOISE_1_S2: f32 = 25.0;
 
+/// Share of the mean interval that is replaced by each velocity.
+const INTERVAL_SHARE: f32 = 0.1;
+
 /// Memory of the estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AgeMemory {
@@ -40,24 +43,33 @@ pub struct AgeMemory {
     /// p \[m/s2\] and q \[m/s3\].
     p: f32,
     q: f32,
-    /// a of the last step \[m/s2\].
-    last_m_s2: f32,
+    /// a of the last step \[m/s2\], `None` before the first one.
+    last_m_s2: Option<f32>,
+    /// Mean time between two velocities \[s\].
+    interval_s: f32,
     /// Factor on the speed of z: 1 up to [`FREE_S`], falling towards 0 with the mean age of the state.
     pub softness: f32,
 }
 
 impl Default for AgeMemory {
     fn default() -> Self {
-        AgeMemory { age_s: 0.0, p: 0.0, q: 0.0, last_m_s2: 0.0, softness: 1.0 }
+        AgeMemory { age_s: 0.0, p: 0.0, q: 0.0, last_m_s2: None, interval_s: 0.0, softness: 1.0 }
     }
 }
 
 impl AgeMemory {
+    /// Returns the memory after a touch of the ground, where the age is kept.
+    #[must_use]
+    pub fn restarted(&self) -> Self {
+        AgeMemory { p: 0.0, q: 0.0, last_m_s2: None, ..*self }
+    }
+
     /// Continues with the known acceleration of this step \[m/s2\].
     #[inline(always)]
     pub fn predict(&mut self, known_m_s2: f32, dt_s: f32) {
-        self.p = math::settled(self.p - (known_m_s2 - self.last_m_s2) - self.q * dt_s);
-        self.last_m_s2 = known_m_s2;
+        let change_m_s2 = self.last_m_s2.map_or(0.0, |last_m_s2| known_m_s2 - last_m_s2);
+        self.p = math::settled(self.p - change_m_s2 - self.q * dt_s);
+        self.last_m_s2 = Some(known_m_s2);
     }
 
     /// Learns from v - v_hat \[m/s\] of a velocity measured `since_s` after the last one, which corrects v_hat by twice
@@ -73,7 +85,8 @@ impl AgeMemory {
         self.p = math::settled(p - 2.0 * rest * p);
         self.q = math::settled(self.q + rest * rest / since_s * p);
         // Between two velocities, the state ages further.
-        let mean_s = self.age_s + 0.5 * since_s;
+        self.interval_s += (since_s - self.interval_s) * INTERVAL_SHARE;
+        let mean_s = self.age_s + 0.5 * self.interval_s;
         self.softness = HALF_S / (HALF_S + math::max(mean_s - FREE_S, 0.0));
     }
 }

@@ -3,13 +3,12 @@
 
 use crate::delay_compensation::DelayCompensation;
 use crate::desired::{DesiredAttitude, DesiredMemory, DesiredRollPitch};
-use crate::disturbance::{
-    ForceObserver, ForceObserverMemory, MomentObserver, MomentObserverMemory, ObserverConditions,
-};
+use crate::disturbance::{ForceObserver, ForceObserverMemory, ObserverConditions};
 use crate::effort::Effort;
 use crate::law::{StepContext, SubsystemLaw, SubsystemTracking};
 use crate::limits::ApproachLimit;
 use crate::model::{Attitude, ModelConstants, RollPitch, euler_rates};
+use crate::moments::{MomentObserver, MomentObserverMemory};
 use crate::reference::{ReferenceFilter, ReferenceMemory};
 use crate::rotation::AttitudeTracking;
 pub use crate::settings::Settings;
@@ -306,7 +305,8 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
         if let Some(moments) = &self.moments {
             moments.record_inputs(&mut filters.moments, &action.given, effort);
         }
-        let along_z = [reference.velocity_m_s.z, observed_m_s2.z];
+        let pushed_m_s2 = filters.forces.as_ref().map_or(0.0, ForceObserverMemory::pushed_m_s2);
+        let along_z = [reference.velocity_m_s.z, pushed_m_s2];
         filters.standstill.advance([u4, self.weight_n], state, along_z, self.settings.dt_s);
         let leaves_ground = touches_ground && !filters.standstill.is_touching_ground();
         // The way back after sliding on the ground must not be learnt as a disturbance.

@@ -1,5 +1,5 @@
-//! Observers of unmodelled disturbances: accelerations, from wind or rotors that are weaker than told, and moments,
-//! from weak rotors or a payload off the centre. Not in the paper.
+//! Observer of unmodelled accelerations, from wind or rotors that are weaker than told, and the settings of all
+//! observers. Not in the paper.
 //!
 //! (16) needs f, which the model takes as zero along x and y, and as gravity along z. Without an observer the rest must
 //! be learnt from the error that it causes. But the vehicle measures its velocity v and knows its thrust:
@@ -22,23 +22,17 @@
 //! ACC 2003, in exact discrete form.
 
 use crate::age::AgeMemory;
-use crate::effectiveness::{Effectiveness, EffectivenessMemory};
 use crate::force_map::{ForceMap, ForceMapWeights};
 use afbc_control::Settings;
 use afbc_control::drag::KnownDrag;
 use afbc_control::math::{self, max};
-use afbc_types::{Inputs, OutOfRange, Parameters, State, parameters};
+use afbc_types::{OutOfRange, Parameters, State, parameters};
 use nalgebra::Vector3;
 
 /// Largest |f_hat| \[m/s2\], that of a wind of some 20 m/s.
 pub const ACCELERATION_MAX_M_S2: f32 = 10.0;
-/// Age of the rates that the moment observer assumes, in addition to the rotor lag \[s\]: rates may be new or 20 ms
-/// old.
-pub const AGE_S: f32 = 0.01;
-/// Smallest bandwidth used in the jump limit of the rates \[rad/s\].
-const W_MIN_RAD_S: f32 = 1.0;
-/// Time for which a force may act unseen \[s\]. A difference that the largest force cannot cause in this time, or since
-/// the last velocity if that is longer, is noise, or a jump of the state, as after an outage.
+/// Time for which a force may act unseen by a quick observer \[s\]. A difference that the largest force cannot cause in
+/// this time, or since the last velocity if that is longer, is noise, or a jump of the state, as after an outage.
 pub const UNSEEN_S: f32 = 0.01;
 /// A velocity that is repeated for longer than this is constant \[s\].
 const REPEATED_S: f32 = 0.12;
@@ -55,6 +49,11 @@ const CHANGE_MAX_M_S: f32 = 0.5;
 const UPRIGHT: f32 = 0.9;
 /// Rate at which the hover thrust learns f_hat along z \[1/s\].
 const LIFT_1_S: f32 = 5.0;
+/// Largest |f_hat| along z that the hover thrust learns \[m/s2\]: the feet's force, until a touch of the ground is
+/// detected, must not take the learnt thrust away.
+const LIFT_MAX_M_S2: f32 = 2.0;
+/// Smallest cosine of the tilt at which the hover thrust is learnt: upside down, it would be learnt the wrong way.
+const LIFTS: f32 = 0.3;
 /// Smallest and largest learnt hover thrust, as shares of the weight.
 const HOVER_SHARE_MIN: f32 = 0.3;
 const HOVER_SHARE_MAX: f32 = 3.0;
@@ -91,12 +90,12 @@ parameters! {
 }
 
 impl DisturbanceObserver {
-    /// Returns the observer for a vehicle that is `slowness` times slower.
+    /// Returns the observer for a vehicle that is `slowness` times slower. Along z, the age that the observer finds, of
+    /// which the rotors' lag is a part, makes the law slower.
     #[must_use]
     pub(crate) fn slowed(self, slowness: f32, lag_s: f32) -> Self {
         DisturbanceObserver {
             disturbance_rad_s: self.disturbance_rad_s / slowness,
-            disturbance_z_rad_s: self.disturbance_z_rad_s,
             disturbance_tilt_rad_s: self.disturbance_tilt_rad_s / slowness,
             disturbance_yaw_rad_s: self.disturbance_yaw_rad_s / slowness,
             disturbance_lag_s: lag_s,
@@ -114,6 +113,8 @@ pub struct ForceObserver {
     observes: [f32; 2],
     /// Share of the filtered thrust that is replaced per step.
     lag: f32,
+    /// Time for which a force may act unseen \[s\].
+    unseen_s: f32,
     dt_s: f32,
     drag: KnownDrag,
     memory: Option<ForceMap>,
@@ -154,14 +155,20 @@ pub struct ForceObserverMemory {
     age: AgeMemory,
     /// Learnt relation between velocity and force.
     pub remembered: ForceMapWeights,
-    /// True if the next velocity is not measured.
+    /// True if the next velocity along x and y is not measured.
     held: bool,
 }
 
 impl ForceObserverMemory {
-    /// Keeps f_hat unchanged in the next step.
+    /// Keeps f_hat along x and y unchanged in the next step.
     pub fn hold(&mut self) {
         self.held = true;
+    }
+
+    /// Returns f_hat along z \[m/s2\].
+    #[inline]
+    pub fn pushed_m_s2(&self) -> f32 {
+        self.acceleration_m_s2.z
     }
 
     /// Returns the factor on the speed of z for the age of the state.
@@ -195,9 +202,9 @@ impl ForceObserverMemory {
     #[cold]
     #[inline(never)]
     fn forget(&mut self, measured_m_s: &Vector3<f32>) {
-        let remembered = self.remembered;
-        *self = Self::begin(measured_m_s, [self.thrust_n, self.hover_n]);
-        self.remembered = remembered;
+        let ForceObserverMemory { noise_m2_s2, age, remembered, thrust_n, hover_n, .. } = *self;
+        let begun = Self::begin(measured_m_s, [thrust_n, hover_n]);
+        *self = ForceObserverMemory { noise_m2_s2, age: age.restarted(), remembered, ..begun };
     }
 
     /// Takes over a measured velocity; f_hat stays.
@@ -239,11 +246,17 @@ impl ForceObserver {
         // Corrected once per step, the observer has two poles at exp(-w dt).
         let rate_1_s = |bandwidth: f32| (math::exp(bandwidth * dt_s) - 1.0) / dt_s;
         let bandwidths = [disturbance_rad_s, disturbance_z_rad_s];
+        // A step of f moves v - v_hat by f t exp(-w t), which is at most f/(e w).
+        let unseen_s = bandwidths
+            .into_iter()
+            .filter(|bandwidth| *bandwidth > 0.0)
+            .fold(UNSEEN_S, |most, w| max(most, 1.0 / (core::f32::consts::E * w)));
         let memory = ForceMap::new(settings.memory_1_s, settings.memory_speed_m_s, dt_s)?;
         Ok((disturbance_rad_s + disturbance_z_rad_s > 0.0).then(|| ForceObserver {
             rates_1_s: bandwidths.map(rate_1_s),
             observes: bandwidths.map(|bandwidth| if bandwidth > 0.0 { 1.0 } else { 0.0 }),
             lag: if lag_s > 0.0 { 1.0 - math::exp(-dt_s / lag_s) } else { 1.0 },
+            unseen_s,
             dt_s,
             drag,
             memory,
@@ -254,9 +267,10 @@ impl ForceObserver {
         }))
     }
 
-    /// Returns f \[m/s2\] for this state with the thrust along `up`: known drag plus, along x and y, the remembered
-    /// force and f_hat. Corrects f_hat if the state is `fresh` and its velocity new. Returns zero while the vehicle
-    /// touches the ground.
+    /// Returns f \[m/s2\] for this state with the thrust along `up`: known drag, the remembered force along x and y,
+    /// and f_hat, less the acceleration by the learnt hover thrust beyond the weight. `hover_n` is the learnt hover
+    /// thrust within what the rotors can give. Corrects f_hat if the state is `fresh` and its velocity new. Returns
+    /// zero while the vehicle touches the ground.
     // One copy for both laws and any number of rotors, which keeps the image small.
     #[inline(never)]
     pub fn advance(
@@ -289,10 +303,12 @@ impl ForceObserver {
         let mut known = drag + up * (share * self.gravity_m_s2);
         known.z -= self.gravity_m_s2;
         if observed.held {
-            // A difference that arose while the velocity was not measured is no disturbance, so f_hat stays.
-            observed.restart(measured);
-            (observed.since_s, observed.held) = (0.0, false);
-        } else if fresh && (*measured != observed.last_m_s || observed.since_s > REPEATED_S) {
+            // A difference that arose while the velocity was not measured is no disturbance, so f_hat stays. The
+            // velocity along z is measured all the same.
+            (observed.velocity_m_s.x, observed.velocity_m_s.y) = (measured.x, measured.y);
+            observed.held = false;
+        }
+        if fresh && (*measured != observed.last_m_s || observed.since_s > REPEATED_S) {
             // A velocity that is older than the rates is repeated until it is measured again.
             self.correct(observed, measured, up.z > UPRIGHT);
         }
@@ -302,8 +318,8 @@ impl ForceObserver {
         observed.velocity_m_s = predicted.map(math::settled);
         let mut force = drag + observed.acceleration_m_s2;
         if let Some(more_n) = self.more_hover_thrust_n(observed) {
-            if fresh {
-                let hover_n = observed.hover_n - observed.acceleration_m_s2.z * self.lift_kg;
+            if fresh && up.z > LIFTS {
+                let hover_n = hover_n - math::limited(observed.acceleration_m_s2.z, LIFT_MAX_M_S2) * self.lift_kg;
                 let [least, most] = [HOVER_SHARE_MIN, HOVER_SHARE_MAX].map(|share| share * self.weight_n);
                 observed.hover_n = math::min(math::max(hover_n, least), most);
             }
@@ -321,7 +337,9 @@ impl ForceObserver {
         // What is not observed is not compared.
         let off = scaled(&(measured - observed.velocity_m_s), self.observes);
         let noise_m_s = observed.follow_noise(&off);
-        let most_m_s = ACCELERATION_MAX_M_S2 * math::max(since_s, UNSEEN_S) + OUTLIER * (noise_m_s - QUIET_M_S);
+        // A slower observer sees a force later.
+        let unseen_s = self.unseen_s * noise_m_s / (QUIET_M_S * observed.age.softness);
+        let most_m_s = ACCELERATION_MAX_M_S2 * math::max(since_s, unseen_s) + OUTLIER * (noise_m_s - QUIET_M_S);
         if off.norm_squared() > most_m_s * most_m_s {
             // One such velocity is noise; a second one shows a jump.
             if observed.is_outlier {
@@ -370,168 +388,6 @@ impl ForceObserver {
     pub fn record_thrust(&self, observed: &mut Option<ForceObserverMemory>, thrust_n: f32) {
         if let Some(observed) = observed {
             observed.thrust_n = math::settled(observed.thrust_n + (thrust_n - observed.thrust_n) * self.lag);
-        }
-    }
-}
-
-/// Observer of the body rates, for moments other than the rotors', with g_i of (6):
-///
-/// ```text
-/// dOmega_hat/dt = g U + d + f_hat + 2w (Omega - Omega_hat)      U: U1..U3 as carried out, behind the rotors' lag
-/// df_hat/dt     = w^2 (Omega - Omega_hat)
-/// ```
-///
-/// g of roll and pitch is the model's times the [learnt share](crate::effectiveness).
-///
-/// With f_hat in place of f, (16) commands what INDI does: the given input plus the missing acceleration, each behind
-/// the same two poles.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MomentObserver {
-    /// Corrections of Omega_hat \[1\] and f_hat \[1/s\] per step and rate difference.
-    rate: Vector3<f32>,
-    acceleration: Vector3<f32>,
-    /// Shares replaced per step: of the filtered inputs, and of the filtered known acceleration.
-    lag: f32,
-    age: f32,
-    dt_s: f32,
-    /// g of roll, pitch and yaw.
-    effectiveness: Vector3<f32>,
-    /// Angular acceleration by a moment per mass \[1/m2\].
-    per_moment: Vector3<f32>,
-    /// -1/g of roll, pitch and yaw.
-    ineffectiveness: Vector3<f32>,
-    /// Largest f_hat \[rad/s2\], and largest Omega - Omega_hat that f_hat can cause \[rad/s\].
-    acceleration_max: Vector3<f32>,
-    jump: Vector3<f32>,
-    /// `None` without an observer of roll and pitch.
-    learner: Option<Effectiveness>,
-}
-
-/// Memory of the moment observer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MomentObserverMemory {
-    rates_rad_s: Vector3<f32>,
-    acceleration_rad_s2: Vector3<f32>,
-    /// Angular acceleration g U by the inputs \[rad/s2\].
-    given_rad_s2: Vector3<f32>,
-    /// Known angular acceleration, delayed to the age of the rates \[rad/s2\].
-    known_rad_s2: Vector3<f32>,
-    effectiveness: EffectivenessMemory,
-}
-
-impl MomentObserverMemory {
-    /// Returns the learnt effectiveness of roll and pitch as a share of the model's.
-    #[inline]
-    pub fn effectiveness_share(&self) -> f32 {
-        self.effectiveness.share
-    }
-}
-
-impl MomentObserver {
-    /// Creates the observer from valid settings, for rotors that give at most `thrust_max_n` together, advanced every
-    /// `dt_s` seconds. `None` if both bandwidths are 0.
-    pub fn new(settings: &DisturbanceObserver, vehicle: &Parameters, thrust_max_n: f32, dt_s: f32) -> Option<Self> {
-        let DisturbanceObserver { disturbance_tilt_rad_s: tilt, disturbance_yaw_rad_s: yaw, .. } = *settings;
-        let bandwidth = Vector3::new(tilt, tilt, yaw);
-        let rest = bandwidth.map(|w| 1.0 - math::exp(-w * dt_s));
-        let lag_s = settings.disturbance_lag_s + AGE_S;
-        let effectiveness = vehicle.effectiveness();
-        // The observed acceleration is limited to what the rotors can compensate.
-        let acceleration_max = effectiveness * (0.5 * thrust_max_n);
-        let (rate, acceleration) = (rest * 2.0, rest.map(|rest| rest * rest / dt_s));
-        // A step of f moves Omega - Omega_hat by f t exp(-w t), which is at most f/(e w).
-        let jump = acceleration_max
-            .zip_map(&bandwidth, |most, w| max(most / (core::f32::consts::E * max(w, W_MIN_RAD_S)), 1.0));
-        (tilt + yaw > 0.0).then(|| MomentObserver {
-            rate,
-            acceleration,
-            lag: 1.0 - math::exp(-dt_s / lag_s),
-            age: 1.0 - math::exp(-dt_s / AGE_S),
-            dt_s,
-            effectiveness,
-            per_moment: vehicle.inertia_kg_m2.map(|inertia| vehicle.mass_kg / inertia),
-            ineffectiveness: effectiveness.map(|g| -1.0 / g),
-            acceleration_max,
-            jump,
-            learner: (tilt > 0.0).then(|| Effectiveness::new([rate.x, acceleration.x], jump.x, dt_s)),
-        })
-    }
-
-    /// Returns f_hat of roll, pitch and yaw \[rad/s2\] for these rates, in addition to `known` \[rad/s2\]. Advances
-    /// f_hat by one step if the rates are `fresh`. Returns zero while the vehicle touches the ground.
-    // One copy for both laws and any number of rotors, which keeps the image small.
-    #[inline(never)]
-    pub fn advance(
-        &self,
-        memory: &mut Option<MomentObserverMemory>,
-        rates_rad_s: &Vector3<f32>,
-        known: &Vector3<f32>,
-        ObserverConditions { fresh, touches_ground }: ObserverConditions,
-    ) -> Vector3<f32> {
-        let zero = Vector3::zeros();
-        let start = MomentObserverMemory {
-            rates_rad_s: *rates_rad_s,
-            acceleration_rad_s2: zero,
-            given_rad_s2: zero,
-            known_rad_s2: *known,
-            effectiveness: EffectivenessMemory::default(),
-        };
-        let memory = memory.get_or_insert(start);
-        if touches_ground {
-            *memory = MomentObserverMemory { effectiveness: memory.effectiveness.restarted(), ..start };
-            return zero;
-        }
-        if !fresh {
-            return memory.acceleration_rad_s2;
-        }
-        let MomentObserverMemory {
-            rates_rad_s: omega_hat,
-            acceleration_rad_s2: f_hat,
-            given_rad_s2: given,
-            known_rad_s2,
-            effectiveness,
-        } = memory;
-        // The known moments are delayed to the assumed age of the rates. Otherwise every change of them would be
-        // observed as a disturbance.
-        *known_rad_s2 = (*known_rad_s2 + (known - *known_rad_s2) * self.age).map(math::settled);
-        let off = rates_rad_s - *omega_hat;
-        if let Some(learner) = &self.learner {
-            learner.learn(effectiveness, [off.x, off.y], [given.x, given.y]);
-        }
-        let found =
-            f_hat.zip_zip_map(&self.acceleration.component_mul(&off), &self.acceleration_max, |f, more, most| {
-                math::settled(math::limited(f + more, most))
-            });
-        let within = off.zip_map(&self.jump, |off, jump| off.abs() <= jump);
-        *f_hat = within.zip_zip_map(f_hat, &found, |within, before, found| if within { found } else { before });
-        let corrected = *omega_hat + self.rate.component_mul(&off);
-        let start = within.zip_zip_map(&corrected, rates_rad_s, |within, to, jumped| if within { to } else { jumped });
-        *omega_hat = (start + (*given + *known_rad_s2 + *f_hat) * self.dt_s).map(math::settled);
-        *f_hat
-    }
-
-    /// Returns the angular acceleration \[rad/s2\] by a moment per mass \[m2/s2\].
-    #[inline]
-    pub fn angular_acceleration_rad_s2(&self, moment_m2_s2: &Vector3<f32>) -> Vector3<f32> {
-        moment_m2_s2.component_mul(&self.per_moment)
-    }
-
-    /// Returns U1..U3 \[N\] that compensate an angular acceleration.
-    #[inline]
-    pub fn compensating_inputs_n(&self, acceleration_rad_s2: &Vector3<f32>) -> [f32; 3] {
-        acceleration_rad_s2.component_mul(&self.ineffectiveness).into()
-    }
-
-    /// Stores U1..U3 commanded in this step \[N\], which are `effort` times as large as for the model's rotors.
-    #[inline]
-    pub fn record_inputs(&self, memory: &mut Option<MomentObserverMemory>, given: &Inputs, effort: f32) {
-        if let Some(memory) = memory {
-            let given = Vector3::new(given.roll_n, given.pitch_n, given.yaw_n);
-            // Known weakness of the rotors is no moment. `effort` is bounded away from zero.
-            let mut given = given.component_mul(&self.effectiveness) * (1.0 / effort);
-            let share = memory.effectiveness.share;
-            (given.x, given.y) = (given.x * share, given.y * share);
-            memory.given_rad_s2 = (memory.given_rad_s2 + (given - memory.given_rad_s2) * self.lag).map(math::settled);
         }
     }
 }

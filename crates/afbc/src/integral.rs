@@ -84,14 +84,17 @@ impl SubsystemLaw for IntegralBackstepping {
         integral: &mut IntegralMemory,
     ) -> (f32, Errors) {
         let Gains { backstepping, integral: kappa, integral_max } = &self.gains[axis];
-        let (fixed, errors) = classical(backstepping, tracking, &context.observed(&self.model, axis));
+        let (softness, tracking) = context.softened(axis, tracking);
+        let backstepping = backstepping.slowed(softness);
+        let (fixed, errors) = classical(&backstepping, &tracking, &context.observed(&self.model, axis));
         if let Some(input) = integral.resume.take() {
             integral.value = input - fixed;
         }
         // The integral is limited where it is used, because the input to resume may also ask for more than the bound.
         let i = math::min(math::max(integral.value, -integral_max), *integral_max);
         let winds_up = errors.e2 * context.unallocated[axis] > 0.0;
-        integral.value = if context.adapt && !winds_up { i + kappa * errors.e2 * context.dt_s } else { i };
+        integral.value =
+            if context.adapt && !winds_up { i + kappa * (softness * softness) * errors.e2 * context.dt_s } else { i };
         (fixed + i, errors)
     }
 

@@ -68,6 +68,14 @@ impl StepContext<'_> {
         model.dynamics_at(axis, &self.state.rates_rad_s, &self.roll_pitch, self.rotor_residual_rad_s)
     }
 
+    /// Returns the factor on the speed of a subsystem, and its tracking with the approach speed of that factor.
+    #[inline(always)]
+    pub(crate) fn softened(&self, axis: Axis, tracking: &SubsystemTracking) -> (f32, SubsystemTracking) {
+        let softness = if matches!(axis, Axis::Z) { self.softness } else { 1.0 };
+        let approach_1_s = tracking.approach_1_s.map(|approach_1_s| approach_1_s * softness);
+        (softness, SubsystemTracking { approach_1_s, ..*tracking })
+    }
+
     /// Returns f, g and dg/dt with the observed f of x, y and z. The observed moments of roll, pitch and yaw are
     /// compensated after the law.
     #[inline(always)]

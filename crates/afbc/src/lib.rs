@@ -53,6 +53,7 @@ pub mod jump_filter;
 pub mod law;
 pub mod limits;
 pub mod model;
+pub mod moments;
 pub mod monitor;
 mod profile;
 pub mod reference;

@@ -78,7 +78,7 @@ impl StandstillDetector {
         &mut self,
         [thrust_n, weight_n]: [f32; 2],
         state: &State,
-        [reference_m_s, observed_m_s2]: [f32; 2],
+        [reference_m_s, pushed_m_s2]: [f32; 2],
         dt_s: f32,
     ) {
         let slower = |speed_max| state.velocity_m_s.iter().all(|v| v.abs() < speed_max);
@@ -86,7 +86,7 @@ impl StandstillDetector {
         let lacks_lift = thrust_n < LIFT_SHARE * weight_n;
         self.still_s = if lacks_lift && slower(speed_max) { self.still_s + dt_s } else { 0.0 };
         let is_stopped = || reference_m_s < -SINKS_M_S && state.velocity_m_s.z > STOPPED_SHARE * reference_m_s;
-        let has_touched = observed_m_s2 > PUSHED_M_S2 && lacks_lift && is_stopped();
+        let has_touched = pushed_m_s2 > PUSHED_M_S2 && lacks_lift && is_stopped();
         // A standing vehicle is landed anew in every step, so that its height counts from where it stood last.
         if self.is_standing() || has_touched {
             self.land();

@@ -213,6 +213,78 @@ fn the_hover_thrust_is_learnt_from_the_observed_force() {
     }
 }
 
+/// While the position is lost, the velocity along z is measured all the same, so that the hover thrust converges
+/// instead of following a force that nobody corrects.
+#[test]
+fn the_hover_thrust_does_not_run_away_without_a_position() {
+    for strength in [0.8_f32, 1.2] {
+        let mut flight = Lift::new();
+        let mut share = 1.0;
+        for step in 0..20_000 {
+            // The position is lost while f_hat is at its largest.
+            if step > 100 {
+                flight.memory.as_mut().unwrap().hold();
+            }
+            let motion = 0.01 * (0.02 * step as f32).sin();
+            share = 1.0 - flight.step([share + motion, strength, 0.0], 0) / 9.81;
+        }
+        let hover_n = flight.observer.hover_thrust_n(&flight.memory).unwrap();
+        assert!((hover_n / weight_n() * strength - 1.0).abs() < 0.02, "{strength}: {hover_n} N");
+    }
+}
+
+/// The force of the feet, until the ground is detected, takes little of the learnt hover thrust. Upside down, nothing
+/// is learnt.
+#[test]
+fn the_hover_thrust_is_not_learnt_from_the_feet_or_upside_down() {
+    let mut flight = Lift::new();
+    for step in 0..250 {
+        // The feet carry the weight.
+        flight.step([0.0, 1.0, 9.81 + 0.1 * (0.3 * step as f32).sin()], 0);
+    }
+    let hover_n = flight.observer.hover_thrust_n(&flight.memory).unwrap();
+    assert!(hover_n > 0.7 * weight_n(), "{hover_n} N");
+
+    let mut flight = Lift::new();
+    for step in 0..500 {
+        let velocity_m_s = Vector3::new(0.0, 0.0, -2.0 * 9.81 * DT_S * step as f32);
+        let state = State { velocity_m_s, ..State::default() };
+        let (down, hover_n) = (-Vector3::z(), flight.observer.hover_thrust_n(&flight.memory).unwrap_or(weight_n()));
+        flight.observer.advance(&mut flight.memory, &state, &down, hover_n, conditions(true, false));
+        flight.observer.record_thrust(&mut flight.memory, 0.5 * weight_n());
+    }
+    assert_eq!(flight.observer.hover_thrust_n(&flight.memory), Some(weight_n()));
+}
+
+/// In noise of the velocity the observer is slower, and a strong gust is no jump of the state.
+#[test]
+fn a_gust_in_noise_is_found() {
+    let observer = observer(40.0);
+    let mut random = 1_u32;
+    let mut noise = || {
+        let mut sum = 0.0;
+        for _ in 0..12 {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            sum += random as f32 / u32::MAX as f32;
+        }
+        0.04 * (sum - 6.0)
+    };
+    let mut body = Body::new(Vector3::zeros(), weight_n());
+    for step in 0..2_000 {
+        let gust_m_s2 = if step < 1_000 { 0.0 } else { 9.0 };
+        let mut measured = body.state;
+        measured.velocity_m_s += Vector3::new(noise(), noise(), noise());
+        let up = body.up();
+        let seen = observer.advance(&mut body.memory, &measured, &up, weight_n(), conditions(true, false));
+        observer.record_thrust(&mut body.memory, weight_n());
+        body.state.velocity_m_s.x += gust_m_s2 * DT_S;
+        // Two poles at a quarter of w take 0.4 s to 90 %.
+        if step > 1_500 {
+            assert!(seen.x > 0.8 * 9.0, "step {step}: {seen:?}");
+        }
+    }
+}
+
 /// The age of the velocity shows in the motion that the thrust causes, whatever force acts beside it. New states show
 /// none, and old ones soften z. An age that ends is forgotten.
 #[test]

@@ -4,7 +4,7 @@
 use afbc::adaptive::{ControlTerms, Gains, Subsystem, SubsystemConditions};
 use afbc::backstepping::{self, ideal, proportional};
 use afbc::fuzzy::{FuzzyBasis, Membership};
-use afbc::integral::IntegralBackstepping;
+use afbc::integral::{IntegralBackstepping, IntegralMemory};
 use afbc::law::StepContext;
 use afbc::law::SubsystemTracking;
 use afbc::model::{Dynamics, ModelConstants, RollPitch};
@@ -130,6 +130,50 @@ proptest! {
         let terms = (a1 + a2) * size + (f64::from(stiffness) + a1 * a2 + a1 * a1) * e1.abs();
         let allowed = 24.0 * U * (terms + f64::from(tracking.x1d_ddot).abs());
         prop_assert!((f64::from(unlimited) - f64::from(u)).abs() <= allowed, "{unlimited} and {u}");
+    }
+
+    /// For old states, z is slower also at the speed limit: where the limit begins, the input does not jump. The
+    /// fallback law is slower by the same factor.
+    #[test]
+    fn old_states_make_z_slower_within_and_at_the_speed_limit(
+        tracking in tracking(), alpha1 in 0.1_f32..10.0, alpha2 in 0.1_f32..20.0, stiffness in 0.0_f32..50.0,
+        softness in 0.2_f32..1.0,
+    ) {
+        let vehicle = Parameters::PAPER.to_f32();
+        let model = ModelConstants::new(&vehicle);
+        let gains = backstepping::Gains { alpha1, alpha2, stiffness };
+        let slower = backstepping::Gains {
+            alpha1: alpha1 * softness,
+            alpha2: alpha2 * softness,
+            stiffness: stiffness * softness * softness,
+        };
+        let context = StepContext {
+            state: &State::default(),
+            roll_pitch: RollPitch::new(&State::default()),
+            rotor_residual_rad_s: 0.0,
+            dt_s: 0.001,
+            adapt: false,
+            unallocated: &PerAxis::default(),
+            observed_m_s2: Vector3::zeros(),
+            softness,
+            known: Some(&model),
+        };
+        let of = |backstepping| Gains { backstepping, ..Profile::Flight.gains().z };
+        let law = Adaptive::new(PerAxis::from_fn(|_| of(gains))).unwrap();
+        let fallback = IntegralBackstepping::new(&vehicle, PerAxis::from_fn(|_| (&of(gains)).into())).unwrap();
+        let slow = Backstepping::new(&vehicle, PerAxis::from_fn(|_| slower)).unwrap();
+        let firm = StepContext { softness: 1.0, ..context };
+        let at_limit = SubsystemTracking { approach_1_s: Some(law.approach(Axis::Z, Some(&model))), ..tracking };
+        let slow_limit = SubsystemTracking { approach_1_s: Some(slow.approach(Axis::Z, None)), ..tracking };
+        for (tracking, slow_tracking) in [(&tracking, &tracking), (&at_limit, &slow_limit)] {
+            let (expected, errors) = slow.input(Axis::Z, slow_tracking, &firm, &mut ());
+            let own = law.input(Axis::Z, tracking, &context, &mut AdaptiveEstimate::default()).0;
+            let other = fallback.input(Axis::Z, tracking, &context, &mut IntegralMemory::default()).0;
+            let size = vehicle.weight_n() + alpha2 * (errors.e2.abs() + 1.0)
+                + (stiffness + alpha1 * alpha1) * (tracking.e1.abs() + errors.e1_dot.abs() + 1.0);
+            prop_assert!((own - expected).abs() < 1e-4 * size, "{own}, not {expected}");
+            prop_assert!((other - expected).abs() < 1e-4 * size, "{other}, not {expected}");
+        }
     }
 
     /// The feed-forward is (16) by the known model in this state, in addition to what the law learns. AFBC uses drag

@@ -1,7 +1,7 @@
 //! The cascade compensates observed and known moments in addition to the law's own inputs.
 
 use crate::common::step;
-use afbc::disturbance::AGE_S;
+use afbc::moments::AGE_S;
 use afbc::{Adaptive, Controller, Profile, Settings};
 use afbc_control::drag::KnownDrag;
 use afbc_control::{Smoother, Validated};

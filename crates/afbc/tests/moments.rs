@@ -1,7 +1,8 @@
 //! Compares the moment observer with its closed solution, and checks which effects it must not see as a moment.
 
-use afbc::disturbance::{AGE_S, DisturbanceObserver, MomentObserver, MomentObserverMemory, ObserverConditions};
+use afbc::disturbance::{DisturbanceObserver, ObserverConditions};
 use afbc::effectiveness::{AGED_S, SHARE_MAX, SHARE_MIN};
+use afbc::moments::{AGE_S, MomentObserver, MomentObserverMemory};
 use afbc_types::{Inputs, Parameters};
 use nalgebra::Vector3;
 use proptest::prelude::*;

@@ -365,8 +365,7 @@ fn gains(contender: &Contender) -> Markup {
 }
 
 /// Column heads of AFBC's gains.
-const AFBC_GAINS: [&str; 13] =
-    ["α₁", "α₂", "c", "γ", "η", "ε", "centre", "width", "σ", "κ", "Θ max", "δ max", "dead zone"];
+const AFBC_GAINS: [&str; 11] = ["α₁", "α₂", "c", "γ", "η", "ε", "centre", "width", "σ", "Θ max", "δ max"];
 
 fn per_axis<G: Declared>(names: &[&str], gains: &PerAxis<G>) -> Markup {
     html! {
