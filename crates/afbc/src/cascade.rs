@@ -257,7 +257,7 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
             adapt: fresh && !touches_ground,
             unallocated: &last.unallocated,
             observed_m_s2,
-            softness: filters.forces.map_or(1.0, |forces| forces.softness()),
+            softness: filters.forces.as_ref().map_or(1.0, ForceObserverMemory::softness),
             known: self.settings.feed_forward.then_some(&self.model),
         };
         let eta_dot = self.eta_dot(state, &attitude);

@@ -233,6 +233,13 @@ impl Guidance {
     #[must_use = "the vehicle must fly the returned setpoint"]
     #[inline]
     pub fn tick(&mut self, given: &GuidanceInputs<'_>, orders: &Orders) -> GuidanceOutputs {
+        let state = given.state.filter(|state| state.is_plausible());
+        self.tick_with_plausible_state(&GuidanceInputs { state, ..*given }, orders)
+    }
+
+    /// As [`tick`](Self::tick), for a state that is [plausible](State::is_plausible), as those of the flight core are.
+    #[inline(always)]
+    pub fn tick_with_plausible_state(&mut self, given: &GuidanceInputs<'_>, orders: &Orders) -> GuidanceOutputs {
         self.memory.tick(&self.settings, given, orders)
     }
 }
@@ -242,7 +249,7 @@ impl Memory {
     fn tick(&mut self, settings: &Settings, given: &GuidanceInputs<'_>, orders: &Orders) -> GuidanceOutputs {
         // The comparison is false for NaN.
         let dt_s = if given.dt_s > 0.0 { min(max(given.dt_s, 1e-4), 0.02) } else { 0.001 };
-        let state = given.state.filter(|state| state.is_plausible());
+        let state = given.state;
         let armed = given.core.armed();
         let airborne = armed && given.airborne;
         let mut notices = GuidanceNotices::default();

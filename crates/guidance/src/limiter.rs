@@ -252,8 +252,19 @@ impl Limiter {
             Some(CompleteTarget { position_m: p, velocity_m_s: v, acceleration_m_s2 }) => {
                 // An acceleration that fits no flight would only drive the vehicle away from the target.
                 let a = if fits { acceleration_m_s2 } else { Vector3::zeros() };
-                let j = jerk_m_s3;
-                (MotionGoal::of(p.xy(), v.xy(), a.xy(), j.xy()), MotionGoal::of(one(p), one(v), one(a), one(j)))
+                let goal = MotionGoal {
+                    position: Some(p.xy()),
+                    velocity: Some(v.xy()),
+                    acceleration: a.xy(),
+                    jerk: jerk_m_s3.xy(),
+                };
+                let climb = MotionGoal {
+                    position: Some(one(p)),
+                    velocity: Some(one(v)),
+                    acceleration: one(a),
+                    jerk: one(jerk_m_s3),
+                };
+                (goal, climb)
             }
             None => {
                 let LimiterTarget { position_m: p, velocity_m_s: v, acceleration_m_s2: a, .. } = *aim;
@@ -283,8 +294,8 @@ impl Limiter {
 fn complete(aim: &LimiterTarget) -> Option<CompleteTarget> {
     let or_zero = |vector: Vector3<f32>| vector.map(|value| if value.is_nan() { 0.0 } else { value });
     let LimiterTarget { position_m, velocity_m_s, acceleration_m_s2, .. } = *aim;
-    // Given values are finite, so their sum is a number.
-    (!position_m.sum().is_nan()).then(|| CompleteTarget {
+    let given = !position_m.iter().any(|value| value.is_nan());
+    given.then(|| CompleteTarget {
         position_m,
         velocity_m_s: or_zero(velocity_m_s),
         acceleration_m_s2: or_zero(acceleration_m_s2),
@@ -297,7 +308,7 @@ fn goal<const D: usize>(
     velocity: nalgebra::SVector<f32, D>,
     acceleration: nalgebra::SVector<f32, D>,
 ) -> MotionGoal<D> {
-    let given = |vector: nalgebra::SVector<f32, D>| (!vector.sum().is_nan()).then_some(vector);
+    let given = |vector: nalgebra::SVector<f32, D>| (!vector.iter().any(|value| value.is_nan())).then_some(vector);
     let zero = nalgebra::SVector::zeros();
     let (position, velocity, acceleration) = (given(position), given(velocity), given(acceleration));
     match (position, velocity, acceleration) {

@@ -85,18 +85,6 @@ pub(crate) struct MotionGoal<const D: usize> {
     pub(crate) jerk: SVector<f32, D>,
 }
 
-impl<const D: usize> MotionGoal<D> {
-    /// Makes a goal of which everything is given.
-    pub(crate) fn of(
-        position: SVector<f32, D>,
-        velocity: SVector<f32, D>,
-        acceleration: SVector<f32, D>,
-        jerk: SVector<f32, D>,
-    ) -> Self {
-        MotionGoal { position: Some(position), velocity: Some(velocity), acceleration, jerk }
-    }
-}
-
 /// Limits that may change from tick to tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct MotionBounds {
@@ -260,7 +248,7 @@ impl MotionShaper {
 
 /// Returns the limit for the vector's direction: the first for positive, the second for negative coordinates.
 fn side<const D: usize>(vector: &SVector<f32, D>, (up, down): (f32, f32)) -> f32 {
-    if D == 1 && vector.iter().all(|coordinate| *coordinate < 0.0) { down } else { up }
+    if vector.iter().all(|coordinate| *coordinate < 0.0) && D == 1 { down } else { up }
 }
 
 /// Returns the vector, shortened to the length `most` if longer.

@@ -82,7 +82,7 @@ impl GuidanceStage {
             sensors: core.sensors,
             available_thrust: self.available_thrust,
         };
-        let guided = self.guidance.tick(&guidance_inputs, orders);
+        let guided = self.guidance.tick_with_plausible_state(&guidance_inputs, orders);
         if let Some(value) = guided.setpoint {
             inbox.put_own_setpoint(Stamped { value, at_us: now_us });
         }

@@ -33,31 +33,42 @@ const SNAP_MAX_M_S4: f32 = 1e7;
 const ANGLE_MAX_RAD: f32 = 1e3;
 /// Largest angular rate, per coordinate \[rad/s\].
 const RATE_MAX_RAD_S: f32 = 1e3;
+/// Number that is within the bounds of a velocity, of an angle and of a rate.
+const REST_MAX: f32 = 1e3;
+const _: () = assert!(REST_MAX <= VELOCITY_MAX_M_S && REST_MAX <= ANGLE_MAX_RAD && REST_MAX <= RATE_MAX_RAD_S);
 /// Largest heading and derivatives of the heading \[rad, rad/s, rad/s2\].
 const HEADING_MAX: f32 = 1e3;
 
-/// True if the vector is finite and within this bound, per coordinate.
-#[inline(always)]
-pub(crate) fn within(vector: &Vector3<f32>, max: f32) -> bool {
-    // Nearly every vector passes by its length, in a third of the instructions. NaN returns false.
-    vector.norm_squared() <= max * max || is_each_within(vector, max)
+/// Returns a number whose highest bit is set if a coordinate is larger than `max` in size or NaN.
+fn excess(vector: &Vector3<f32>, max: f32) -> u32 {
+    // The bits of positive numbers are in the order of the numbers, with NaN last. A negative difference sets the
+    // highest bit, so one branch suffices for a whole state.
+    let excess = vector.map(|value| max.to_bits().wrapping_sub(value.abs().to_bits()));
+    excess.x | excess.y | excess.z
 }
 
-/// As [`within`], for vectors that are longer than the bound.
-#[cold]
-#[inline(never)]
-fn is_each_within(vector: &Vector3<f32>, max: f32) -> bool {
-    vector.x.abs() <= max && vector.y.abs() <= max && vector.z.abs() <= max
+/// True if each vector is finite and within its bound, per coordinate.
+#[inline]
+pub(crate) fn within<const N: usize>(vectors: [(&Vector3<f32>, f32); N]) -> bool {
+    vectors.into_iter().fold(0, |any, (vector, max)| any | excess(vector, max)) >> 31 == 0
 }
 
 impl State {
     /// True if every value is finite and physically possible: at most 1e5 m, 1e3 m/s, 1e3 rad and 1e3 rad/s in size.
     /// Controllers must reject other states.
     pub fn is_plausible(&self) -> bool {
-        within(&self.position_m, POSITION_MAX_M)
-            && within(&self.velocity_m_s, VELOCITY_MAX_M_S)
-            && within(&self.attitude_rad, ANGLE_MAX_RAD)
-            && within(&self.rates_rad_s, RATE_MAX_RAD_S)
+        // Nearly every state passes by its sums of squares, which takes fewer instructions than the exact check. A sum
+        // with a number that is not finite is not within any bound.
+        let State { position_m, velocity_m_s, attitude_rad, rates_rad_s } = self;
+        let rest = velocity_m_s.norm_squared() + attitude_rad.norm_squared() + rates_rad_s.norm_squared();
+        let is_small = position_m.norm_squared() <= POSITION_MAX_M * POSITION_MAX_M && rest <= REST_MAX * REST_MAX;
+        is_small
+            || within([
+                (position_m, POSITION_MAX_M),
+                (velocity_m_s, VELOCITY_MAX_M_S),
+                (attitude_rad, ANGLE_MAX_RAD),
+                (rates_rad_s, RATE_MAX_RAD_S),
+            ])
     }
 }
 
@@ -108,11 +119,13 @@ impl Setpoint {
     /// 1e3 m/s2 and 1e3 rad/s2, jerk of at most 1e5 m/s3 and snap of at most 1e7 m/s4.
     pub fn is_plausible(&self) -> bool {
         let heading = Vector3::new(self.yaw_rad, self.yaw_rate_rad_s, self.yaw_acceleration_rad_s2);
-        within(&self.position_m, POSITION_MAX_M)
-            && within(&self.velocity_m_s, VELOCITY_MAX_M_S)
-            && within(&self.acceleration_m_s2, ACCELERATION_MAX_M_S2)
-            && within(&self.jerk_m_s3, JERK_MAX_M_S3)
-            && within(&self.snap_m_s4, SNAP_MAX_M_S4)
-            && within(&heading, HEADING_MAX)
+        within([
+            (&self.position_m, POSITION_MAX_M),
+            (&self.velocity_m_s, VELOCITY_MAX_M_S),
+            (&self.acceleration_m_s2, ACCELERATION_MAX_M_S2),
+            (&self.jerk_m_s3, JERK_MAX_M_S3),
+            (&self.snap_m_s4, SNAP_MAX_M_S4),
+            (&heading, HEADING_MAX),
+        ])
     }
 }

@@ -35,7 +35,7 @@ impl Pose {
         let Pose { position_m, attitude: [w, x, y, z], sigmas: PoseSigmas { position_m: position, attitude_rad } } =
             *self;
         let is_sigma = |sigma: f32| sigma > 0.0 && sigma < f32::INFINITY;
-        within(&position_m, POSITION_MAX_M)
+        within([(&position_m, POSITION_MAX_M)])
             && is_rotation(&Quaternion::new(w, x, y, z))
             && position.is_none_or(is_sigma)
             && attitude_rad.is_none_or(is_sigma)
