@@ -84,8 +84,8 @@ const BAD_TABLES: [(&str, &str); 70] = [
         ":5: settings.rate_hz: unknown key; \
          known here: dt_s, rotor_force_max_n, raised_thrust_max, rotor_drag_1_s, body_drag_1_m, rotor_height_m, \
          command_filter_rad_s, forward_rad_s, tilt_by_thrust, anti_windup, freeze_on_ground, bumpless, feed_forward, \
-         by_rotation, disturbance_rad_s, disturbance_tilt_rad_s, disturbance_yaw_rad_s, memory_1_s, \
-         memory_speed_m_s, disturbance_lag_s, reference_xy_rad_s, reference_z_rad_s, reference_yaw_rad_s, \
+         by_rotation, disturbance_rad_s, disturbance_z_rad_s, disturbance_tilt_rad_s, disturbance_yaw_rad_s, \
+         memory_1_s, memory_speed_m_s, disturbance_lag_s, reference_xy_rad_s, reference_z_rad_s, reference_yaw_rad_s, \
          reference_acceleration_m_s2, reference_turn_rad_s2, reference_yaw_rate_rad_s, smooth_tilt_rad_s, \
          smooth_yaw_rad_s, smooth_lift_rad_s, lead_s",
     ),

@@ -43,8 +43,8 @@ pub struct AgeMemory {
     /// p \[m/s2\] and q \[m/s3\].
     p: f32,
     q: f32,
-    /// a of the last step \[m/s2\].
-    last_m_s2: f32,
+    /// a of the last step \[m/s2\], `None` before the first one.
+    last_m_s2: Option<f32>,
     /// Mean time between two velocities \[s\].
     interval_s: f32,
     /// Factor on the speed of z: 1 up to [`FREE_S`], falling towards 0 with the mean age of the state.
@@ -53,7 +53,7 @@ pub struct AgeMemory {
 
 impl Default for AgeMemory {
     fn default() -> Self {
-        AgeMemory { age_s: 0.0, p: 0.0, q: 0.0, last_m_s2: 0.0, interval_s: 0.0, softness: 1.0 }
+        AgeMemory { age_s: 0.0, p: 0.0, q: 0.0, last_m_s2: None, interval_s: 0.0, softness: 1.0 }
     }
 }
 
@@ -61,14 +61,15 @@ impl AgeMemory {
     /// Returns the memory after a touch of the ground, where the age is kept.
     #[must_use]
     pub fn restarted(&self) -> Self {
-        AgeMemory { p: 0.0, q: 0.0, ..*self }
+        AgeMemory { p: 0.0, q: 0.0, last_m_s2: None, ..*self }
     }
 
     /// Continues with the known acceleration of this step \[m/s2\].
     #[inline(always)]
     pub fn predict(&mut self, known_m_s2: f32, dt_s: f32) {
-        self.p = math::settled(self.p - (known_m_s2 - self.last_m_s2) - self.q * dt_s);
-        self.last_m_s2 = known_m_s2;
+        let change_m_s2 = self.last_m_s2.map_or(0.0, |last_m_s2| known_m_s2 - last_m_s2);
+        self.p = math::settled(self.p - change_m_s2 - self.q * dt_s);
+        self.last_m_s2 = Some(known_m_s2);
     }
 
     /// Learns from v - v_hat \[m/s\] of a velocity measured `since_s` after the last one, which corrects v_hat by twice
