@@ -168,7 +168,7 @@ impl ControlTerms {
     }
 }
 
-/// What the cascade tells a subsystem in one step, besides its errors.
+/// Conditions of a step that the cascade sets for a subsystem, besides its errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SubsystemConditions {
     /// Part of the input that the last step could not allocate.

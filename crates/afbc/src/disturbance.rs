@@ -334,7 +334,7 @@ impl ForceObserver {
         let since_s = math::min(math::max(observed.since_s, self.dt_s), LONG_S);
         (observed.last_m_s, observed.since_s) = (*measured, 0.0);
         let [rate_xy_1_s, rate_z_1_s] = self.rates_1_s;
-        // What is not observed is not compared.
+        // An axis without an observer is not compared.
         let off = scaled(&(measured - observed.velocity_m_s), self.observes);
         let noise_m_s = observed.follow_noise(&off);
         // A slower observer sees a force later.

@@ -179,7 +179,6 @@ fn swung(share: f32, rad_s: f32, late_s: f32, f: &Vector3<f32>) -> f32 {
         let u = Vector3::new((rad_s * t).sin(), (rad_s * t).cos(), 0.0) * 2.0;
         wire.push_back(body.rates);
         let rates = std::mem::replace(&mut body.rates, wire.pop_front().unwrap());
-        // The learnt share is the observer's known weakness, as in the cascade.
         body.step(&observer, &u, &Vector3::zeros(), 1.0);
         let turned = (body.input.component_mul(&effectiveness()) * share + f) * DT_S;
         body.rates = rates + turned;
@@ -194,7 +193,7 @@ fn the_effectiveness_is_learnt_from_large_moments() {
         for rad_s in [10.0, 20.0, 30.0] {
             for f in [Vector3::zeros(), Vector3::new(20.0, -10.0, 0.0)] {
                 let learnt = swung(share, rad_s, 0.0, &f);
-                // What old rates may explain does not count.
+                // The observer leaves out a shortfall that old rates may explain.
                 let aged = 0.5 * (AGED_S * rad_s) * (AGED_S * rad_s);
                 let (least, most) = (share - 0.05, share + aged.min(1.0 - share) + 0.05);
                 assert!((least..most).contains(&learnt), "{share} at {rad_s} rad/s, {f:?}: {learnt}");
