@@ -160,6 +160,11 @@ fn raised(block: &mut CovarianceBlock, least: f32) {
 #[inline]
 fn held(block: &mut CovarianceBlock, bounds: &VarianceBounds) -> bool {
     mirror(block);
+    // The usual case takes comparisons alone.
+    let usual = |variance: f32| variance > bounds.least && variance <= bounds.most;
+    if usual(block.m11) && usual(block.m22) && usual(block.m33) {
+        return false;
+    }
     raised(block, bounds.least);
     block.m11 > bounds.most || block.m22 > bounds.most || block.m33 > bounds.most
 }

@@ -15,7 +15,7 @@ use crate::memory::Memory;
 use crate::queue::{AidObservation, FusedAxes, PendingFusion, parts};
 use crate::restart::reference;
 use crate::rotation::{renormalized, small, yaw_between};
-use afbc_control::math::{abs_max, max, min, sqrt};
+use afbc_control::math::{abs_max, limited, max, min, sqrt};
 use nalgebra::Vector3;
 
 /// Maximum age of a measurement when its turn comes: 250 ms plus the waiting time \[us\].
@@ -322,7 +322,7 @@ impl Estimator {
 
     /// Adds a correction to the state.
     fn correct(&self, memory: &mut Memory, by: &ErrorVector) {
-        let limited = |bias: Vector3<f32>, most: f32| bias.map(|x| max(-most, min(x, most)));
+        let within = |bias: Vector3<f32>, most: f32| bias.map(|x| limited(x, most));
         let turn = small(&by.theta);
         let nominal = &mut memory.nominal;
         nominal.turn_to(renormalized(&(turn * nominal.attitude)));
@@ -330,8 +330,8 @@ impl Estimator {
         // The correction belongs to the covariance's time. The nominal state is up to 3 ms newer.
         let moved = by.position + by.velocity * memory.interval.time_s;
         nominal.move_by(&moved);
-        nominal.gyro_bias = limited(nominal.gyro_bias + by.gyro, self.settings.gyro_bias_max_rad_s);
-        nominal.accel_bias = limited(nominal.accel_bias + by.accel, self.settings.accel_bias_max_m_s2);
+        nominal.gyro_bias = within(nominal.gyro_bias + by.gyro, self.settings.gyro_bias_max_rad_s);
+        nominal.accel_bias = within(nominal.accel_bias + by.accel, self.settings.accel_bias_max_m_s2);
         memory.height_offset += by.baro;
         memory.turned = turn * memory.turned;
         memory.yaw_bank.turn(by.theta.z);
