@@ -140,8 +140,8 @@ fn spread(input: f32, weights: &Matrix3<f32>, norm_max: f32) -> AdaptiveEstimate
 #[inline]
 fn advance(estimate: &mut AdaptiveEstimate, rate: &AdaptationRate, safeguards: &Safeguards, dt_s: f32) {
     let Safeguards { sigma, theta_max, delta_max } = *safeguards;
-    // If the leakage is faster than the step, the estimate becomes zero and does not change sign.
-    let keep = math::max(1.0 - sigma * dt_s, 0.0);
+    // At least 0.8 by the ranges of sigma and of the time step.
+    let keep = 1.0 - sigma * dt_s;
     let theta = estimate.theta * keep + rate.first * (rate.theta * dt_s) * rate.second.transpose();
     let square = theta.norm_squared();
     estimate.theta = if square > theta_max * theta_max { theta * (theta_max / math::sqrt(square)) } else { theta };

@@ -4,7 +4,7 @@
 use crate::rig::suite::{Pace, Suite, reads_the_whole_range};
 use crate::rig::{Model, Rig, Trouble, noise, reads, run};
 use afbc_drivers::icm426xx::{Icm426xx, Icm42688p};
-use afbc_drivers::{InertialReading, PartFault};
+use afbc_drivers::{InertialReading, PartFault, SensorPart};
 use embassy_futures::block_on;
 
 /// Registers of bank 0; of banks 1 and 2, only the self-test data.
@@ -214,6 +214,21 @@ fn all_pass_the_suite() {
     passes::<0x47, true>(0x42);
     passes::<0x42, false>(0x47);
     passes::<0x42, true>(0x47);
+}
+
+/// An axis that has not been measured yet makes an answer no reading.
+#[test]
+fn an_axis_without_a_measurement_is_no_reading() {
+    let take = |answer: [u8; 14]| Icm42688p::<true> {}.take(0, &answer);
+    assert!(take([0; 14]).unwrap().is_some());
+    // The first number is the temperature.
+    for axis in 1..7 {
+        let mut answer = [0; 14];
+        answer[2 * axis] = 0x80;
+        assert_eq!(take(answer), Ok(None), "axis {axis}");
+        answer[2 * axis + 1] = 1;
+        assert!(take(answer).unwrap().is_some(), "axis {axis}");
+    }
 }
 
 /// The part always shows the present rates, however it moves.

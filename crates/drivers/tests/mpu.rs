@@ -4,7 +4,7 @@ use crate::rig::mpu_registers::Registers;
 use crate::rig::suite::{Pace, Suite, reads_the_whole_range};
 use crate::rig::{Rig, reads, run};
 use afbc_drivers::mpu::{Icm20602, Icm20608, Icm20689, Mpu, Mpu6000, Mpu6500, Mpu9250};
-use afbc_drivers::{InertialReading, PartFault, SensorPart};
+use afbc_drivers::{InertialReading, PartFault, ScriptStep, SensorPart};
 use embassy_futures::block_on;
 
 fn right(reading: &InertialReading) -> bool {
@@ -117,4 +117,12 @@ fn the_self_test_of_the_mpu_6500_and_mpu_9250_passes_as_at_the_factory() {
         let result = tested(Mpu6500 {}, 0x70, [[0; 4]; 2], responses);
         assert_eq!(result, if passes { Ok(()) } else { Err(PartFault::SelfTest) }, "{rate}, {force}");
     }
+}
+
+/// The data sheets ask for a reset of the signal paths after that of the part, of an MPU and not of an ICM.
+#[test]
+fn an_mpu_also_resets_its_signal_paths() {
+    let resets = |setup: &[ScriptStep]| setup.iter().any(|step| matches!(step, ScriptStep::Write(0x68, 0b111)));
+    assert!([Mpu6000::SETUP, Mpu6500::SETUP, Mpu9250::SETUP].into_iter().all(resets));
+    assert!(![Icm20602::SETUP, Icm20608::SETUP, Icm20689::SETUP].into_iter().any(resets));
 }
