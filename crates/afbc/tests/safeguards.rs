@@ -46,7 +46,7 @@ fn reference(gains: &Gains, e2: f32, unallocated: f32, dt_s: f32, before: &Adapt
     let towards_limit = f64::from(e2) * f64::from(unallocated) > 0.0;
     let e2 = f64::from(e2);
     let e = if towards_limit { 0.0 } else { e2 };
-    let keep = (1.0 - sigma * dt).max(0.0);
+    let keep = 1.0 - sigma * dt;
     let mut theta = before.theta.map(f64::from) * keep + w * (gamma * e * dt);
     if theta.norm() > theta_max {
         theta *= theta_max / theta.norm();
@@ -185,6 +185,13 @@ proptest! {
         prop_assert_eq!(heeding.x, careless.x, "its limits are not the rotors'");
         prop_assert!(heeding.z.theta.m22 < careless.z.theta.m22 && heeding.roll != careless.roll);
     }
+}
+
+/// No step can turn an estimate's sign by leakage: the ranges of sigma and of the time step leave at least 0.8 of it.
+#[test]
+fn the_ranges_keep_the_leakage_slower_than_the_step() {
+    let lost = Safeguards::SIGMA.range.max * afbc_control::Settings::DT.range.max;
+    assert!(lost < 0.201, "{lost} of an estimate in a step");
 }
 
 /// Without an error, an estimate decays by exp(-sigma t). Under a constant error, delta_hat settles where adaptation

@@ -119,7 +119,7 @@ fn the_self_test_of_the_mpu_6500_and_mpu_9250_passes_as_at_the_factory() {
     }
 }
 
-/// The data sheets ask for a reset of the signal paths after that of the part, of an MPU and not of an ICM.
+/// After its own reset, an MPU needs one of its signal paths (register 0x68), by its register map. An ICM does not.
 #[test]
 fn an_mpu_also_resets_its_signal_paths() {
     let resets = |setup: &[ScriptStep]| setup.iter().any(|step| matches!(step, ScriptStep::Write(0x68, 0b111)));
