@@ -61,6 +61,28 @@ impl PartTiming for Time {
     }
 }
 
+/// A clock to which no interrupt is wired.
+struct Clock(Time);
+
+impl PartTiming for Clock {
+    fn now_us(&self) -> u64 {
+        self.0.now_us()
+    }
+
+    async fn wait(&self, us: u32) {
+        self.0.wait(us).await;
+    }
+}
+
+/// Without an interrupt, a part is taken to be ready after the whole time.
+#[test]
+fn without_a_wire_the_whole_time_is_waited() {
+    let time = Time::default();
+    let mut clock = Clock(time.clone());
+    assert!(time.run(clock.ready(1_700)));
+    assert_eq!((time.now_us(), clock.ready_us()), (1_700, None));
+}
+
 /// An interrupt wire; the function returns the next edge after a time.
 struct Wire<F>(Time, F);
 

@@ -3,7 +3,7 @@
 use crate::rig::suite::{Pace, Suite, reads_fields};
 use crate::rig::{Model, Rig, Trouble, noise, run};
 use afbc_drivers::ist8310::Ist8310;
-use afbc_drivers::{MagneticReading, PartFault};
+use afbc_drivers::{MagneticReading, PartFault, SensorPart};
 use nalgebra::Vector3;
 
 /// Field along forward, right and down.
@@ -111,6 +111,17 @@ fn fields_of_the_whole_range_are_read_and_none_beyond() {
     let beyond = [[1_610.0, 0.0, 0.0], [0.0, -1_610.0, 0.0], [0.0, 0.0, 2_490.0], [0.0, 0.0, -2_600.0]];
     let fields = [&inside[..], &beyond];
     reads_fields(Ist8310, Registers::new(), |part, field_ut| part.field_ut = field_ut, is_field, fields);
+}
+
+/// The ends of the range belong to it.
+#[test]
+fn the_largest_field_is_read() {
+    let read = |words: [i16; 3]| Ist8310.take(0, words.map(i16::to_le_bytes).as_flattened());
+    let field_ut = read([21_120, -21_120, 32_736]).ok().flatten().expect("a reading").field_ut;
+    assert_eq!(field_ut, Vector3::new(1_600.0, -1_600.0, -2_480.0));
+    for beyond in [[21_121, 0, 0], [0, -21_121, 0], [0, 0, 32_737], [0, 0, -32_737]] {
+        assert_eq!(read(beyond), Err(PartFault::Range), "{beyond:?}");
+    }
 }
 
 #[test]

@@ -467,6 +467,47 @@ proptest! {
     }
 }
 
+/// A fix has the time of its first byte, also behind a frame that lost bytes, which seems to last into the next one. The
+/// broken frame is counted.
+#[test]
+fn a_fix_has_the_time_of_its_first_byte() {
+    let good = frame([0x01, 0x07], &solution(3 * SECOND, &Truth::ZURICH));
+    let mut driver = UbxReceiver::new();
+    let Some(ReceiverAction::Baud(baud)) = driver.poll(0) else { panic!("no baud rate") };
+    let byte_us = 10 * SECOND / u64::from(baud);
+    // Takes the bytes as a line of this baud rate gives them. Returns how much earlier the only fix is than byte `at`.
+    let early_us = |driver: &mut UbxReceiver, begin_us: u64, bytes: &[u8], at: usize| {
+        let arrives_us = |place: usize| begin_us + place as u64 * byte_us;
+        let fixes: Vec<_> =
+            bytes.iter().enumerate().filter_map(|(place, byte)| driver.take(arrives_us(place), *byte)).collect();
+        assert_eq!(fixes.len(), 1, "{at}");
+        arrives_us(at) - fixes[0].at_us
+    };
+    let alone_us = early_us(&mut driver, SECOND, &good, 0);
+    for lost in 1..60 {
+        let begin_us = SECOND + lost as u64 * SECOND;
+        let cut = &good[..good.len() - lost];
+        let behind_us = early_us(&mut driver, begin_us, &[cut, &good].concat(), cut.len());
+        assert!(behind_us.abs_diff(alone_us) <= 1, "{lost} bytes lost: {behind_us} us, alone {alone_us} us");
+        assert_eq!(driver.damaged(), lost as u32);
+    }
+}
+
+/// A receiver that gives sentences only, and then falls silent, is searched for at the other baud rates.
+#[test]
+fn a_receiver_of_sentences_that_changes_its_baud_rate_is_found_again() {
+    let mut model = Model::at(Generation::Six, 9_600);
+    model.deaf = true;
+    let mut bench = Bench::new(model);
+    bench.run(14 * SECOND);
+    assert!(bench.fixes(10 * SECOND).len() >= 9);
+    let before = bench.driver.searches();
+    bench.model.baud = 57_600;
+    bench.run(20 * SECOND);
+    assert_eq!(bench.driver.searches(), before + 1);
+    assert!(bench.fixes(10 * SECOND).len() >= 9);
+}
+
 /// Returns the commands that a receiver of this generation gets until it is configured.
 fn commands(generation: Generation, baud: u32) -> Vec<Vec<u8>> {
     let mut model = Model::at(generation, baud);
