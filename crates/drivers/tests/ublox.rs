@@ -467,8 +467,8 @@ proptest! {
     }
 }
 
-/// A fix has the time of its first byte, also behind a frame that lost bytes, which seems to last into the next one. The
-/// broken frame is counted.
+/// A fix has the time of its first byte, also behind a frame that lost bytes, which seems to last into the next one.
+/// The broken frame is counted.
 #[test]
 fn a_fix_has_the_time_of_its_first_byte() {
     let good = frame([0x01, 0x07], &solution(3 * SECOND, &Truth::ZURICH));
