@@ -234,7 +234,7 @@ impl Subsystem {
         (terms, AdaptationRate { first, second, theta, delta })
     }
 
-    /// Returns u_a + u_r, and advances the estimate if the context allows it. The part of the input that the last step
+    /// Returns u_a + u_r, and advances the estimate if it `adapts`. The part of the input that the last step
     /// could not allocate and the factor on gamma are those of [`SubsystemConditions`].
     // One copy for all six subsystems, not inlined, so that it can use all registers. Numbers are passed in registers,
     // structs in memory.
@@ -245,11 +245,12 @@ impl Subsystem {
         inputs: [f32; 2],
         [unallocated, learning]: [f32; 2],
         context: &StepContext,
+        adapts: bool,
         estimate: &mut AdaptiveEstimate,
     ) -> f32 {
         let conditions = SubsystemConditions { unallocated, learning, printed: context.known.is_none() };
         let (terms, rate) = self.law(&Errors { e2, ..Errors::default() }, inputs, estimate, &conditions);
-        if context.adapt {
+        if adapts {
             advance(estimate, &rate, &self.gains.safeguards, context.dt_s);
         }
         terms.fuzzy + terms.robust
@@ -343,7 +344,7 @@ impl SubsystemLaw for Adaptive {
             None => 0.0,
         };
         let conditions = [context.unallocated[axis], softness * softness];
-        let learnt = subsystem.step(errors.e2, inputs, conditions, context, estimate);
+        let learnt = subsystem.step(errors.e2, inputs, conditions, context, context.adapts(axis), estimate);
         (known + (learnt + proportional(gains.alpha2, &errors)), errors)
     }
 

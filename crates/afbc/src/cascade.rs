@@ -252,9 +252,9 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
             roll_pitch: attitude.roll_pitch,
             rotor_residual_rad_s: *rotor_residual_rad_s,
             dt_s: self.settings.dt_s,
-            // On the ground the feet hold the vehicle against everything but the thrust, so only the thrust is learnt
-            // (`lift`).
+            // On the ground the feet hold the vehicle against everything but the thrust, so only the thrust is learnt.
             adapt: fresh && !touches_ground,
+            adapt_z: fresh && !stands,
             unallocated: &last.unallocated,
             observed_m_s2,
             softness: filters.forces.as_ref().map_or(1.0, ForceObserverMemory::softness),
@@ -263,8 +263,7 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
         let eta_dot = self.eta_dot(state, &attitude);
 
         // Position: subsystems 4, 5, 6.
-        let lift = StepContext { adapt: fresh && !stands, ..context };
-        let [u4, u5, u6] = self.position(&reference, [&lift, &context], estimates, &mut last.errors);
+        let [u4, u5, u6] = self.position(&reference, &context, estimates, &mut last.errors);
         // Desired roll and pitch (40), with the derivatives for (12) and (16).
         let followed = [&reference, setpoint];
         let desired = self.desired.advance(
@@ -416,12 +415,12 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
         u
     }
 
-    /// Returns U4 \[N\], u5 and u6 \[m/s2\]: subsystems 4 (with the context `lift`), 5 and 6.
+    /// Returns U4 \[N\], u5 and u6 \[m/s2\]: subsystems 4, 5 and 6.
     #[inline(always)]
     fn position(
         &self,
         reference: &Setpoint,
-        [lift, context]: [&StepContext; 2],
+        context: &StepContext,
         estimates: &mut PerAxis<L::Estimate>,
         errors: &mut PerAxis<Errors>,
     ) -> [f32; 3] {
@@ -433,7 +432,7 @@ impl<L: SubsystemLaw, const N: usize> Controller<L, N> {
             y.tracking([xi.y, xi_dot.y], [p.y, v.y, a.y]),
             z.tracking([xi.z, xi_dot.z], [p.z, v.z, a.z]),
         );
-        let u4 = self.input(Axis::Z, z, lift, &mut estimates.z, &mut errors.z);
+        let u4 = self.input(Axis::Z, z, context, &mut estimates.z, &mut errors.z);
         let u5 = self.input(Axis::X, x, context, &mut estimates.x, &mut errors.x);
         let u6 = self.input(Axis::Y, y, context, &mut estimates.y, &mut errors.y);
         [u4, u5, u6]

@@ -93,8 +93,11 @@ impl SubsystemLaw for IntegralBackstepping {
         // The integral is limited where it is used, because the input to resume may also ask for more than the bound.
         let i = math::min(math::max(integral.value, -integral_max), *integral_max);
         let winds_up = errors.e2 * context.unallocated[axis] > 0.0;
-        integral.value =
-            if context.adapt && !winds_up { i + kappa * (softness * softness) * errors.e2 * context.dt_s } else { i };
+        integral.value = if context.adapts(axis) && !winds_up {
+            i + kappa * (softness * softness) * errors.e2 * context.dt_s
+        } else {
+            i
+        };
         (fixed + i, errors)
     }
 

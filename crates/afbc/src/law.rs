@@ -49,8 +49,10 @@ pub struct StepContext<'a> {
     pub rotor_residual_rad_s: f32,
     /// Time step \[s\].
     pub dt_s: f32,
-    /// False if estimates must not change.
+    /// False if the estimates of roll, pitch, yaw, x and y must not change.
     pub adapt: bool,
+    /// False if the estimate of z must not change.
+    pub adapt_z: bool,
     /// Part of each subsystem's input that the last step could not allocate; zero without anti-windup.
     pub unallocated: &'a PerAxis<f32>,
     /// f of x, y and z \[m/s2\]: drag, plus the observed part ([`crate::disturbance`]). Zero without an observer.
@@ -66,6 +68,12 @@ impl StepContext<'_> {
     #[inline]
     pub(crate) fn dynamics(&self, model: &ModelConstants, axis: Axis) -> Dynamics {
         model.dynamics_at(axis, &self.state.rates_rad_s, &self.roll_pitch, self.rotor_residual_rad_s)
+    }
+
+    /// Returns true if the subsystem's estimate may change.
+    #[inline(always)]
+    pub(crate) fn adapts(&self, axis: Axis) -> bool {
+        if matches!(axis, Axis::Z) { self.adapt_z } else { self.adapt }
     }
 
     /// Returns the factor on the speed of a subsystem, and its tracking with the approach speed of that factor.

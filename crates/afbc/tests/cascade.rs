@@ -131,6 +131,7 @@ fn compose<L: SubsystemLaw + Copy>(
             rotor_residual_rad_s: carried.rotor_residual_rad_s,
             dt_s: settings.common.dt_s,
             adapt: true,
+            adapt_z: true,
             unallocated: &carried.unallocated,
             observed_m_s2: Vector3::zeros(),
             softness: 1.0,

@@ -111,6 +111,7 @@ proptest! {
             rotor_residual_rad_s: 0.0,
             dt_s: 0.001,
             adapt: true,
+            adapt_z: true,
             unallocated: &PerAxis::default(),
             observed_m_s2: Vector3::zeros(),
             softness: 1.0,
@@ -153,6 +154,7 @@ proptest! {
             rotor_residual_rad_s: 0.0,
             dt_s: 0.001,
             adapt: false,
+            adapt_z: false,
             unallocated: &PerAxis::default(),
             observed_m_s2: Vector3::zeros(),
             softness,
@@ -200,6 +202,7 @@ proptest! {
             rotor_residual_rad_s,
             dt_s: 0.001,
             adapt: false,
+            adapt_z: false,
             unallocated: &PerAxis::default(),
             observed_m_s2,
             softness: 1.0,
@@ -362,6 +365,7 @@ proptest! {
                 rotor_residual_rad_s: 0.0,
                 dt_s,
                 adapt: false,
+                adapt_z: false,
                 unallocated: &PerAxis::default(),
                 observed_m_s2: Vector3::zeros(),
                 softness: 1.0,
@@ -371,7 +375,7 @@ proptest! {
             prop_assert_eq!((u, seen, frozen), (terms.sum(), errors, before));
 
             let mut moved = before;
-            let (u, _) = law.input(axis, &tracking, &StepContext { adapt: true, ..context }, &mut moved);
+            let (u, _) = law.input(axis, &tracking, &StepContext { adapt: true, adapt_z: true, ..context }, &mut moved);
             prop_assert_eq!(u, terms.sum());
             for ((moved, before), rate) in moved.theta.iter().zip(before.theta.iter()).zip(rate.theta().iter()) {
                 // The rate's factors round four times, the sum once.
