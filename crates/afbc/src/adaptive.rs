@@ -234,8 +234,8 @@ impl Subsystem {
         (terms, AdaptationRate { first, second, theta, delta })
     }
 
-    /// Returns u_a + u_r, and advances the estimate if it `adapts`. The part of the input that the last step
-    /// could not allocate and the factor on gamma are those of [`SubsystemConditions`].
+    /// Returns u_a + u_r, and advances the estimate if it `adapts`. The part of the input that the last step could not
+    /// allocate and the factor on gamma are those of [`SubsystemConditions`].
     // One copy for all six subsystems, not inlined, so that it can use all registers. Numbers are passed in registers,
     // structs in memory.
     #[inline(never)]

@@ -51,7 +51,7 @@ fn step(
         rotor_residual_rad_s: 0.0,
         dt_s: DT_S,
         adapt,
-        adapt_z: adapt,
+        adapt_z: !adapt,
         unallocated: &PerAxis { x: unallocated, ..PerAxis::default() },
         observed_m_s2: Vector3::zeros(),
         softness: 1.0,
